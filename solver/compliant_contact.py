@@ -34,9 +34,8 @@ LARGEST_CONTACT_STIFFNESS = 1e22
 def with_contact_stiffness(model: ReducedModel, contact_stiffness: float) -> ReducedModel:
     """The model with a spring in series with each displacement of each pair.
 
-    The relative displacements of the new model are those of the contact, at the same indices. Behind all displacements
-    of the model follow the scaled compressions of the springs, one for each relative displacement. Responses, loads and
-    all else are the same.
+    The relative displacements of the new model are those of the contact, at the same indices; the scaled compressions
+    of the springs are further displacements at the end.
 
     contact_stiffness: kappa_N per area, N/m3; the tangential one is `TANGENTIAL_RATIO` times as large.
     Raises ValueError where it is not between 0 and `LARGEST_CONTACT_STIFFNESS`.

@@ -62,31 +62,19 @@ def backbone(
 
     By the extended periodic motion concept (`solver.modes.modal_model`). A point that fails spoils no other one.
 
-    Parameters
-    ----------
-    model
-        From `build_model`, `studies.build_scene` or `studies.read_scene`. Its harmonic load is not used.
-    amplitude
-        (n_amplitude,) or one number, m sqrt(kg), in any order: modal amplitude, as in `Backbone`. The mode at an
-        amplitude does not depend on the other amplitudes.
-    friction_coefficient
-        One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
-    mode
-        Number of the linear mode, from 1 on in ascending frequency, from which the nonlinear one begins: closed pairs
-        stick. Of a joint that has fewer such modes, as a mass on a rigid slider: closed pairs slide.
-    sweep
-        Loading history: the amplitude is raised from zero ("up"), or raised to at least twice the amplitude of the
-        point and then lowered ("down"). A joint whose mode exists only while it slides has "down" alone.
-    settings
-        The defaults of `SolverSettings` if not given.
-    wear_depth
-        (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
+    - model: from `build_model`, `studies.build_scene` or `studies.read_scene`. Its harmonic load is not used.
+    - amplitude: (n_amplitude,) or one number, m sqrt(kg), in any order: modal amplitude, as in `Backbone`. The mode at
+      an amplitude does not depend on the other amplitudes.
+    - friction_coefficient: of all pairs, or (n_contact,). None for a model with its own, e.g. from a scene file.
+    - mode: number of the linear mode, from 1 on in ascending frequency, from which the nonlinear one begins: closed
+      pairs stick. Of a joint that has fewer such modes, as a mass on a rigid slider: closed pairs slide.
+    - sweep: the amplitude is raised from zero ("up"), or raised to at least twice the amplitude of the point and then
+      lowered ("down"). A joint whose mode exists only while it slides has "down" alone.
+    - settings: the defaults of `SolverSettings` if not given.
+    - wear_depth: (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
 
-    Raises
-    ------
-    ValueError
-        A number is out of its range; the model lacks nodal diameters that the harmonics need; friction coefficients
-        are given twice, not at all, or not to each pair.
+    Raises ValueError where a number is out of its range, where the model lacks nodal diameters that the harmonics need,
+    and where friction coefficients are given twice, not at all, or not to each pair.
     """
     settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("amplitude", amplitude, above=0.0)

@@ -37,6 +37,11 @@ FINE_SAMPLES = 2048
 """Points of a period in the search for a missed event and for the largest response: a sine can exceed a limit between
 them by 1e-6 only, and a peak of harmonic 20 is found to 0.05 %."""
 
+ROUGH_SHARE = 1e-3
+"""Largest residual of a state that is no result, as a fraction of rtol. With a tenth and with ten times this value the
+motion of the dovetail is equal to 1e-4; with the tolerance of a result nodes take 1.4 times the iterations, and
+reference solutions 1.3 times for errors that are equal to three digits (16 pairs, 212.42 to 213 Hz)."""
+
 Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
 """Scheme of the steps on the slow time scale."""
@@ -119,6 +124,11 @@ class SolverSettings:
     def automatic(self) -> bool:
         """Whether harmonics or samples are chosen automatically."""
         return self.harmonics == "auto" or self.samples == "auto"
+
+    @property
+    def rough_tolerance(self) -> float:
+        """Tolerance of a state that is no result: on the way of a sweep, in a comparison, of a reference solution."""
+        return max(self.tolerance, ROUGH_SHARE * self.rtol)
 
 
 @packable

@@ -14,18 +14,21 @@ from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import BalanceAt, State, largest_responses
+from solver.harmonic_balance.state import BalanceAt, Failure, State, largest_responses
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.presentation import NOT_IN_DATASETS, PresentedCurve
 from solver.settings import Direction, SolverSettings
-from solver.stability.floquet import Multipliers, Stability, find_multipliers, is_stable
+from solver.stability.floquet import Multipliers, Stability, find_multipliers
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 
 _LEAST_PART = 0.1  # of the first value: how far a curve may turn back
 _FEWEST_STEPS = 50  # of a curve without folds: enough for a drawing
+
+_Branch = tuple[list[State], list[int], Failure]
+"""States in the order of the curve, indices of the folds among them, and how the curve ends."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -123,7 +126,7 @@ def response_curve(
         return Balance(joint, history, balance.wear_depth)
 
     if at is None or not start.outcome.complete:
-        branch = _Branch((), (), start.outcome, start.message)
+        branch: _Branch = [], [], Failure(start.outcome, start.message)
     else:
         # a branch may turn back behind its start before it comes to the last value
         back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
@@ -131,16 +134,6 @@ def response_curve(
         arc = Arc(balance_at, State(at, balance.history, float(first)), span, Run(settings.tolerance))
         branch = _follow_branch(arc, last, back, most, over_frequency)
     return _reported(case, branch, balance_at, over_frequency, errors)
-
-
-@dataclass(frozen=True)
-class _Branch:
-    """Converged states of a branch in the order of the arc, indices of the folds among them, and how it ended."""
-
-    points: tuple[State, ...]
-    folds: tuple[int, ...]
-    outcome: Outcome
-    message: str
 
 
 def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency: bool) -> _Branch:
@@ -162,7 +155,7 @@ def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency
             if passed[0] == back:
                 said = "the curve turns back as far as {}: begin farther away"
             elif end is not None:
-                return _Branch(tuple(points), tuple(folds), Outcome.CONVERGED, "")
+                return points, folds, Failure(Outcome.CONVERGED)
             break
         points.append(reached)
         if len(points) >= most:
@@ -170,18 +163,19 @@ def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency
             break
     at = points[-1].parameter
     end_at = f"{at / (2.0 * np.pi):.6g} Hz" if over_frequency else f"{at:.6g} N"
-    return _Branch(tuple(points), tuple(folds), Outcome.BRANCH_LOST, said.format(end_at))
+    return points, folds, Failure(Outcome.BRANCH_LOST, said.format(end_at))
 
 
 def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool) -> ResponseCurve:
     """The curve of a branch, each point with its error and multipliers."""
-    n_response, n_points = len(case.model.linear[0].response), len(branch.points)
+    points, folds, ended = branch
+    n_response, n_points = len(case.model.linear[0].response), len(points)
     response = np.empty((n_points, n_response), np.complex128)
     peak, error = np.empty((n_points, n_response)), np.full(n_points, np.nan)
     found: list[Multipliers] = []
     stability: list[Stability] = []
     balances: list[HarmonicBalance] = []
-    for index, point in enumerate(branch.points):
+    for index, point in enumerate(points):
         balance, at = balance_at(point.parameter, point.history), point.evaluation
         joint, run = balance.joint, Run(case.settings.tolerance)
         response[index] = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
@@ -191,10 +185,8 @@ def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency
             estimate = refine(case, joint.omega, joint.excitation_amplitude, point, run).estimate.response
             error[index] = estimate if np.isfinite(estimate) else np.inf
         found.append(find_multipliers(case, joint, at, run))
-        stability.append(found[-1].stability(odd=not is_stable(balance, at, run.fresh())))
+        stability.append(found[-1].stability(odd=not run.fresh().is_stable(balance, at)))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
-    is_fold = np.zeros(n_points, bool)
-    is_fold[list(branch.folds)] = True
     return ResponseCurve(
         parameter="frequency" if over_frequency else "excitation_amplitude",
         frequency=np.array([each.frequency for each in balances]),
@@ -202,11 +194,11 @@ def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency
         response=response,
         response_peak=peak,
         response_error=error,
-        is_fold=is_fold,
+        is_fold=np.isin(np.arange(n_points), folds),
         stability=tuple(stability),
         multipliers=tuple(each.values for each in found),
         multiplier_error=np.array([each.error for each in found]),
-        outcome=branch.outcome,
-        message=branch.message,
+        outcome=ended.outcome,
+        message=ended.message,
         _balances=tuple(balances),
     )

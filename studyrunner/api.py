@@ -89,5 +89,6 @@ def run_study(
     shown = ProgressDisplay(quiet=not progress)
     # the scene as well: with two threads its matrices differ in the last bits, and start states with them
     with threadpool_limits(1):
-        compute_study(Ranks(), study, target, RunOptions(fresh, retry_failed, checked), shown, shown.say)
+        given = RunOptions(fresh, retry_failed, checked, "the same call")
+        compute_study(Ranks(), study, target, given, shown, shown.say)
     return open_result(target.path)

@@ -17,7 +17,6 @@ from studyrunner.mpi.ranks import (
     LauncherError,
     RankInterrupted,
     Ranks,
-    check_software,
     job_size,
     launcher_rank,
     start_ranks,
@@ -149,7 +148,6 @@ def _follow(ranks: Ranks) -> int:
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     """Rank 0: its exit status."""
     try:
-        check_software(ranks)
         from studyrunner.options import parse_options
 
         options = parse_options(arguments)
@@ -170,8 +168,6 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
         raise_ending()
         print(*(f"run-study: {line}" for line in str(error).splitlines()), sep="\n", file=sys.stderr)
-    except LauncherError as error:
-        print(f"run-study: launcher: {error}", file=sys.stderr)
     except SystemExit:
         return CONVERGED
     return BAD_INPUT

@@ -34,16 +34,16 @@ from studyrunner.user_error import UserError, Verbatim, show_text
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What a run does with earlier results, and the date in the file.
+    """What a run does with earlier results, and the date in the file, as `check_date` gives it; None for none.
 
-    fresh: whether the run begins anew. Else the run continues what an earlier one has left.
-    retry_failed: whether failed points are computed again.
-    date: date of creation, as `check_date` gives it; None for no date in the file.
+    fresh: whether the run begins anew. retry_failed: whether failed points are computed again. again: what goes on
+    after an end from outside, in words.
     """
 
     fresh: bool = False
     retry_failed: bool = False
     date: str | None = None
+    again: str = "the same command"
 
 
 def compute_study(
@@ -55,36 +55,13 @@ def compute_study(
     say: Callable[[str], None],
     notes: Sequence[str] = (),
 ) -> Counter[int]:
-    """Rank 0: computes a study together with the other ranks and writes the file `target.path`.
+    """Rank 0: computes a study together with the other ranks, writes its result, and counts the points of each outcome.
 
-    A finished result at this path is replaced by a result without missing points only.
-
-    Parameters
-    ----------
-    ranks, study, options
-        The ranks, the study that they compute, and what is done with earlier results.
-    target
-        The result file, as `check_result` gives it.
-    display
-        What the user sees while the tasks are done.
-    say
-        Takes a line on what is done before: a wrong scene is bad input, which ends with one line.
-    notes
-        Lines for the user.
-
-    Returns
-    -------
-    Counter
-        Number of points of each outcome.
-
-    Raises
-    ------
-    UserError
-        Where a scene is wrong, or another run uses the file of the progress.
-    StorageError
-        Where something cannot be written.
-    KeyboardInterrupt
-        Where the run is ended from outside, with what is left in words; finished points have been written.
+    target: as `check_result` gives it; a finished result is replaced by one without missing points only. display: what
+    the user sees while the tasks are done, notes first. say: takes a line on what is done before: a wrong scene is bad
+    input, which ends with one line. Raises UserError where a scene is wrong, or another run uses the file of the
+    progress; StorageError where something cannot be written; KeyboardInterrupt where the run is ended from outside,
+    with what is left in words, after finished points have been written.
     """
     with _open_progress(target) as store:
         scenes = build_scenes(ranks, study, store, say)
@@ -115,15 +92,15 @@ def compute_study(
                 arrays = small_arrays(study, scenes.scenes, scenes.facts, scenes.variables)
                 return write_result(study, facts, completion, target, arrays, attributes, scenes.kept)
 
-            return _compute(ranks, study, StudyRun(completion, scenes.models, display), completion, target, write)
+            return _compute(ranks, study, StudyRun(completion, scenes.models, display), target, options.again, write)
 
 
 def _compute(
     ranks: Ranks,
     study: Study,
     run: StudyRun,
-    completion: CompletionIndex,
     target: Target,
+    again: str,
     write: Callable[[], Counter[int]],
 ) -> Counter[int]:
     """Has the tasks done that are left and writes the result, also where the run is ended from outside."""
@@ -141,12 +118,10 @@ def _compute(
         begin_ending()
         outcomes = write()
         if n_left := outcomes[Outcome.NOT_COMPUTED]:
-            n_points, name = completion.plan.n_points, target.path.name
+            name, n_points = target.path.name, outcomes.total()
             done = f"{n_points - n_left} of {count(n_points, 'point')}"
             kept = f"{done} are kept, {name} is the finished result that it was" if target.finished else ""
-            raise KeyboardInterrupt(
-                f"interrupted: {kept or f'{name} holds {done}'}, the same command goes on"
-            ) from None
+            raise KeyboardInterrupt(f"interrupted: {kept or f'{name} holds {done}'}, {again} goes on") from None
     return outcomes
 
 

@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,7 @@ from fretwear import (
 )
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studyrunner.cli import main
+from tests.solver.models import OMEGA, random_model
 from tests.studyrunner.faked_runs import Solver
 
 ROOT = Path(solver.__file__).parents[1]
@@ -256,6 +258,25 @@ def test_one_joint_gives_the_bits_of_a_study(result):
     for name in ("worn_volume", "wear_rate", "worn_volume_error", "residual"):
         np.testing.assert_array_equal(getattr(history, name), at[name])
     np.testing.assert_array_equal(history.wear_depth[:, 0], at.wear_depth)
+
+
+@pytest.mark.slow
+def test_friction_is_one_number_or_one_of_each_pair_or_that_of_the_model():
+    model, settings = random_model(3, ("constant_load_one_tangent",) * 2), SolverSettings(1, 32)
+    own = replace(model, contact=replace(model.contact, friction_coefficient=np.array([0.2, 0.6])))
+    at = OMEGA / (2.0 * np.pi), 120.0
+    one, same, other = (
+        frequency_response(model, *at, given, settings=settings).response for given in (0.4, [0.4, 0.4], [0.2, 0.6])
+    )
+    np.testing.assert_array_equal(one, same)
+    assert one[0, 0] != other[0, 0]
+    step = {"scheme": "implicit", "step": 10.0, "settings": settings}
+    given, taken = (march_wear(of, *at, mu, 1e-11, 10.0, **step) for of, mu in ((model, [0.2, 0.6]), (own, None)))
+    assert given.worn_volume[-1] > 0.0
+    np.testing.assert_array_equal(given.response[0], other[0])
+    np.testing.assert_array_equal(given.wear_depth, taken.wear_depth)
+    with pytest.raises(ValueError, match=r"^friction_coefficient is given twice: the scene has one of each pair"):
+        frequency_response(own, *at, 0.4)
 
 
 def test_results_are_datasets_files_pictures_and_five_lines(tmp_path):

@@ -28,7 +28,7 @@ from solver.accuracy.harmonic_levels import (
 )
 from solver.accuracy.resolved_state import FAINT_SHARE, ResolvedState
 from solver.harmonic_balance.state import State
-from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, FORCING, SMALL_JOINT
+from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, SMALL_JOINT
 from solver.newton.run import Run
 from solver.settings import FINE_SAMPLES, Resolution
 from solver.structure.joint import Case, Joint
@@ -218,7 +218,7 @@ class _Search:
 
     def _compared(self, here: ResolvedState, resolution: Resolution) -> ResolvedState | None:
         """The state with other harmonics and samples, as accurately as a comparison needs; None where not found."""
-        return here.solve_at(resolution, self.run.to(max(self.run.tolerance, FORCING * here.case.settings.rtol)))
+        return here.solve_at(resolution, self.run.to(here.case.settings.rough_tolerance))
 
     def _next(
         self, here: ResolvedState, wanted: Resolution, finer: ResolvedState | None, richer: ResolvedState | None

@@ -105,8 +105,7 @@ def advance_monodromy(
 ) -> None:
     """Multiply the monodromy (2, 2) by the derivative of one sample that slips or is separated, in place.
 
-    The monodromy is the derivative of the state by the state at the start of the period. Slip leaves only changes of
-    the state across the slip direction, separation leaves none.
+    Slip leaves only changes of the state across the slip direction, separation leaves none.
     """
     limit = friction_limit(friction, normal)
     if status == SEPARATED or limit == 0.0:
@@ -124,9 +123,9 @@ def advance_monodromy(
 def closed_fraction(force: float, neighbour: float) -> tuple[float, float, float]:
     """Mean normal force over the half step towards a neighbour, and its derivatives by both predicted normal forces.
 
-    `force` is positive. The predicted normal force is linear between two samples, and the pair opens or closes at its
-    zero. The half step next to an opening is weighted by the closed fraction of the step. Without this weight each
-    change of a status is a corner of the residual, and a branch with hard impacts breaks up into small folds.
+    `force` is positive. The predicted normal force is linear between two samples; the half step next to an opening has
+    the weight of the closed fraction of the step. Without it each change of a status is a corner of the residual, and a
+    branch with hard impacts breaks up into small folds.
     """
     if neighbour >= 0.0:
         return force, 1.0, 0.0

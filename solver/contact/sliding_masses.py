@@ -267,20 +267,20 @@ def mass_tangent(
         limit_t = friction_limit(friction, normal_t)
         pulls = period.predicted_t[pair, 1:]
         slopes, speed_t = mass_slopes(pulls, limit_t, period.start[pair], gains, masses.line[pair])
-        dforce_t, work, leave = np.empty((n_samples, 2, 3 * m + 2)), np.zeros(3 * m + 2), np.empty((5, 3 * m + 2))
-        entry = start_columns(3 * m)
+        dforce_t, work, after = np.empty((n_samples, 2, 3 * m + 2)), np.zeros(3 * m + 2), np.empty((5, 3 * m + 2))
+        velocity = start_columns(3 * m)
         for n in range(n_samples):
             by_limit = friction if normal_t[n] > 0.0 else 0.0
             for row in range(5):
                 by = slopes[n, row]
-                leave[row] = by[2] * entry[0] + by[3] * entry[1]
+                after[row] = by[2] * velocity[0] + by[3] * velocity[1]
                 for k in range(m):
-                    leave[row, m + k] += by[0] * mean_t[n, k]
-                    leave[row, 2 * m + k] += by[1] * mean_t[n, k]
-                    leave[row, k] += by[4] * (by_limit * point_t[n, k])
-            dforce_t[n] = leave[:2]
-            work += normal_t[n] * masses.step * leave[4]
+                    after[row, m + k] += by[0] * mean_t[n, k]
+                    after[row, 2 * m + k] += by[1] * mean_t[n, k]
+                    after[row, k] += by[4] * (by_limit * point_t[n, k])
+            dforce_t[n] = after[:2]
+            work += normal_t[n] * masses.step * after[4]
             if normal_t[n] > 0.0:
                 work[:m] += speed_t[n] * masses.step * point_t[n]
-            entry[:, :] = leave[2:4]
-        assemble(out[0][pair], out[1][pair], dforce_t, work, periodic_start(entry)[0], analysis_t)
+            velocity[:, :] = after[2:4]
+        assemble(out[0][pair], out[1][pair], dforce_t, work, periodic_start(velocity)[0], analysis_t)

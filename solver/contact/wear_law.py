@@ -46,8 +46,6 @@ class WearLaw:
     - table: of the law "table".
     - surfaces: factor of the wear coefficient for each label of a surface. A pair whose label names both sides, as
       "flat/cylinder", has the sum of both factors. Empty: factor 1 for each pair.
-    - proportional: whether the wear rate is proportional to the wear coefficient, as of all laws here: a history then
-      depends on `k_w` times cycles only.
     - worn: depth of each pair at the start of a history, m, from which the depths of the law "table" count; empty: 0.
     """
 
@@ -55,7 +53,6 @@ class WearLaw:
     threshold: float = 0.0
     table: WearTable | None = None
     surfaces: tuple[tuple[str, float], ...] = ()
-    proportional: bool = True
     worn: tuple[float, ...] = ()
 
     def begun_at(self, depth: FloatArray) -> WearLaw:

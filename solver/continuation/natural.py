@@ -1,12 +1,9 @@
 """Steps along a parameter, natural steps, shakedown of sliding masses by them, and constants that all searches share.
 
-The length of a step follows from the change of the state over the step, or its local error, over the one allowed
-(`take_step`: along frequency, load, amplitude, cycles or missions). Natural steps of Newton's method alone are halved
-where it fails (`follow_naturally`).
-
-The parameter is the frequency, the load, or the fraction of a change of the tangential history or of the wear depth.
-The *change* of the vibration is `vibration_change` of two states, relative to the first one. A state that is found is
-exact to the tolerance for all values of the constants.
+The length of a step along frequency, load, amplitude, cycles or missions follows from the change of the state over the
+step, or its local error, over the one allowed (`take_step`). Natural steps of Newton's method alone are halved where it
+fails (`follow_naturally`). The *change* of the vibration is `vibration_change` of two states, relative to the first
+one. A state that is found is exact to the tolerance for all values of the constants.
 """
 
 from __future__ import annotations
@@ -41,7 +38,6 @@ LINEAR_CHANGE = 1.0
 """Largest change over a step between two states in which no pair slips or opens. The reversal of phase at a linear
 resonance is a change of 2."""
 
-
 STEP_SAFETY = 0.85
 """Length of a step over the length with the allowed error, and the largest factor on a step that was refused."""
 
@@ -57,7 +53,7 @@ EndT = TypeVar("EndT")
 
 
 class Line(Protocol[HereT, EndT]):
-    """What is marched along."""
+    """What the steps go along."""
 
     def attempt(self, here: HereT, length: float, /) -> EndT | None:
         """End of a step; None where it is not found."""

@@ -32,7 +32,6 @@ from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
-from solver.stability.floquet import is_stable
 from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -161,7 +160,7 @@ def relax_to_periodic(
         change = _change(motion, ahead)
         too_far = change > 2.0 * SMOOTH_CHANGE and length > 1.0
         # a step over more than the time in which a motion grows would damp this motion
-        damped = grows and result.converged and not is_stable(balance, result.evaluation, run)
+        damped = grows and result.converged and not run.is_stable(balance, result.evaluation)
         if damped and result.iterations == 0:
             return Outcome.UNSTABLE
         if not result.converged or too_far or damped:
@@ -182,7 +181,7 @@ def relax_to_periodic(
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
             found = run.state(balance, predicted)
             left -= budget.iterations - before
-            if found is not None and not is_stable(balance, found.evaluation, run):
+            if found is not None and not run.is_stable(balance, found.evaluation):
                 grows = True
             elif found and _change(transient.periodic(found.evaluation), motion) < SMOOTH_CHANGE:
                 return found

@@ -21,11 +21,9 @@ from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, carried_history, history_at_rest, vibration_change, vibration_size
 from solver.model import FloatArray
-from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, first_resolution
-from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
@@ -78,10 +76,6 @@ class Path(Protocol[S]):
     @property
     def steps(self) -> tuple[float, float, float]:
         """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
-
-    @property
-    def node_tolerance(self) -> float:
-        """Tolerance of the scaled residual of a node; results are solved to that of the settings."""
 
     def ahead(self, parameter: float, length: float) -> float:
         """The parameter a step farther, or back where the length is below 0."""
@@ -154,11 +148,6 @@ class LoadingPath:
         """As in Path, over the frequency or the whole load."""
         return SHORTEST_STEP, LONGEST_STEP, FREE_STEP
 
-    @property
-    def node_tolerance(self) -> float:
-        """As in Path."""
-        return max(self.case.settings.tolerance, FORCING * self.case.settings.rtol)
-
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""
         if self.omega is None:
@@ -183,7 +172,7 @@ class LoadingPath:
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
             balance = self.balance_at(end.parameter, end.evaluation.history)
-            if arrived and is_stable(balance, end.evaluation, run):
+            if arrived and run.is_stable(balance, end.evaluation):
                 return Step(end, tuple(folds))
             # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
@@ -291,4 +280,4 @@ def choose_resolution(case: Case, joint: Joint, point: State, run: Run) -> Refin
 def _stable(balance: Balance, begin: FloatArray, target: float, run: Run) -> State | None:
     """Stable state of a balance near a predicted force (n_rel, m), N; None where none is found."""
     found = run.state(balance, begin, target, NEAR_ITERATIONS)
-    return found if found is not None and is_stable(balance, found.evaluation, run) else None
+    return found if found is not None and run.is_stable(balance, found.evaluation) else None

@@ -33,7 +33,6 @@ from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.settings import Direction, FollowedFrequency, SolverSettings
-from solver.stability.floquet import is_stable
 
 
 def follow_branch(
@@ -165,7 +164,7 @@ def _resonance_between(
         found = None
     for fold in step.folds:
         before_fold = (fold - omega) * nodes.direction > FREE_STEP * fold
-        if found is None or not before_fold or not is_stable(found.balance, found.at, run):
+        if found is None or not before_fold or not run.is_stable(found.balance, found.at):
             back = "down" if line.sweep == "up" else "up"
             over = f"resonance at {fold / (2.0 * math.pi):.6g} Hz"
             raise _NoResonanceError(f'the sweep {line.sweep} jumps over the {over}: give sweep = "{back}"')

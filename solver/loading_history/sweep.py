@@ -194,7 +194,7 @@ class Sweep(Generic[S]):
 
     def attempt(self, here: S, length: float) -> Step[S] | None:
         """As in Line."""
-        run = self.run.to(self.path.node_tolerance)
+        run = self.run.to(self.path.case.settings.rough_tolerance)
         found = self.path.solve(self.state.nodes.states, self._target(here, length), run)
         return None if found is None else Step(found)
 
@@ -277,8 +277,8 @@ class Sweep(Generic[S]):
         nodes = self.state.reference
         for target in targets:
             if nodes is not None:
-                path, run = self.path.at(nodes.resolution), self._reference_run.to(self.path.node_tolerance)
-                found = path.solve(nodes.states, target, run)
+                path, rough = self.path.at(nodes.resolution), self.path.case.settings.rough_tolerance
+                found = path.solve(nodes.states, target, self._reference_run.to(rough))
                 nodes = None if found is None else nodes.then(found)
         return nodes
 

@@ -29,7 +29,7 @@ from solver.results.verdict import first_cut_off
 from solver.settings import Direction, Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
-from solver.wear.integrate import Integrations, Like, SlowTime
+from solver.wear.integrate import Guide, Integrations, SlowTime
 from solver.wear.rate_slope import rate_slope
 from solver.wear.step import Adaptive
 from solver.wear.wearing_joint import WearingJoint, WearState
@@ -75,7 +75,7 @@ class BlockRun:
     response_error, growth_error: estimated relative errors of responses and growth.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
     held, cut_off: whether a joint that slides as a whole was held, or a pair at an edge of the contact carries load.
-    like, begun: what the reference solution takes over, and the next mission (None for a block that continues).
+    guide, begun: what the reference solution takes over, and the next mission (None for a block that continues).
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: of Newton's method, start state included.
     sweep_rate: |df/dt| / (zeta f)^2 of a passage; 0 for steady vibration.
@@ -90,7 +90,7 @@ class BlockRun:
     inaccurate: float = 0.0
     held: bool = False
     cut_off: bool = False
-    like: Like | None = None
+    guide: Guide | None = None
     last: StartState | None = None
     begun: Begun | None = None
     iterations: int = 0
@@ -104,7 +104,7 @@ class BlockCase:
     mission, place: the mission, and the place of the block in it. depth (n_contact,): m, worn before the block.
     deadline: CPU time of the thread, s, at which the time of the history is over.
     carried: state that the block continues; None for a block that begins anew.
-    begun, like: of this block in an earlier mission, and in the history for its reference solution; else None.
+    begun, guide: of this block in an earlier mission, and in the history for its reference solution; else None.
     with_slope: whether the slope of the growth is asked for.
     every: whether stability is tested at begin and end, also where nothing speaks for a loss of stability.
     """
@@ -115,7 +115,7 @@ class BlockCase:
     deadline: float = math.inf
     carried: StartState | None = None
     begun: Begun | None = None
-    like: Like | None = None
+    guide: Guide | None = None
     with_slope: bool = False
     every: bool = True
 
@@ -172,8 +172,8 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     counts = np.array([0.0, cycles])
     asked = SlowTime(work.wear_coefficient, Adaptive(work.case.settings.rtol), counts, law=work.law, ends_at_last=True)
     solve = Integrations(work.case, start)
-    like, every = case.like, case.every
-    ended = solve.history(asked, stable_end=every) if like is None else solve.reference(asked, like, counts)
+    guide, every = case.guide, case.every
+    ended = solve.history(asked, stable_end=every) if guide is None else solve.reference(asked, guide, counts)
     state = ended.state
     if state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return ended.failure
@@ -197,7 +197,7 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         inaccurate=state.worst.largest if state.inaccurate_from <= cycles else 0.0,
         held=state.held_from <= cycles,
         cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
-        like=Like(ended.course.resolutions, state.step_limit),
+        guide=Guide(ended.course.resolutions, state.step_limit),
         last=_last(state, start) if case.is_continued else None,
         begun=begun,
         iterations=start.newton_iterations + ended.iterations,
@@ -256,7 +256,7 @@ def _again(case: BlockCase, begun: Begun) -> StartState | None:
     try:
         found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if found is None or not path.forgets(found):
-            every_node = 1 if case.like is None else NODES_OF_A_REFERENCE_STEP
+            every_node = 1 if case.guide is None else NODES_OF_A_REFERENCE_STEP
             found, most = _through_nodes(path, begun, target, every_node, run), CHANGE_OF_A_WAY
         if found is None or vibration_change(at, found.evaluation) > most:
             return None
@@ -282,7 +282,9 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: i
     ahead, halvings = [*nodes, target], 0
     while ahead:
         here, parameter = states[-1], ahead[0]
-        after = coarse.solve(states, parameter, run if parameter == target else run.to(coarse.node_tolerance))
+        after = coarse.solve(
+            states, parameter, run if parameter == target else run.to(coarse.case.settings.rough_tolerance)
+        )
         if after is not None and coarse.change(here, after, float(every_node)) <= LARGEST_CHANGE:
             states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)

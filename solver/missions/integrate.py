@@ -205,14 +205,14 @@ class Missions:
     ) -> tuple[BlockRun, ...] | Failure:
         """Compute the blocks of the mission of a number behind a node. depth (n_contact,): m, before the mission."""
         mission, fine, carried = self.mission, self.progress.fine, now.runs[-1].last
-        likes = () if fine is None else fine.nodes[int(np.searchsorted(fine.ends, number))].runs
+        guides = () if fine is None else fine.nodes[int(np.searchsorted(fine.ends, number))].runs
         # as in a wear history: stability is tested at the begin and the end
         every = fine is None and number in (1, mission.missions[-1])
         runs: list[BlockRun] = []
         deadline = self._began + mission.settings.time_limit
         for place, block in enumerate(mission.blocks):
-            like, begun = likes[place].like if likes else None, self._begun[place]
-            case = BlockCase(mission, place, depth, deadline, carried, begun, like, with_slopes, every)
+            guide, begun = guides[place].guide if guides else None, self._begun[place]
+            case = BlockCase(mission, place, depth, deadline, carried, begun, guide, with_slopes, every)
             through = run_passage if isinstance(block.frequency, Passage) else run_block
             found = guarded(partial(through, case))
             if isinstance(found, Failure):

@@ -44,7 +44,7 @@ from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
 from solver.structure.joint import friction_of_pairs
-from solver.wear.integrate import RTOL_RATIO, Like
+from solver.wear.integrate import RTOL_RATIO, Guide
 from solver.wear.rate_slope import rate_slope
 
 FIRST_FREQUENCIES = 17
@@ -129,7 +129,7 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
         inaccurate=max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0),
-        like=Like(resolutions, math.nan),
+        guide=Guide(resolutions, math.nan),
         last=ends[-1].start if case.is_continued else None,
         begun=Begun(swept.needed),
         iterations=swept.iterations,
@@ -167,7 +167,7 @@ def parts_of(states: Sequence[SweptState]) -> FloatArray:
 def find_states(case: BlockCase) -> Swept | Failure:
     """The states of one passage at the depth before it, as many as its wear needs."""
     passage, area = case.block.passage, case.mission.area
-    aim = FREQUENCY_ERROR * (1.0 if case.like is None else RTOL_RATIO) * case.mission.settings.rtol
+    aim = FREQUENCY_ERROR * (1.0 if case.guide is None else RTOL_RATIO) * case.mission.settings.rtol
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
@@ -239,9 +239,9 @@ def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Fa
     """States of the sweep through the range at given frequencies, ascending, Hz."""
     passage, found = case.block.passage, []
     line = case.line(passage.sweep)
-    if case.like is not None:
+    if case.guide is not None:
         # errors of a reference solution are not used
-        line.known = case.like.resolutions
+        line.known = case.guide.resolutions
     for index, start in follow_line(line, frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)

@@ -119,11 +119,6 @@ class NonlinearMode:
         shortest = math.log1p(FREE_STEP)
         return shortest, math.log(LARGEST_STEP_RATIO), shortest
 
-    @property
-    def node_tolerance(self) -> float:
-        """As in Path."""
-        return self.case.settings.tolerance
-
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path."""
         return parameter * math.exp(length)

@@ -21,8 +21,7 @@ from solver.newton.period_preconditioner import PeriodFactor, build_period_facto
 from solver.settings import NEGLIGIBLE
 
 FORCING = 1e-3
-"""Relative residual of a Newton direction (dovetail with half and twice this value: equal to 1e-6). Also the residual
-of a node of a sweep as a fraction of rtol: with a tenth and with ten times this value the motion is equal to 1e-4."""
+"""Relative residual of a Newton direction (dovetail with half and twice this value: equal to 1e-6)."""
 
 KEPT_PRODUCTS = 25
 """Most products of a solve with a kept factorisation, before a new one is built, which takes as long as 20 products

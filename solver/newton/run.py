@@ -6,7 +6,7 @@ of an arc-length step, the frequency at a given phase lag, frequency, damping an
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -270,7 +270,20 @@ class Run:
 
     def step(self, balance: Balance, at: Evaluation, right: FloatArray, rtol: float = FORCING) -> FloatArray:
         """Step (n_rel, m), N, with Jacobian times step = right (n_rel, m), N, in a state, to a relative residual."""
-        return self.solver.solve(balance.linearise(at), right, rtol)
+        return np.asarray(self.steps(balance, at, [right], rtol)[0])
+
+    def steps(
+        self, balance: Balance, at: Evaluation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
+    ) -> FloatArray:
+        """Steps (k, n_rel, m), N, for k right-hand sides, as `step`."""
+        return self.solver.solve_all(balance.linearise(at), rights, rtol)
+
+    def is_stable(self, balance: Balance, at: Evaluation) -> bool:
+        """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`).
+
+        balance: of the state at a fixed wear depth, as the vibration is fast and the wear is slow.
+        """
+        return bool(self.solver.determinant_sign(balance.linearise(at)) >= 0.0)
 
     def move(self, old: Case, joint: Joint, state: State) -> State | None:
         """The state of a case with the harmonics and samples of another joint; None where it is not found."""

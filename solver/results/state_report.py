@@ -47,9 +47,8 @@ def evaluated(joint: Joint, state: PeriodicState) -> tuple[Balance, Evaluation]:
 class StateReport:
     """Reported values of a state; units and shapes as in `WearHistory`, without the dimension n_output.
 
-    excitation_frequency_error: by the harmonics and samples of the state.
-    resonance: `resonance_frequency`, rad/s; resonance_error: its estimated relative error by harmonics and samples;
-        both NaN where they were not asked for.
+    resonance: `resonance_frequency`, rad/s, and its estimated relative error; NaN where not asked for. Errors are those
+    by the harmonics and samples of the state.
     """
 
     wear_depth: FloatArray

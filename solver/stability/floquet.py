@@ -6,7 +6,7 @@ A small disturbance p' of a state with amplitudes that vary slowly as exp(sigma 
 
 Its determinant is that of the Jacobian, Eq. (16), at sigma = 0, and positive for sigma towards infinity. So a negative
 determinant of the Jacobian means an odd number of real, positive growth rates: multipliers on the real axis beyond +1,
-as between two folds of a branch. The sign is tested at each state of a branch (`is_stable`).
+as between two folds of a branch. The sign is tested at each state of a branch (`Run.is_stable`).
 
 Disturbances with a multiplier outside the unit circle grow: beyond +1 to another state, beyond -1 with twice the
 period, a complex pair with a second frequency (Neimark-Sacker bifurcation). The multipliers of reported states come
@@ -26,7 +26,7 @@ from typing import Literal
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED
-from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure, State
 from solver.model import BoolArray, ComplexArray, FloatArray, LinearModel
 from solver.newton.linear_solver import MOST_PRODUCTS, SMALL_JOINT, ritz_values
@@ -70,14 +70,6 @@ _EPS = float(np.finfo(np.float64).eps)
 Stability = Literal["stable", "fold", "period doubling", "Neimark-Sacker", "unknown"]
 """Stable, or the kind of disturbance that grows: one that keeps its sign ("fold", as between two folds), one that
 changes sign in each period, or one with a second frequency."""
-
-
-def is_stable(balance: Balance, at: Evaluation, run: Run) -> bool:
-    """False where a state has an odd number of real multipliers beyond +1.
-
-    balance: of the state at a fixed wear depth, as the vibration is fast and the wear is slow.
-    """
-    return bool(run.solver.determinant_sign(balance.linearise(at)) >= 0.0)
 
 
 @dataclass(frozen=True)
@@ -223,7 +215,7 @@ def _integrated(joint: Joint, at: Evaluation, growing_only: bool, rtol: float) -
 
 
 def _samples(joint: Joint, at: Evaluation, small: bool) -> int:
-    """Samples of a period for the time integration: enough for vibrations that grow in the structure alone."""
+    """Samples of a period: up to eight times as many for vibrations that grow in the structure alone."""
     switching, stuck = switching_pairs(at)
     growing = (_growing(joint.model.linear[0], _moving(joint, pairs).tobytes()) for pairs in (stuck, stuck | switching))
     fastest = max(float(np.abs(of.imag).max(initial=0.0)) for of in growing) / joint.omega

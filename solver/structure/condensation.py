@@ -1,9 +1,9 @@
 """The linear structure at one frequency, condensed on the relative displacements of the contact pairs.
 
-With the dynamic stiffness A = K + i n w C - (n w)^2 M of harmonic n, Eq. (1), and the displacements split into those of
-the pairs (r) and all others (i),
+With the dynamic stiffness A = K + i n w C - (n w)^2 M of harmonic n, Eq. (1), the load f, and the displacements split
+into those of the pairs (r) and all others (i),
 
-    Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = F_r - A_ri A_ii^-1 F_i.                                         (8)
+    Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = f_r - A_ri A_ii^-1 f_i.                                         (8)
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def _static(linear: LinearModel, relative: tuple[int, ...]) -> tuple[FloatArray,
     found = condense(
         np.real(linear.stiffness), np.array(relative, np.intp), linear.load_static, np.real(linear.response)
     )
-    return tuple(np.asarray(np.real(part), np.float64) for part in found)
+    return tuple(np.ascontiguousarray(np.real(part), np.float64) for part in found)
 
 
 Moving = tuple[DenseStiffness | SharedStiffness, ComplexArray, ComplexArray, ComplexArray]
@@ -193,7 +193,7 @@ class Condensed(NamedTuple):
     """A structure reduced to the relative displacements u (n_rel,).
 
     - stiffness (n_rel, n_rel): Schur complement, N/m. force (n_rel,): reduced load, N.
-    - rows (k, n_rel), offset (k,): rows of all displacements as `rows u + offset`.
+    - rows (k, n_rel), offset (k,): `rows u + offset` is what the given rows make of all displacements.
     """
 
     stiffness: Matrix

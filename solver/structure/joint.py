@@ -21,9 +21,7 @@ from solver.structure.penalty import Penalty, build_penalty
 class Joint:
     """All data that are constant while a periodic state is sought.
 
-    - model: before condensation. structure: the condensed one.
-    - omega, excitation_amplitude: rad/s, N.
-    - friction_coefficient (n_contact,): for each pair.
+    model: before condensation. omega, excitation_amplitude: rad/s, N. friction_coefficient (n_contact,).
     """
 
     model: ReducedModel
@@ -158,13 +156,10 @@ def build_case(
     settings: SolverSettings,
     resolution: Resolution | None = None,
 ) -> Case:
-    """Case of a scene.
+    """Case of a scene; errors as of `friction_of_pairs`.
 
-    - friction_coefficient: one number for all pairs or (n_contact,); None where the scene has its own.
     - omega: angular frequency for which the penalty is built, rad/s; equal for states that are compared.
     - resolution: first harmonics and samples; by default from the settings.
-
-    Raises ValueError where the friction coefficient is given twice, not at all, or not for each pair.
     """
     chosen = resolution or first_resolution(settings)
     penalty = build_penalty(model, omega, chosen.highest)
@@ -172,7 +167,10 @@ def build_case(
 
 
 def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatArray | None) -> FloatArray:
-    """Friction coefficient (n_contact,) for each pair; arguments and errors as in `build_case`."""
+    """Friction coefficient (n_contact,) from one number, from (n_contact,), or where None is given from the scene.
+
+    Raises ValueError where it is given twice, not at all, or not for each pair.
+    """
     own, n_contact = model.contact.friction_coefficient, model.contact.n_contact
     if own is None and friction_coefficient is None:
         raise ValueError("friction_coefficient is missing: the scene has none of its own")

@@ -7,9 +7,8 @@ E_n has to be near Z_n above the highest harmonic:
 - A pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, with
   E_n = eps near this stiffness, Eq. (10).
 - A mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is inertial: the pair is marched with its mass
-  (`solver.contact.sliding_masses`), with `E_n = -(n w)^2 m + i n w c`.
-- A mass on a stiff spring at its slider is inertial where the mass dominates in the harmonics that are left out. Where
-  the spring dominates, the pair is taken at displacement level.
+  (`solver.contact.sliding_masses`), with `E_n = -(n w)^2 m + i n w c`. So is a mass behind a stiff spring where the
+  mass dominates in the harmonics that are left out.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
 from solver.wear.course import unknown_course
-from solver.wear.integrate import ENDS_ALL, Ended, Integrations, Like, SlowTime
+from solver.wear.integrate import ENDS_ALL, Ended, Guide, Integrations, SlowTime
 
 
 def integrate_together(
@@ -41,10 +41,10 @@ def integrate_together(
     resume: progress, as given to `keep`, of a computation of some of these histories, which goes on from there. The
         results are equal to the last bit, except `run_time`.
     """
-    known = start.state is not None
-    case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution) if known else None
-    progress = None if resume is None else unpack(resume)
-    integrations = None if case is None else Integrations(case, start, keep, progress)
+    integrations = None
+    if start.state is not None:
+        case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
+        integrations = Integrations(case, start, keep, None if resume is None else unpack(resume))
     for each in asked:
         if integrations is None:
             nothing = Ended(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)), 0, 0.0)
@@ -103,12 +103,12 @@ def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rto
         spent += adaptive.seconds
     if adaptive.state is None or not is_compared(adaptive):
         return Solutions(own, adaptive)
-    like = Like(adaptive.course.resolutions, adaptive.state.step_limit)
+    guide = Guide(adaptive.course.resolutions, adaptive.state.step_limit)
     # NaN where no target was reached
     compared = np.concatenate([[0.0, adaptive.course.reached], _counts(asked, adaptive), adaptive.course.dense.counts])
     reached = min(adaptive.course.ends[-1], asked.end)
     return Solutions(
-        own, adaptive, integrations.reference(asked, like, np.unique(compared[compared <= reached]), spent)
+        own, adaptive, integrations.reference(asked, guide, np.unique(compared[compared <= reached]), spent)
     )
 
 

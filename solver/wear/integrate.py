@@ -118,7 +118,7 @@ class SlowTime:
 
 @packable
 @dataclass(frozen=True)
-class Like:
+class Guide:
     """What a reference solution takes from its history.
 
     resolutions: cycle count from which on a resolution holds, and this resolution; of a passage the frequency, Hz.
@@ -194,18 +194,19 @@ class Integrations:
         course = Course(work.area, asked.adaptive, counts, asked.until, share)
         return self._integrated(asked.name, line, check, work.begin, course, spent, stable_end=stable_end)
 
-    def reference(self, asked: SlowTime, like: Like, compared: FloatArray, spent: float = 0.0) -> Ended:
+    def reference(self, asked: SlowTime, guide: Guide, compared: FloatArray, spent: float = 0.0) -> Ended:
         """Integrate the reference solution of an adaptive history of which the start state may be another one.
 
         compared (n,): ascending counts at which it is read, the first 0. spent: as for `history`.
         """
         work, end = self._joint(asked), float(compared[-1])
-        resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in like.resolutions)
+        work.run = work.run.to(self._case.settings.rough_tolerance)
+        resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in guide.resolutions)
         # a short history may consist of its first steps, which do not depend on rtol
         steps = Adaptive(RTOL_RATIO * self._case.settings.rtol, 2.0 if asked.ends_at_last else 1.0)
         line = WearLine(work, steps, end if asked.ends_at_last else math.inf)
         check = partial(report_only, resolutions=resolutions, with_resonance=asked.shifts)
-        first = partial(begin_reference, work, like.step_limit)
+        first = partial(begin_reference, work, guide.step_limit)
         course = Course(work.area, smooth=True, counts=compared)
         return self._integrated(f"{asked.name} reference", line, check, first, course, spent)
 
@@ -288,7 +289,7 @@ def begin_reference(work: WearingJoint, step_limit: float) -> WearState:
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
     balance, first = Balance(work.at(begun), history, begun.depth), begun.point.evaluation.predicted_h
     point = work.run.state(balance, first, most=NEAR_ITERATIONS)
-    return begun if point is None else work.noted(replace(begun, point=point))
+    return begun if point is None else work.with_rates(replace(begun, point=point))
 
 
 def guarded(compute: Callable[[], T]) -> T | Failure:

@@ -42,7 +42,7 @@ def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -
         # the last pairs that stick come loose together
         reached = _held(work, state, worn, drifts=True) or reached
     work.run.budget.limit = float("inf")
-    return reached if isinstance(reached, Failure) else work.noted(replace(reached, cycle=cycle, previous=None))
+    return reached if isinstance(reached, Failure) else work.with_rates(replace(reached, cycle=cycle, previous=None))
 
 
 def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:

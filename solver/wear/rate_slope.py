@@ -15,7 +15,7 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.wear_law import WearingWork
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
-from solver.newton.linear_solver import FORCING, SIGN_PRODUCTS, ritz_values
+from solver.newton.linear_solver import SIGN_PRODUCTS, ritz_values
 from solver.newton.run import Run
 from solver.outcome import in_digits
 from solver.structure.joint import Joint
@@ -43,7 +43,7 @@ def rate_changes(
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = run.solver.solve_all(balance.linearise(at), rights, FORCING)
+        steps = run.steps(balance, at, rights)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
         found[acting] += (growth * moved).sum(axis=2)
     return found

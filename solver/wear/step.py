@@ -244,7 +244,7 @@ def attempt_step(work: WearingJoint, state: WearState, length: float, scheme: Sc
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
         error = own / (own + other) * (end.depth - explicit)
     last = LastStep(length, depth, before.predicted_h, state.omega, state.resolution)
-    end = work.noted(replace(end, cycle=state.cycle + length, previous=last))
+    end = work.with_rates(replace(end, cycle=state.cycle + length, previous=last))
     return Step(end, float(np.abs(error) @ work.area))
 
 

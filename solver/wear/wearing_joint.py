@@ -24,7 +24,6 @@ from solver.outcome import Outcome, in_digits
 from solver.packing import packable
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution
-from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.rate_slope import explicit_step_limit
 
@@ -169,7 +168,7 @@ class WearingJoint:
 
     def is_stable(self, joint: Joint, at: Evaluation) -> bool:
         """Whether a state is stable at constant wear depth."""
-        return is_stable(Balance(joint, at.history, at.wear_depth), at, self.run)
+        return self.run.is_stable(Balance(joint, at.history, at.wear_depth), at)
 
     def rate(self, at: Evaluation) -> FloatArray:
         """Wear rate (n_contact,), m per cycle, Eqs. (7), (21), (25)."""
@@ -200,9 +199,9 @@ class WearingJoint:
             # the stability of a start state has been checked
             judged_h=at.predicted_h,
         )
-        return self.noted(begun)
+        return self.with_rates(begun)
 
-    def noted(self, state: WearState) -> WearState:
+    def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, and with the limit of the explicit step from the first state that wears on."""
         at = state.point.evaluation
         volumes = self.rate(at) * self.area

@@ -71,7 +71,6 @@ def _record_of(kind: np.dtype[np.void], result: PointResult) -> NDArray[np.uint8
 class CompletionIndex:
     """Results and start states of a plan, in a file that may contain those of earlier runs and of other studies.
 
-    The results of a task do not depend on earlier results: a continued run ends with the same numbers.
     plan: its tasks have keys. kind: data type of a record, as `record_type` gives it.
     """
 

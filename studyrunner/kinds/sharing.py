@@ -1,9 +1,8 @@
 """Which choices of wear coefficient, step and scheme share one wear history, and why.
 
-The rates of all present wear laws are proportional to the wear coefficient (`WearLaw.proportional`). The wear equation
-is then dW/dt = k_w f(W), Eq. (7). With s k_w in place of k_w and h / s in place of the step h the same states follow
-each other, each at the cycle count t / s. A task integrates the history of the largest k_w; the other histories are
-read from this one at the counts s t. With a law that is not proportional no two k_w share a history.
+The rates of all wear laws are proportional to the wear coefficient: dW/dt = k_w f(W), Eq. (7). With s k_w in place of
+k_w and h / s in place of the step h the same states follow each other, each at the cycle count t / s. A task integrates
+the history of the largest k_w; the other histories are read from this one at the counts s t.
 """
 
 from __future__ import annotations
@@ -134,20 +133,19 @@ def _group(study: Study, choice: Index) -> tuple[str, Hashable]:
     """Reason for which a choice may share a history, and what choices that do have in common."""
     wear, step, scheme = choice
     value, word = study.axes.wear_coefficient[wear], study.axes.scheme[scheme]
-    proportional = study.wear_law.proportional
     if not study.solver.shortcuts:
         return "alone", choice
     if study.cycles_kept[-1] == 0.0:
         return "cycles", wear
-    if proportional and value == 0.0:
+    if value == 0.0:
         return "unworn", wear
     if word in _OWN_STEPS:
-        return word, None if proportional else wear
+        return word, None
     if word == "explicit" and study.slow_time.largest_depth is not None:
         # the last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories
         return "largest_depth", wear
     # to a few digits: the same products may differ by round-off
-    return "steps", (scheme, f"{value * study.axes.step[step]:.11e}" if proportional else choice)
+    return "steps", (scheme, f"{value * study.axes.step[step]:.11e}")
 
 
 def _ends_with_a_step(study: Study, history: ScaledHistory) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from studyrunner.mpi.ranks import Question, Ranks, ask_all
+from studyrunner.mpi.ranks import Ranks, ask_all
 from studyrunner.system.files import create
 
 _ALIGNED = 64  # bytes: no array shares a line of the cache with another one
@@ -67,8 +67,8 @@ def open_mapped(given: MappedFile) -> Any:  # a type that rank 0 knows
 
 
 @dataclass(frozen=True)
-class WhetherSeen(Question):
-    """Whether a rank sees a file with these contents."""
+class WhetherSeen:
+    """Question of rank 0: whether a rank sees a file with these contents."""
 
     path: Path
     mark: bytes

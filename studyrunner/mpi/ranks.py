@@ -30,7 +30,6 @@ _RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK"
 _JOBS = ("SLURM_NTASKS", "PBS_NP", "LSB_DJOB_NUMPROC", "NSLOTS")
 _SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _SECONDS_TO_PRINT = 1.0
-_SECONDS_TO_ANSWER = 300.0  # a rank imports the solver first, from a slow disk for one
 _SHARED = "/dev/shm/mpich_shm_"
 _MANY_SENT = 64
 _REMEDY = (
@@ -66,7 +65,7 @@ def _largest(environment: Mapping[str, str], names: tuple[str, ...]) -> int:
 class Ranks:
     """Processes that send each other Python objects, in the order of sending; this class: one process, without MPI.
 
-    rank: number of this process; process 0 hands out the work. size: number of processes.
+    rank: of this process; process 0 hands out the work. size: number of processes.
     """
 
     rank = 0
@@ -116,10 +115,18 @@ class MpiRanks(Ranks):
         self._many = _MANY_SENT
         self.rank = self._world.Get_rank()
         self.size = self._world.Get_size()
+        self._software: list[tuple[str, str]] = self._world.allgather(describe_software())
         if library == "MPICH":
-            # behind the barrier all ranks have mapped the memory
-            self._world.Barrier()
+            # all ranks have mapped the memory: they have exchanged messages
             _unlink_shared_memory()
+
+    def check_software(self) -> None:
+        """Raises LauncherError where a rank runs other software than rank 0, with which numbers may differ."""
+        host, own = self._software[0]
+        for rank, (other_host, other) in enumerate(self._software):
+            if other != own:
+                said = f"rank {rank} on {other_host} runs other versions of this program, of Python or of numpy than"
+                raise LauncherError(f"{said} rank 0 on {host}: install the same software for all ranks")
 
     def send(self, message: object, rank: int) -> None:  # noqa: D102
         if len(self._sent) >= self._many:
@@ -170,7 +177,7 @@ def _unlink_shared_memory() -> None:
 def start_ranks() -> Ranks:
     """The ranks that the launcher started, or this process alone where there is no launcher.
 
-    Raises LauncherError where the launcher started more processes than the MPI library knows of.
+    Raises LauncherError where MPI knows of fewer processes, or one of them runs other software.
     """
     if not any(name in os.environ for name in _SIGNS):
         return Ranks()
@@ -184,66 +191,38 @@ def start_ranks() -> Ranks:
     if announced > ranks.size:
         ranks.close()
         raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
+    try:
+        ranks.check_software()
+    except LauncherError:
+        ranks.close()
+        raise
     return ranks
+
+
+def describe_software() -> tuple[str, str]:
+    """Name of this machine, and a hash of what this process runs."""
+    packages = ("solver", "studies", "studyrunner")
+    return platform.node(), " ".join((platform.machine(), *map(package_digest, packages)))
 
 
 class RankInterrupted:
     """Message of a rank that was ended from outside; all ranks end."""
 
 
-class Question:
-    """What rank 0 asks the other ranks."""
-
-    def answer(self) -> object:
-        """What this process answers; not None."""
-        raise NotImplementedError
-
-
-class WhatSoftware(Question):
-    """What a rank runs."""
-
-    def answer(self) -> tuple[str, str]:
-        """Name of this machine, and a hash of what this process runs."""
-        packages = ("solver", "studies", "studyrunner")
-        return platform.node(), " ".join((platform.machine(), *map(package_digest, packages)))
-
-
-def wait_for_message(ranks: Ranks) -> object:
-    """The next message; for ranks that have nothing else to do."""
+def wait_for_message(ranks: Ranks) -> tuple[int, object]:
+    """Sender and content of the next message; for ranks that have nothing else to do."""
     while (received := ranks.receive()) is None:
         time.sleep(POLL_SECONDS)
-    return received[1]
+    return received
 
 
-def ask_all(ranks: Ranks, question: Question) -> dict[int, object]:
-    """Rank 0: the answers of all other ranks, by rank; None for a rank that is silent.
-
-    Raises KeyboardInterrupt where a rank was interrupted.
-    """
-    answers: dict[int, object] = dict.fromkeys(range(1, ranks.size))
-    for rank in answers:
+def ask_all(ranks: Ranks, question: object) -> dict[int, object]:
+    """Rank 0: the answers of all other ranks, by rank. Raises KeyboardInterrupt where one was interrupted."""
+    answers: dict[int, object] = {}
+    for rank in range(1, ranks.size):
         ranks.send(question, rank)
-    latest = time.monotonic() + _SECONDS_TO_ANSWER
-    while None in answers.values() and time.monotonic() < latest:
-        received = ranks.receive()
-        if received is None:
-            time.sleep(POLL_SECONDS)
-        elif isinstance(received[1], RankInterrupted):
+    while len(answers) < ranks.size - 1:
+        rank, answers[rank] = wait_for_message(ranks)
+        if isinstance(answers[rank], RankInterrupted):
             raise KeyboardInterrupt
-        else:
-            answers[received[0]] = received[1]
     return answers
-
-
-def check_software(ranks: Ranks) -> None:
-    """Rank 0: raises LauncherError where a rank runs other software, with which numbers may differ, or is silent."""
-    question = WhatSoftware()
-    host, own = question.answer() if ranks.size > 1 else ("", "")
-    for rank, answer in ask_all(ranks, question).items():
-        if not isinstance(answer, tuple):
-            said = f"has not said within {_SECONDS_TO_ANSWER:.0f} s what it runs"
-        elif answer[1] != own:
-            said = f"on {answer[0]} runs other versions of this program, of Python or of numpy than rank 0 on {host}"
-        else:
-            continue
-        raise LauncherError(f"rank {rank} {said}: install the same software for all ranks")

@@ -20,7 +20,8 @@ from typing import Any
 
 from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.dispatch import Assignment, Dispatcher, Task
-from studyrunner.mpi.ranks import POLL_SECONDS, Question, RankInterrupted, Ranks, wait_for_message
+from studyrunner.mpi.mapped_file import WhetherSeen
+from studyrunner.mpi.ranks import POLL_SECONDS, RankInterrupted, Ranks, wait_for_message
 from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 
 SECONDS_TO_PROGRESS = 3.0
@@ -112,8 +113,8 @@ def follow_rank_0(ranks: Ranks, run: Run) -> None:
         ranks.send(reply, 0)
         ranks.flush()
 
-    while (message := wait_for_message(ranks)) is not None:
-        if isinstance(message, Question):
+    while (message := wait_for_message(ranks)[1]) is not None:
+        if isinstance(message, WhetherSeen):
             send(message.answer())
         elif isinstance(message, Assignment):
             _work(message, run, send, _seconds_to_progress(ranks), raise_ending)

@@ -53,12 +53,7 @@ class _Parser(argparse.ArgumentParser):
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """The command line: `result`, `folder` and `measured` are paths, None where left out; `vtu`; `point`, by axis.
 
-    Raises
-    ------
-    UserError
-        Where it is wrong.
-    SystemExit
-        After --help.
+    Raises UserError where it is wrong, SystemExit after --help.
     """
     look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
     parser = _Parser("study-report", description=_DESCRIPTION, epilog=_EPILOG, **look)
@@ -98,13 +93,7 @@ def _read_pairs(text: str) -> tuple[int, ...]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command and returns its exit status.
-
-    Parameters
-    ----------
-    arguments
-        The command line, None for that of this process.
-    """
+    """Runs the command line, None for that of this process, and returns its exit status."""
     keep_talking()
     take_endings()
     try:
@@ -129,6 +118,14 @@ def _report(options: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.markup import escape
 
+    def draw(items: Iterable[Item], status: Status) -> Iterator[Item]:
+        """The items; the terminal shows which of them is drawn."""
+        for item in items:
+            raise_ending()
+            status.update(f"drawing: {escape(item.title)}")
+            yield item
+        status.update("writing the page")
+
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
         from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
@@ -147,11 +144,11 @@ def _report(options: argparse.Namespace) -> int:
             result = _compute(result, folder, options)
             status.start()
             page = folder / "index.html"
-            summary = write_page(result, _say(draw_report(result), status), page)
+            written = write_page(result, draw(draw_report(result), status), page)
             n_files = write_series(folder) if write_series else 0
-    shown = f"{count(summary.n_drawings, 'figure')}, {count(summary.n_tables, 'table')}, {summary.n_missing} left out"
+    shown = f"{count(written.n_drawings, 'figure')}, {count(written.n_tables, 'table')}, {written.n_missing} left out"
     seconds = format_seconds(time.monotonic() - began)
-    print(f"{page}: {shown}, {summary.n_bytes / 1e6:.1f} MB, {seconds}; open it in a browser")
+    print(f"{page}: {shown}, {written.n_bytes / 1e6:.1f} MB, {seconds}; open it in a browser")
     if options.vtu:
         print(f"{folder / SERIES}: time series of {count(n_files, 'VTU file')}; open it in ParaView")
     return WRITTEN
@@ -163,8 +160,7 @@ def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Resul
 
     given: dict[str, Any] = {"path": options.result, "folder": folder, "point": options.point}
     asked = {"loops": options.loops, "natural_frequencies": options.natural_frequencies}
-    again = compute_worn_joint(**given, **asked) if any(asked.values()) else {}
-    why = ""
+    again, why = compute_worn_joint(**given, **asked) if any(asked.values()) else {}, ""
     if not options.no_compute and has_worn_response(result):
         print("study-report: computing the response of the worn joint (--no-compute leaves it out)", file=sys.stderr)
         try:
@@ -173,17 +169,6 @@ def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Resul
             # a report of what there is, where the scene is gone or the file has no depths
             why = str(error)
     return replace(result, again=again, no_worn_response=why)
-
-
-def _say(items: Iterable[Item], status: Status) -> Iterator[Item]:
-    """The items; tells on the terminal which of them is done."""
-    from rich.markup import escape
-
-    for item in items:
-        raise_ending()
-        status.update(f"drawing: {escape(item.title)}")
-        yield item
-    status.update("writing the page")
 
 
 def _make_folder(folder: Path) -> None:

@@ -8,27 +8,52 @@ from functools import partial
 from typing import Any, cast
 
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, style
-from studyrunner.report.figures import (
-    contact,
-    loops,
-    missions,
-    outcome,
-    precision,
-    response,
-    scatter,
-    sector,
-    trends,
-    wear,
-)
+from studyrunner.report.figures import loops, missions, pairs, points, precision, response, scatter, wear
+from studyrunner.report.panels import add_legend
 from studyrunner.report.root import figures as root
 from studyrunner.result.scene_pairs import OF_PAIRS, of_shown_scene
-from studyrunner.result.view import Result
+from studyrunner.result.view import Result, as_sentences
 
 WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
 """Kinds of results."""
 
-POINT, COURSE = "frequency, scheme and what else varies", "the axis that figures are drawn over"
-"""What a title names of the shown point."""
+_BANDS, _BARS = "Bands: estimated errors", "Bars: estimated errors, none where they are smaller than the markers"
+_OTHERS = "Each point is another joint, which wore at its own value of the horizontal axis"
+_QUANTILES = (
+    "So much is worn at most in 5, 25, 50, 75 and 95 % of the samples. Dashed: 5 and 95 %, with every sample less or"
+    " more its numerical error"
+)
+CAPTIONS = {
+    "blocks": "Cycles of one mission. A passage whose rate is far below (zeta f)² wears as its steady states do",
+    "block_shares": f"Above, shares of the blocks in the volume worn in one mission; below, worn volumes. {_BANDS}",
+    "block_responses": f"Amplitude of the first harmonic in the mission that ends at the number. {_BANDS}",
+    "natural_frequency": _BARS,
+    "damping_ratio": _BARS,
+    "worn_volume_bands": _QUANTILES,
+    "worn_volume_bands_course": _QUANTILES,
+    "exceedance": "Probability that more is worn than a volume, and that a pair is worn deeper than a depth. Where two"
+    " lines are alike, samples without a value leave open what is between them",
+    "deciding_inputs": "Share of the variance (Sobol' indices), or rank correlation: 1 or -1 where the volume rises or"
+    " falls with this input alone; an effect that rises and falls is not seen",
+    "worn_volume": _BANDS,
+    "final_worn_volume": f"{_OTHERS}. Bars: estimated errors; of a point that ended early, what was worn by then",
+    "worn_volume_map": f"{_OTHERS}. Hatched: no result",
+    "wear_rate_map": f"{_OTHERS}. Hatched: no result",
+    "response_after_own_wear": "Each mark is another joint, which wore at its own frequency: the marks are no response"
+    " curve. That they are low where the new joint resonates does not mean that wear protects",
+    "excitation_frequency": _BANDS,
+    "trends": "Bars: estimated error of the worn volume",
+    "wear_depth": "Of both surfaces together",
+    "worn_profile": "Of both surfaces together",
+    "fretting_loops": "Tangential force over relative displacement through a period, each about its mean: the area"
+    " inside is the energy of friction",
+    "normal_load": "Where the force is zero the pair is open",
+    "pair_motion": "Path of the relative displacement about its mean; a pair that sticks is a dot",
+    "certificates": "The largest over all points computed to the end and all counts in the file; 0 is the best",
+    "precision": "Each mark is one setting; a line joins those of a scheme than which no quicker one is as exact;"
+    " rings: of all. Open marks, in the grey: errors too small against the uncertainty of the reference",
+}
+"""How figures are to be read, whatever the result; what they say of a result stands before it."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +63,8 @@ class Entry:
     name: of its files. title: {slow} stands for cycles or missions, {over} for the axis that figures are drawn over;
     (table) is left out of the heading. draw: makes it. kinds: of the results that have it. needs: variables without
     which a sentence says what to ask for. scene: where scenes of a study differ in these variables, that of the shown
-    point is drawn. at: what the title names of the shown point, `POINT` or `COURSE`. always: also where no point has a
-    result.
+    point is drawn. at: whether the title names the "point" that is shown, or its "course" alone. always: also where no
+    point has a result.
     """
 
     name: str
@@ -55,109 +80,88 @@ class Entry:
         """The figure, a sentence in its place, or None."""
         over = (result.course_axis or "").replace("_", " ")
         title = self.title.format(slow=result.counted, over=over).removesuffix(" (table)")
-        if lacks := result.lacks(*self.needs):
-            return Missing(self.name, title, lacks)
         shown = of_shown_scene(result, self.scene) if self.scene else result
-        drawn = self._drawn(shown, WIDTH)
+        drawn = result.lacks(*self.needs) or self._drawn(shown, WIDTH)
         if drawn is None:
             return None
         if isinstance(drawn, str):
             return Missing(self.name, title, drawn)
-        named = {
-            POINT: ("frequency", "scheme", *shown.varying, *shown.fixed),
-            COURSE: (result.course_axis or "frequency",),
-        }
+        named = {"point": ("frequency", "scheme", *shown.varying, *shown.fixed)}
+        named["course"] = (result.course_axis or "frequency",)
         where = shown.describe(shown.shown_point(), named.get(self.at, ()))
         title = f"{title}: {where}" if where else title
+        how = CAPTIONS.get(self.name, "")
         if isinstance(drawn, Table):
-            return replace(drawn, name=self.name, title=title)
-        return Drawing(self.name, title, drawn[1], drawn[0], lambda: cast("Any", self._drawn(shown, COLUMN_WIDTH))[0])
+            return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, how))
+        figure, *notes = drawn
+        caption = as_sentences(*notes, how)
+        return Drawing(self.name, title, caption, figure, lambda: cast("Any", self._drawn(shown, COLUMN_WIDTH))[0])
 
     def _drawn(self, result: Result, width: float) -> Drawn:
         # the style is that of the whole process: it is not left on while the caller has the word
         with style(width):
-            return self.draw(result)
+            drawn = self.draw(result)
+            if isinstance(drawn, tuple) and not drawn[0].legends:
+                add_legend(drawn[0])
+        return drawn
 
 
-_ONE: dict[str, Any] = {"scene": OF_PAIRS, "at": POINT}
-_BLOCK: dict[str, Any] = {"kinds": (MISSIONS,), "at": POINT}
+_ONE: dict[str, Any] = {"scene": OF_PAIRS, "at": "point"}
+_BLOCK: dict[str, Any] = {"kinds": (MISSIONS,), "at": "point"}
 _MODE: dict[str, Any] = {"kinds": (MODES,)}
 _WEAR: dict[str, Any] = {"kinds": (WEAR,)}
+_OF_ONE = {**_WEAR, **_ONE}
+_WORN: dict[str, Any] = {"needs": ("worn_volume",)}
+_RESPONSE: dict[str, Any] = {**_WEAR, "needs": ("response_amplitude",)}
+_ALL: dict[str, Any] = {"kinds": (WEAR, MISSIONS, MODES)}
+_SECTOR: dict[str, Any] = {"scene": root.OF_SECTOR, "always": True}
+
+
+def _of(draw: Callable[..., Drawn], name: str, title: str, **options: Any) -> Entry:
+    """A figure of the variable of its name."""
+    options["needs"] = (*options.get("needs", ()), name.removesuffix("_map"))
+    return Entry(name, title, partial(draw, name=options["needs"][-1]), **options)
+
 
 FIGURES = (
     Entry("blocks", "Blocks of the mission with their wear (table)", missions.list_blocks, **_BLOCK),
     Entry("block_shares", "Wear by block over the missions", missions.draw_shares, **_BLOCK),
     Entry("block_responses", "Vibration of each block over the missions", missions.draw_responses, **_BLOCK),
-    *(
-        Entry(name, title, partial(response.draw_mode, name=name), needs=(name,), **_MODE)
-        for name, title in (
-            ("natural_frequency", "Natural frequency of a mode over its amplitude"),
-            ("damping_ratio", "Damping ratio of a mode over its amplitude"),
-        )
-    ),
+    _of(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude", **_MODE),
+    _of(response.draw_mode, "damping_ratio", "Damping ratio of a mode over its amplitude", **_MODE),
     Entry("worn_volume_bands", "Worn volume of the samples over {slow}", scatter.draw_bands),
     Entry("worn_volume_bands_course", "Worn volume of the samples over {over}", scatter.draw_bands_over_course),
     Entry("exceedance", "Probability of more wear", scatter.draw_exceedance),
     Entry("deciding_inputs", "What decides the worn volume", scatter.draw_deciding_inputs),
-    Entry("deciding_input", "Worn volume over the input that decides most", scatter.draw_deciding_input),
-    Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, needs=("worn_volume",), at=COURSE),
-    Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, needs=("worn_volume",)),
-    *(
-        Entry(f"{name}_map", title, partial(wear.draw_map, name=name), needs=("worn_volume", name))
-        for name, title in (
-            ("worn_volume", "Worn volume over {over} and {slow}"),
-            ("wear_rate", "Wear rate over {over} and {slow}"),
-        )
-    ),
-    Entry(
-        "frequency_response",
-        "Frequency response of one joint, new and worn",
-        response.draw_responses,
-        **_WEAR,
-        needs=("response_amplitude",),
-    ),
+    Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, **_WORN, at="course"),
+    Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, **_WORN),
+    _of(wear.draw_map, "worn_volume_map", "Worn volume over {over} and {slow}"),
+    _of(wear.draw_map, "wear_rate_map", "Wear rate over {over} and {slow}", **_WORN),
+    Entry("frequency_response", "Frequency response of one joint, new and worn", response.draw_responses, **_RESPONSE),
     Entry(
         "response_after_own_wear",
         "Response of different joints, each after wear at its own frequency",
         response.draw_after_wear,
-        **_WEAR,
-        needs=("response_amplitude",),
+        **_RESPONSE,
     ),
     Entry(
         "excitation_frequency", "Frequency of an excitation that follows the resonance", wear.draw_excitation, **_WEAR
     ),
-    Entry("trends", "Trends along the axes of the study", trends.draw_trends),
+    Entry("trends", "Trends along the axes of the study", points.draw_trends),
     Entry("worn_root", "The worn root", root.draw_root, **_ONE),
     Entry("whole_disk", "The whole disk", root.draw_disk, scene=OF_PAIRS),
-    Entry("wear_depth", "Wear depth of each pair", contact.draw_depths, **_ONE),
-    Entry("worn_profile", "Worn profile of the contact surfaces", contact.draw_profile, **_ONE),
-    Entry("mean_pressure", "Mean pressure", contact.draw_pressure, **_WEAR, **_ONE, needs=("mean_pressure",)),
-    Entry("fretting_loops", "Fretting loops", loops.draw_fretting, **_WEAR, **_ONE),
-    Entry("normal_load", "Normal force through a period", loops.draw_normal, **_WEAR, **_ONE),
-    Entry("pair_motion", "Motion of the pairs in the contact plane", loops.draw_motion, **_WEAR, **_ONE),
-    *(
-        Entry(
-            f"{name}_fraction",
-            title,
-            partial(root.draw_fraction, name=f"{name}_fraction"),
-            **_MODE,
-            **_ONE,
-            needs=(f"{name}_fraction",),
-        )
-        for name, title in (("slip", "Where the joint slips"), ("open", "Where the joint opens"))
-    ),
-    Entry(
-        "pair_numbers", "Numbers of the contact pairs", contact.draw_numbers, (WEAR, MISSIONS, MODES), scene=OF_PAIRS
-    ),
-    Entry(
-        "natural_frequencies",
-        "Sector and its natural frequencies, joint stuck",
-        sector.draw_sector,
-        scene=sector.OF_SECTOR,
-        always=True,
-    ),
-    Entry("outcome_map", "How the points ended", outcome.draw_outcomes, (WEAR, MISSIONS, MODES), always=True),
-    Entry("certificates", "Certificates: how right the states are (table)", outcome.list_certificates),
+    Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, **_ONE),
+    Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, **_ONE),
+    Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, **_OF_ONE, needs=("mean_pressure",)),
+    Entry("fretting_loops", "Fretting loops", loops.draw_fretting, **_OF_ONE),
+    Entry("normal_load", "Normal force through a period", loops.draw_normal, **_OF_ONE),
+    Entry("pair_motion", "Motion of the pairs in the contact plane", loops.draw_motion, **_OF_ONE),
+    _of(root.draw_fraction, "slip_fraction", "Where the joint slips", **_MODE, **_ONE),
+    _of(root.draw_fraction, "open_fraction", "Where the joint opens", **_MODE, **_ONE),
+    Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS, **_ALL),
+    Entry("natural_frequencies", "Sector and its natural frequencies, joint stuck", root.draw_sector, **_SECTOR),
+    Entry("outcome_map", "How the points ended", points.draw_outcomes, always=True, **_ALL),
+    Entry("certificates", "Certificates: how right the states are (table)", points.list_certificates),
     Entry("precision", "Error against run time", precision.draw_precision, **_WEAR),
 )
 """The figures of all results."""

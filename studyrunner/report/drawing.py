@@ -32,11 +32,8 @@ _COLUMN_LABEL, _COLUMN_TITLE = 28, 48  # characters of a vertical label, and of 
 
 _STYLE: Any = {
     "font.size": 9.5,
-    "axes.titlesize": 9.5,
-    "axes.labelsize": 9.5,
-    "legend.fontsize": 8.5,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
+    **dict.fromkeys(("axes.titlesize", "axes.labelsize"), 9.5),
+    **dict.fromkeys(("legend.fontsize", "xtick.labelsize", "ytick.labelsize"), 8.5),
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -55,8 +52,7 @@ _STYLE: Any = {
     "legend.borderpad": 0.0,
     "legend.columnspacing": 1.4,
     "image.cmap": MAP,
-    "figure.dpi": DPI,
-    "savefig.dpi": DPI,
+    **dict.fromkeys(("figure.dpi", "savefig.dpi"), DPI),
     "svg.fonttype": "none",
     "svg.hashsalt": "fretwear",
 }
@@ -115,8 +111,10 @@ class Table:
 
 Item = Drawing | Missing | Table
 
-Drawn = tuple[Figure, str] | Table | str | None
-"""What draws an item gives: a figure with its caption, a table, a sentence in their place, None for nothing to see."""
+Drawn = tuple[Figure, *tuple[str, ...]] | Table | str | None
+"""What draws an item gives: a figure and the sentences of its caption, of which empty ones are left out; a table; a
+sentence in their place; None for nothing to see.
+"""
 
 
 @contextmanager

@@ -33,6 +33,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#000000", "#CC79A7", "#E69F00", "#5
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _CHARACTERS, _MARK, _LEGEND_ROW = 14.0, 6, 0.18  # of a legend: letters in an inch, a mark in letters, inches of a row
+_TITLE = 80  # characters of titles over panels side by side
 _FEWEST_TICKS, _MOST_TICKS = 3, 6
 _WIDE, _LEAST, _LOW, _HIGH = 5.0, 1.5, 2.6, 3.2  # inches: least width of a wide figure; heights in a narrow one
 
@@ -60,9 +61,8 @@ def new_panels(
     own = np.minimum(np.maximum(0.45 * n_columns * usual, np.minimum(usual, _LOW)), np.maximum(usual, _HIGH))
     heights = np.tile(np.maximum(own, _LEAST), n_columns)
     figure = Figure(figsize=(width, heights.sum()), layout="constrained")
-    panels = (
-        figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights.tolist()).reshape(n_columns, n_rows).T
-    )
+    panels = figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights.tolist())
+    panels = panels.reshape(n_columns, n_rows).T
     for (row, column), panel in np.ndenumerate(panels):
         for shared, share, first in ((sharex, panel.sharex, (0, column)), (sharey, panel.sharey, (row, 0))):
             other = panels[0, 0] if shared is True else panels[first]
@@ -79,11 +79,21 @@ def new_panel(height: float) -> tuple[Figure, Axes]:
     return figure, panels[0, 0]
 
 
-def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
-    """Colour, dashes and marker of the line of this number.
+def panel_grid(labels: Sequence[str], height: float, **shared: Any) -> tuple[Figure, NDArray[Any]]:
+    """A figure and its panels (rows, columns) with these titles, two by two where there are four, else side by side.
 
-    n_points: on the line; where there are many, markers stand on some of them only.
+    height: of a row, inches.
     """
+    n_columns = 2 if len(labels) == 4 else len(labels)
+    n_rows = len(labels) // n_columns
+    figure, panels = new_panels(n_rows, n_columns, 0.5 + height * n_rows, sharey=True, **shared)
+    for panel, label in zip(panels.flat, labels, strict=True):
+        panel.set_title(textwrap.fill(label, _TITLE // n_columns))
+    return figure, panels
+
+
+def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
+    """Colour, dashes and marker of the line of this number; of many points only some have a marker."""
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": _DASHES[number % len(_DASHES)],
@@ -116,9 +126,8 @@ def add_line(
     if band:
         panel.fill_between(at, low, high, color=line.get_color(), alpha=0.18, linewidth=0.0, gid="error")
     else:
-        sides = np.stack([y[drawn] - low, error[drawn]])
         bars: dict[str, Any] = {"fmt": "none", "ecolor": line.get_color(), "elinewidth": 1.0, "capsize": 2.5}
-        panel.errorbar(at, y[drawn], yerr=sides, zorder=2.5, **bars)
+        panel.errorbar(at, y[drawn], yerr=np.stack([y[drawn] - low, error[drawn]]), zorder=2.5, **bars)
     return max(highest, min(float(high.max()), 2.0 * highest))
 
 
@@ -159,8 +168,9 @@ def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
     figure.legend(list(found.values()), labels, loc="outside lower center", ncols=math.ceil(len(labels) / n_rows))
 
 
-def set_from_zero(panel: Axes, largest: float) -> None:
-    """Let the vertical axis begin at zero, and end at something where all values are zero."""
+def set_from_zero(panel: Axes, largest: float | None = None) -> None:
+    """Let the vertical axis begin at zero and end above the largest value, by default of what is drawn."""
+    largest = float(panel.dataLim.ymax) if largest is None else largest
     panel.set_ylim(0.0, 1.06 * largest if largest > 0.0 else 1.0)
 
 
@@ -182,15 +192,15 @@ def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
         ticks = [factor * decade for decade in decades for factor in steps if low <= factor * decade <= high]
         if len(ticks) >= _FEWEST_TICKS:
             break
+
+    def show(value: float, _position: object) -> str:
+        number = 100.0 * value if percent else value
+        text = f"{number:.4g}" if 1e-3 <= number < 1e4 else show_power(number)
+        return f"{text} %" if percent else text
+
     axis.set_minor_locator(NullLocator())
     axis.set_major_locator(FixedLocator(ticks[:: -(-len(ticks) // _MOST_TICKS) or 1]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: _show_tick(value, percent)))
-
-
-def _show_tick(value: float, percent: bool) -> str:
-    number = 100.0 * value if percent else value
-    text = f"{number:.4g}" if 1e-3 <= number < 1e4 else show_power(number)
-    return f"{text} %" if percent else text
+    axis.set_major_formatter(FuncFormatter(show))
 
 
 def mark_failed(panel: Axes, positions: FloatArray, failed: NDArray[np.bool_]) -> str:

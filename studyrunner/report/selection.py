@@ -23,7 +23,7 @@ _MANY = 60  # points from which markers are small
 
 @dataclass(frozen=True)
 class Choice:
-    """Combinations of the axes that a figure shows, with labels.
+    """Points that a figure shows, as indices along all axes that are not free, with labels.
 
     sentence: on combinations that are left out; empty where there are none.
     """
@@ -33,7 +33,7 @@ class Choice:
     sentence: str
 
     def __iter__(self) -> Iterator[tuple[dict[str, int], str]]:
-        """Combinations with their labels."""
+        """Points with their labels."""
         return iter(zip(self.points, self.labels, strict=True))
 
 
@@ -45,26 +45,24 @@ def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, 
     """
     order = [name for name in dict.fromkeys((*first, *result.axes)) if name in result.varying and name not in free]
     shown = {name: index for name, index in result.shown_point().items() if name not in free}
-    split: list[str] = []
-    number = 1
+    sizes, split, number = result.dataset.sizes, list[str](), 1
     for name in order:
-        size = result.dataset.sizes[name]
-        if number * size <= limit:
+        if number * sizes[name] <= limit:
             split.append(name)
-            number *= size
+            number *= sizes[name]
     split.sort(key=result.axes.index)
-    places = itertools.product(*(range(result.dataset.sizes[name]) for name in split))
+    places = itertools.product(*(range(sizes[name]) for name in split))
     points = tuple({**shown, **dict(zip(split, place, strict=True))} for place in places)
     labels = tuple(result.describe(point, split) for point in points)
-    sizes = {name: result.dataset.sizes[name] for name in order if name not in split}
-    sizes |= {name: size for name, size in result.fixed.items() if name not in free}
-    fixed = [name for name in result.axes if name in sizes]
+    left = {name: sizes[name] for name in order if name not in split}
+    left |= {name: size for name, size in result.fixed.items() if name not in free}
+    fixed = [name for name in result.axes if name in left]
     if not fixed:
         return Choice(points, labels, "")
     others = " and ".join(
-        count(sizes[name] - 1, "other sample")
+        count(left[name] - 1, "other sample")
         if name == SAMPLE
-        else f"{count(sizes[name] - 1, 'other value')} of {name.replace('_', ' ')}"
+        else f"{count(left[name] - 1, 'other value')} of {name.replace('_', ' ')}"
         for name in fixed
     )
     return Choice(points, labels, f"Shown for {result.describe(shown, fixed)}; the file also holds {others}.")

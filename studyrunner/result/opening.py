@@ -46,6 +46,7 @@ _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
 _INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", *CERTIFICATE)
 """Ends of the names of variables that may be infinite: errors that are not known, what comes after any cycle."""
+_ATTRIBUTES = ("units", "long_name", "flag_meanings", "sentences", "flag_values")  # of variables, for the report
 _LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
 _REMEDY = "give a result file of run-study that is whole"
 
@@ -68,11 +69,10 @@ class _WrongError(Exception):
 def open_result(path: str | Path) -> xr.Dataset:
     """Open a result file after a check that it is a result of `run-study`: sizes, dimensions and types.
 
-    The dataset is that of `xarray.open_dataset(path)`, read when it is needed, and has the accessor `fretwear`. Two
-    things are added for the reader: the coordinate `ended`, which is `outcome` in words; and loops have the dimension
-    `loop_contact`, the pairs that have loops, in place of `contact`, along which most are NaN. The file stays open
-    until the dataset is closed: use it in a `with` statement, or call its `load` and `close`. A file that is replaced
-    meanwhile, by another run, stays as it was for this dataset.
+    The dataset is that of `xarray.open_dataset(path)`, read when it is needed. Two things are added: the coordinate
+    `ended`, which is `outcome` in words; and loops have the dimension `loop_contact`, the pairs that have loops, in
+    place of `contact`. The file stays open until the dataset is closed: use it in a `with` statement, or call its
+    `load` and `close`. A file that is replaced meanwhile, by another run, stays as it was for this dataset.
 
     Raises
     ------
@@ -115,10 +115,7 @@ def _open(path: str | Path) -> tuple[xr.Dataset, xr.Dataset]:
 
 @contextmanager
 def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
-    """Turns errors of the libraries about a damaged file into UserError. source: name of the file for the user.
-
-    every: whether all errors are turned; for blocks that only read.
-    """
+    """Turns errors of the libraries about a damaged file into UserError; every: all errors, of a block that reads."""
     try:
         yield
     except UserError:
@@ -140,10 +137,7 @@ def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
 
 
 def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
-    """The effective study of a file, by table; empty where it is no TOML.
-
-    Raises UserError where the study is no text in UTF-8, too long, or nested too deeply.
-    """
+    """The effective study of a file, by table; empty where it is no TOML. Raises UserError: it is nested too deeply."""
     try:
         tables = read_toml(str(attributes.get("study", "")).encode("utf-8", "replace"), source)
     except NoTomlError:
@@ -156,8 +150,7 @@ def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str
 def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     """Variables of a file that the report knows, their texts cleaned. Only coordinates, texts and the mesh are read.
 
-    source: name of the file for the user. Raises UserError where a needed variable is missing, or has a wrong shape or
-    type.
+    source: name of the file for the user. Raises UserError where a variable is missing, or has a wrong shape or type.
     """
     slow = "mission" if "mission" in dataset.dims else "cycle"
     lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
@@ -179,7 +172,7 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
         raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
     checked.attrs = _cleaned(checked.attrs)
     for variable in checked.variables.values():
-        variable.attrs = _cleaned(variable.attrs)
+        variable.attrs = _cleaned({name: variable.attrs[name] for name in _ATTRIBUTES if name in variable.attrs})
     checked.set_close(dataset.close)
     study_tables(checked.attrs, source)
     return checked

@@ -116,21 +116,17 @@ class Result(Points):
         return self.counts(self._shown) if self.has("cycle_count") else self.counts({})
 
     def counts(self, point: Point) -> NDArray[np.float64]:
-        """Cycle counts of one point. Numbers of the outputs where it has counts of its own and they do not ascend.
+        """Cycle counts of one point, NaN for outputs that it has not.
 
-        Infinite is that of a final state that was found without slow time; NaN those of outputs the point has not.
+        Numbers of the outputs where it has counts of its own and they do not ascend, or are not finite, as old files
+        have them for a final state.
         """
         numbers = np.asarray(self.dataset["cycle"].values, dtype=float)
         if not self.has("cycle_count"):
             return numbers
         own = np.asarray(self.at("cycle_count", point).values, dtype=float)
-        ascend = own.size > 1 and (np.diff(own[~np.isnan(own)]) > 0.0).all()
+        ascend = own.size > 1 and not np.isinf(own).any() and (np.diff(own[~np.isnan(own)]) > 0.0).all()
         return own if ascend else numbers
-
-    @property
-    def has_history(self) -> bool:
-        """Whether the shown point has states between the first and a final one."""
-        return len(self.cycles) > 1 and bool(np.isfinite(self.cycles[1:]).any())
 
     def last_kept(self, point: Point) -> int:
         """Index of the last cycle count at which a point holds values: one at its target has none behind it."""
@@ -202,8 +198,8 @@ class Result(Points):
         return show_cycles(float(self.cycles[index]), self.counted)
 
     def when(self, index: int, before: str = "at") -> str:
-        """A kept cycle count in words, with the word `before` it: "at 5 cycles", "in the final state"."""
-        return "in the final state" if np.isinf(self.cycles[index]) else f"{before} {self.cycle_label(index)}"
+        """A kept cycle count in words, with the word `before` it: "at 5 cycles"."""
+        return f"{before} {self.cycle_label(index)}"
 
 
 def as_sentences(*parts: str) -> str:

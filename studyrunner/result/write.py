@@ -39,29 +39,6 @@ _KEY_TYPE = "S32"
 _COMPLEX = np.dtype([("r", "f8"), ("i", "f8")])
 _PACKED: Any = {"compression": "zlib", "complevel": 1, "shuffle": True}
 
-_OF_SCENE = {
-    "contact/dofs": "closing, first and second tangential relative displacement of each pair; -1 where there is none",
-    "contact/area": "weight of the pair, m2",
-    "contact/gap": "initial gap, m",
-    "contact/normal_load": "constant normal force of pairs without a closing displacement, N, compression positive",
-    "contact/friction_coefficient": "friction coefficient of the pair",
-    "contact/position": "position of the pair, m",
-    "contact/edge": "1 where the bodies go on beyond the pair without pairs, 0 elsewhere",
-    "contact/surface": "label of the surface of the pair",
-    "mass": "mass matrix, kg",
-    "damping": "viscous damping matrix, N s/m",
-    "stiffness": "stiffness matrix, N/m",
-    "load/static": "static load, N",
-    "load/harmonic": "harmonic load, N for an excitation amplitude of 1",
-    "response/dofs": "rows that give the responses from the displacements",
-    "response/names": "name of each response",
-    "mesh/x": "position of the node, x, m",
-    "mesh/y": "position of the node, y, m",
-    "mesh/z": "position of the node, z, m",
-    "mesh/quad": "nodes of the outer face, anticlockwise from outside",
-    "mesh/part": "part that the face belongs to",
-}
-
 Region = tuple[slice, ...]
 
 
@@ -107,10 +84,7 @@ def write_result(
 
 @contextlib.contextmanager
 def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
-    """A new NetCDF file. Raises OSError with the reason of the system.
-
-    The library itself reports missing permission or an error of HDF, whatever the reason.
-    """
+    """A new NetCDF file. Raises OSError with the reason of the system, which the library does not report."""
     try:
         with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
             yield file
@@ -268,5 +242,4 @@ def _write_scene(root: netCDF4.Group, scene: KeptScene) -> None:
             pair = pair or root.createCompoundType(_COMPLEX, "complex")
             kind, values = pair, np.ascontiguousarray(values, np.complex128).view(_COMPLEX)
         variable = group.createVariable(name, kind, dimensions, fill_value=False, **({} if kind is str else _PACKED))
-        variable.setncattr("long_name", _OF_SCENE[key.split("/", 2)[-1] if key.startswith("nd/") else key])
         variable[:] = values

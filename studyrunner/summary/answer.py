@@ -138,7 +138,7 @@ def _samples(result: Result) -> Samples | None:
 
 def _modes(result: Result) -> tuple[ModeRange, ...]:
     numbers = [name for name in result.varying if name != "mode" and result.dataset[name].dtype.kind in "iuf"]
-    ends = {name: (show_number(float(result.dataset[name].values[place])) for place in (0, -1)) for name in numbers}
+    ends = {name: [show_number(float(result.dataset[name].values[place])) for place in (0, -1)] for name in numbers}
     over = ", ".join(f"{name.replace('_', ' ')} {' to '.join(each)}" for name, each in ends.items())
     axis, found = result.axes.index("mode"), []
     for index, number in enumerate(result.dataset["mode"].values.tolist()):

@@ -90,7 +90,7 @@ class ProgressDisplay:
         self._share = 1.0 if done else max(self._share, min(found.share, _MOST_SHOWN))
         parts = [f"{found.n_done} of {count(found.n_points, 'point')}", f"{100.0 * self._share:.0f} %"]
         if not done:
-            parts.append(f"about {format_seconds(found.seconds_left)} left")
+            parts.append(f"about {format_seconds(max(1.0, found.seconds_left))} left")
         if found.running:
             more = len(found.running) - _MOST_NAMED
             named = ", ".join(found.running[:_MOST_NAMED])

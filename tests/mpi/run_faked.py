@@ -6,8 +6,7 @@ others wait for that.
 FAKE_STEPS: every history takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
 takes two. Each step is noted in a file, what was gone on from in another one, and what was done when in a third.
 FAKE_PROGRESS: a task says so often how far it is, s; 0.03 where it is not given.
-FAKE_CRASH: what each history at the second frequency does instead: "segfault" or "abort"; so does each sweep on its way
-to the fourth one where "in sweep" stands behind.
+FAKE_CRASH: what each history at the second frequency does instead: "segfault" or "abort".
 FAKE_NOTHING: tasks take no time at all; in the end rank 0 says how much memory and time it has taken.
 FAKE_TELLING: seconds between two lines that say how far the run is.
 FAKE_PATIENCE: each sweep stops after its first start state until a history from it is done; after this time it raises.
@@ -18,7 +17,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,7 +46,10 @@ PATIENCE = 200.0
 
 def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterator[Result]:
     """Stands for `task_runs.compute_task`."""
-    facts = facts_of(models[task.scenes[0]])
+    model = models[task.scenes[0]]
+    if id(model) not in FACTS:
+        FACTS[id(model)] = model, describe_scene(model)
+    facts = FACTS[id(model)][1]
     seconds = float(os.environ.get("FAKE_SECONDS", "0.0" if "FAKE_NOTHING" in os.environ else "0.002"))
     n_steps = int(os.environ.get("FAKE_STEPS", "0"))
     if isinstance(task, Sweep):
@@ -58,19 +60,7 @@ def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterat
 
 
 FACTS: dict[int, tuple[object, SceneFacts]] = {}
-
-
-def facts_of(model: object) -> SceneFacts:
-    """Facts of a model, found once."""
-    if id(model) not in FACTS:
-        FACTS[id(model)] = model, describe_scene(model)
-    return FACTS[id(model)][1]
-
-
-def crash_in(kind: str) -> str:
-    """How tasks of a kind are to crash; empty for not at all."""
-    crash, _, in_sweep = os.environ.get("FAKE_CRASH", "").partition(" ")
-    return crash if (kind == "sweep") == bool(in_sweep) else ""
+"""Of models, by their identity: found once."""
 
 
 def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iterator[Result]:
@@ -78,10 +68,6 @@ def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iter
     for number, started in enumerate(fake_sweep(replace(task, known=frozenset()))):
         if not left:
             return
-        if crash_in("sweep") and started.place == 3:
-            # what was given before is on the disk by then
-            time.sleep(2.0)
-            end_process(crash_in("sweep"))
         if number < gone_on_from(task):
             continue
         if n_steps:
@@ -95,15 +81,19 @@ def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iter
         if n_steps:
             keep(Packed("sweep", (np.array([number + 1.0]),)))
         if "FAKE_PATIENCE" in os.environ:
-            wait_until(Path(f"sweep{task.number}.txt").exists, float(os.environ["FAKE_PATIENCE"]))
+            latest = time.monotonic() + float(os.environ["FAKE_PATIENCE"])
+            while not Path(f"sweep{task.number}.txt").exists():
+                if time.monotonic() > latest:
+                    raise TimeoutError
+                time.sleep(0.01)
 
 
 def compute_history(
     task: History, facts: SceneFacts, n_steps: int, seconds: float, keep: Keep
 ) -> Iterator[PointResult]:
     failing = int(os.environ.get("FAKE_FAILURE", "-1"))
-    if crash_in("history") and task.position == 1:
-        end_process(crash_in("history"))
+    if task.position == 1:
+        end_process(os.environ.get("FAKE_CRASH", ""))
     if launcher_rank() == failing:
         # not the task, but what is around it
         yield from fake_evaluate(task, facts=facts)
@@ -156,8 +146,7 @@ def note_done(what: str, task: Task, number: int) -> None:
 
 
 def watch_memory(samples: list[int]) -> None:
-    """Memory of this process, KiB, that is not that of files: those that it reads are in memory as long as there is
-    room only."""
+    """Memory of this process, KiB, but for that of files, which are in memory as long as there is room only."""
     while True:
         samples.append(own_memory())
         time.sleep(0.02)
@@ -174,15 +163,6 @@ def end_process(how: str) -> None:
         ctypes.string_at(0)
     elif how == "abort":
         os.abort()
-
-
-def wait_until(condition: Callable[[], bool], patience: float) -> None:
-    """Returns when the condition holds; raises TimeoutError after a while."""
-    latest = time.monotonic() + patience
-    while not condition():
-        if time.monotonic() > latest:
-            raise TimeoutError
-        time.sleep(0.01)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import os, runpy, sys
 sys.path.insert(0, {root!r})
 from studyrunner.mpi import ranks
 if os.environ["PMI_RANK"] == "1":
-    ranks.WhatSoftware.answer = lambda _: ("elsewhere", "other")
+    ranks.describe_software = lambda: ("elsewhere", "other")
 sys.argv = [{faked!r}, *sys.argv[1:]]
 runpy.run_path({faked!r}, run_name="__main__")
 """

@@ -101,7 +101,7 @@ def test_bad_input_is_said_once(tmp_path):
 def test_a_run_on_two_ranks_says_how_far_it_is(tmp_path):
     """Both ranks are seen at work, and the rank that serves them is not too busy to say so."""
     study = (*CHEAP, "--set", "axes.scheme=['implicit', 'explicit']", "-o", "out.nc")
-    told = {"FAKE_STEPS": "4", "FAKE_SECONDS": "0.03", "FAKE_TELLING": "0.1"}
+    told = {"FAKE_STEPS": "4", "FAKE_SECONDS": "0.06", "FAKE_TELLING": "0.1"}
     ended = run_to_end(2, [FAKED, *study], tmp_path, told)
     assert ended.status == 0, ended.said
     found = [match for line in ended.said.splitlines() if (match := LINE.fullmatch(line))]

@@ -18,7 +18,7 @@ from solver.outcome import Outcome
 from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.stability.disturbances import build_monodromy, switching_pairs
-from solver.stability.floquet import find_instability, is_stable, multipliers_of
+from solver.stability.floquet import find_instability, multipliers_of
 from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import build_case
 from tests.solver.models import converged_state, crossings, cyclic_model, march_wear, random_balance, random_model
@@ -243,7 +243,7 @@ def test_the_branches_of_a_mass_at_a_wall_have_alternating_stability():
     at = start.evaluate(start.predict(state.displacement_h, state.contact_force_h))
     upper = State(at, state.start_history, 1.55)
     middle, lower = islice(crossings(Arc(wall_at, upper, 0.08, Run(1e-8)), 1.55, 1.0), 2)
-    stable = [is_stable(wall_at(1.55, one.history), one.evaluation, Run(1e-8)) for one in (upper, middle, lower)]
+    stable = [Run(1e-8).is_stable(wall_at(1.55, one.history), one.evaluation) for one in (upper, middle, lower)]
     assert stable == [True, False, True]
     sizes = [np.abs(point.evaluation.displacement_h).max() for point in (upper, middle)]
     assert sizes[0] > sizes[1] > 0
@@ -256,4 +256,4 @@ def test_a_joint_that_is_open_or_stuck_all_over_is_stable():
         predicted[balance.joint.component_index % 3 == 0, 0] = level
         at = balance.evaluate(predicted)
         assert (at.status_t == (0 if level < 0 else 1)).all()
-        assert is_stable(balance, at, Run(1e-8))
+        assert Run(1e-8).is_stable(balance, at)

@@ -34,7 +34,7 @@ from solver.missions.step import Step, attempt_step
 from solver.packing import Packed
 from solver.results.history import StartState
 from solver.settings import Resolution, WearTarget
-from solver.wear.integrate import Like
+from solver.wear.integrate import Guide
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.sdof_slider import Parameters as SliderParameters
 from tests.solver.models import scene
@@ -209,7 +209,7 @@ def pairs():
 
 def exact_run(case):
     """The wear of `dW/dn = r - L W` through a block; the reference solution wears a little more."""
-    rate, loss = RATES[case.place] * (1.0 if case.like is None else 1.001), LOSS[case.place]
+    rate, loss = RATES[case.place] * (1.0 if case.guide is None else 1.001), LOSS[case.place]
     slope = expm(-case.block.steady[1] * loss) - np.eye(2)
     # `r - L W` lies in the range of L but for uniform wear
     values, vectors = np.linalg.eigh(loss)
@@ -218,7 +218,7 @@ def exact_run(case):
     growth = vectors @ (decay * (vectors.T @ (rate - loss @ case.depth)))
     response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
     slope = slope if case.with_slope else None
-    return BlockRun(growth, response, np.abs(response), slope, like=Like((), 1.0))
+    return BlockRun(growth, response, np.abs(response), slope, guide=Guide((), 1.0))
 
 
 @pytest.fixture
@@ -325,7 +325,7 @@ def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
     def run(case):
         nonlocal deepest
         found, depth = exact_run(case), float(case.depth.max())
-        if depth > limit or (case.like is None and depth > deepest + 4e-8):
+        if depth > limit or (case.guide is None and depth > deepest + 4e-8):
             return Failure(Outcome.MARCH_FAILED, "lost")
         deepest = max(deepest, depth + float(found.growth.max()))
         return found
@@ -436,8 +436,8 @@ def test_the_reference_of_a_passage_takes_its_resolutions_and_estimates_no_error
     settings = SolverSettings(rtol=2e-3)
     case = passing(Passage(185.0, 215.0, 5.0), settings=settings)
     fine = run_passage(case)
-    assert fine.like is not None
-    as_reference = replace(case, like=fine.like)
+    assert fine.guide is not None
+    as_reference = replace(case, guide=fine.guide)
     reference = run_passage(as_reference)
     assert reference.iterations < fine.iterations
     known, estimated = (states_at(of, np.array([200.0])) for of in (as_reference, case))

@@ -29,12 +29,12 @@ def slider(damping=0.0):
     )
 
 
-def foot(loss=1e-5, mass=1e-3):
-    """A pressed foot, kg, with a tip on a spring above it; damping: `loss` times stiffness."""
+def foot():
+    """A pressed foot with a tip on a spring above it; damping: 1e-5 times stiffness."""
     stiffness = np.array([[1e7, 0.0, 0.0], [0.0, 4e6, -2e6], [0.0, -2e6, 2e6]])
     return build_model(
-        np.diag([mass, mass, 0.2]),
-        loss * stiffness,
+        np.diag([1e-3, 1e-3, 0.2]),
+        1e-5 * stiffness,
         stiffness,
         [[0, 1, -1]],
         1e-4,
@@ -229,11 +229,9 @@ def test_wear_opens_the_joint_as_a_gap_does():
 
 
 def test_what_has_no_mode_says_so():
-    below = 0.5 * SIZE * np.sqrt(MASS)
     for model, amplitude, asked, outcome, said in (
         (foot(), 1e-6, {"mode": 4}, Outcome.START_FAILED, "fewer linear modes"),
         (slider(), 1e-3, {}, Outcome.START_FAILED, 'sweep = "down"'),
-        (slider(), below, {"sweep": "down"}, Outcome.BRANCH_LOST, "the mode is followed down to"),
     ):
         found = backbone(model, amplitude, 0.5, **asked)
         assert found.outcome == (outcome,)
@@ -241,15 +239,11 @@ def test_what_has_no_mode_says_so():
         assert np.isnan(found.frequency).all()
 
 
-@pytest.mark.slow
 def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points():
-    """A heavy foot whose own vibration the harmonics meet stops several times in a period."""
-    # raised over a small fold, and lowered from there as far as it goes
-    found = backbone(foot(mass=0.05), [1e-4, 1.5e-5], 0.5, sweep="down")
-    assert found.outcome == (Outcome.CONVERGED, Outcome.BRANCH_LOST)
-    assert np.isnan(found.frequency[1])
-    assert 300.0 < found.frequency[0] < 450.0
-    assert "the mode is followed down to the amplitude" in found.message[1]
+    found = backbone(slider(), SIZE * np.sqrt(MASS) * np.array([0.5, 2.0]), 0.5, sweep="down")
+    assert found.outcome == (Outcome.BRANCH_LOST, Outcome.CONVERGED)
+    assert np.isnan(found.frequency).tolist() == [True, False]
+    assert "the mode is followed down to the amplitude" in found.message[0]
 
 
 def test_wrong_arguments_are_named():

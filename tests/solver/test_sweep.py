@@ -22,7 +22,6 @@ from solver.loading_history.frequency_sweep import (
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.results.history import StartState
 from solver.settings import SolverSettings
 from tests.solver.models import branch_states, dovetail, scene
 
@@ -79,19 +78,6 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch):
     assert abs(slip_work(coarse) / slip_work(fine) - 1.0) < coarse.wear_rate_error
 
 
-@pytest.mark.slow
-def test_progress_beyond_a_frequency_is_not_used_for_it():
-    kept: list[Packed] = []
-
-    def keep(progress):
-        kept.extend([] if isinstance(progress, str) else [progress])
-
-    asked = dovetail(13), 0.5, 0.5
-    list(follow_branch(*asked, np.array([212.0, 212.75]), "up", AUTOMATIC, keep=keep))
-    ((_, again),) = follow_branch(*asked, np.array([BESIDE]), "up", AUTOMATIC, resume=kept[-1])
-    assert_same_state(again, alone())
-
-
 @pytest.mark.parametrize("sweep", ["up", "down"])
 def test_a_sweep_begins_away_from_its_points_and_from_resonances(sweep):
     model = dovetail()
@@ -125,37 +111,6 @@ def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch):
     assert nodes.state.failure is Outcome.UNSETTLED
 
 
-class KilledError(BaseException):
-    """The end of a run, in the middle of its work."""
-
-
-def in_short_runs(model, friction, amplitude, frequencies, way):
-    """The start states from runs that all end at their second save, and the number of runs."""
-    found: dict[int, StartState] = {}
-    saved: list[Packed] = []
-    for n_runs in range(1, 1000):
-        n_saves = 0
-
-        def keep(progress):
-            nonlocal n_saves
-            if isinstance(progress, str):
-                return
-            saved[:], n_saves = [progress], n_saves + 1
-            if n_saves == 2:
-                raise KilledError
-
-        left = [index for index in range(frequencies.size) if index not in found]
-        resume = saved[0] if saved else None
-        try:
-            asked = model, friction, amplitude, frequencies[left], way, AUTOMATIC
-            for place, start in follow_branch(*asked, keep=keep, resume=resume):
-                found[left[place]] = start
-        except KilledError:
-            continue
-        return found, n_runs
-    raise AssertionError("the runs never end")
-
-
 INTERRUPTED = {
     "nodes and resolutions": (lambda: dovetail(13), 0.5, 0.5, [212.0, 212.6], "up"),
     "folds and settling in time": (lambda: scene("vibro_impact"), 0.0, 0.02, [0.2, 0.255], "up"),
@@ -165,16 +120,19 @@ INTERRUPTED = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", INTERRUPTED)
-def test_runs_that_end_at_each_save_arrive_at_the_same_numbers(case, monkeypatch):
+def test_a_sweep_goes_on_from_each_save_to_the_last_bit(case, monkeypatch):
+    """Also to a frequency that was passed before."""
     monkeypatch.setattr(sweep_module, "ITERATIONS_PER_SAVE", 5)
     build, friction, amplitude, frequencies, way = INTERRUPTED[case]
-    model, at = build(), np.array(frequencies)
-    whole = dict(follow_branch(model, friction, amplitude, at, way, AUTOMATIC))
+    asked, kept = (build(), friction, amplitude, np.array(frequencies), way, AUTOMATIC), list[Packed | str]()
+    whole = dict(follow_branch(*asked, keep=kept.append))
     assert max(start.branch for start in whole.values()) == (1 if "folds" in case else 0)
-    found, n_runs = in_short_runs(model, friction, amplitude, at, way)
-    assert n_runs > 2 * len(whole)
-    for index, wanted in whole.items():
-        assert_same_state(found[index], wanted)
+    saved = [progress for progress in kept if not isinstance(progress, str)]
+    assert len(saved) > 2 * len(whole)
+    for progress in saved[1 :: len(saved) // 4 + 1]:
+        again = dict(follow_branch(*asked, resume=progress))
+        for index, wanted in whole.items():
+            assert_same_state(again[index], wanted)
 
 
 @pytest.mark.slow

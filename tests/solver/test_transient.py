@@ -16,7 +16,6 @@ from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
-from solver.stability.floquet import is_stable
 from solver.structure.joint import build_case
 from tests.references import coulomb_orbit
 from tests.solver.models import converged_state, crossings, first_point, scene
@@ -69,7 +68,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     balance_at, first, size = wall(WALL_OMEGA)
 
     def grows(point):
-        return not is_stable(balance_at(point.parameter, point.history), point.evaluation, Run(1e-8))
+        return not Run(1e-8).is_stable(balance_at(point.parameter, point.history), point.evaluation)
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
     start = first(0.03)

@@ -1,10 +1,13 @@
-"""Wear histories of the slider under a spring against its differential equation and its exact motion."""
+"""Wear histories of the slider under a spring against its differential equation; a joint that is worn before."""
 
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
+from solver import frequency_response
+from solver import march_wear as march_model
+from solver.contact.wear_law import WearLaw, WearTable
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.results.state_report import LOOP_PHASES
@@ -26,6 +29,7 @@ from tests.solver.worn_slider import (
 STEPS = (8000.0, 4000.0, 2000.0, 1000.0)
 GIVEN: tuple[Scheme, ...] = ("explicit", "implicit")
 SCHEMES: tuple[Scheme, ...] = (*GIVEN, "adaptive")
+FEW = SolverSettings(harmonics=3, samples=128)
 FINE_OUTPUT = np.linspace(0.0, END, 101)
 
 
@@ -110,3 +114,30 @@ def test_only_the_product_of_wear_coefficient_and_cycles_matters():
         one, other = getattr(slow, name), getattr(fast, name)
         assert np.abs(one - other).max() <= 1e-9 * np.abs(one).max(), name
     assert fast.wear_rate == pytest.approx(10 * slow.wear_rate, rel=1e-9, abs=0.0)
+
+
+def test_a_response_at_a_depth_is_that_of_less_normal_force():
+    """The spring of the slider presses by 10 N less 1e5 N/m times the depth."""
+    worn = frequency_response(scene("sdof_slider"), 150.0, 10.0, 0.5, settings=FEW, wear_depth=[4e-5])
+    less = frequency_response(scene("sdof_slider", normal_load=6.0), 150.0, 10.0, 0.5, settings=FEW)
+    np.testing.assert_allclose(worn.response, less.response, rtol=1e-7)
+    assert set(worn.outcome) == {Outcome.CONVERGED}
+
+
+def test_a_march_goes_on_from_a_depth():
+    model = scene("sdof_slider")
+    whole = march_model(model, 160.0, 10.0, 0.5, WEAR, [0.0, 2e4, 4e4], settings=FEW)
+    rest = march_model(model, 160.0, 10.0, 0.5, WEAR, [2e4], settings=FEW, wear_depth=whole.wear_depth[1])
+    assert rest.outcome is Outcome.CONVERGED
+    depth = whole.wear_depth[1, 0] + rest.wear_depth[-1, 0]
+    error = whole.wear_depth_error[-1, 0] + rest.wear_depth_error[-1, 0]
+    assert depth == pytest.approx(whole.wear_depth[-1, 0], abs=error)
+    assert error < 1e-2 * depth
+
+
+def test_a_law_that_depends_on_the_depth_is_refused():
+    law = WearLaw("table", table=WearTable((0.0, 1e6), (0.0, 1e-5), ((1.0, 1.0), (1.0, 1.0))))
+    with pytest.raises(ValueError, match="wear_depth: give another law"):
+        march_model(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [4e4], law=law, wear_depth=0.0)
+    with pytest.raises(ValueError, match="wear_depth: give a depth, m, for each of 1 pairs, not 2"):
+        march_model(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [4e4], wear_depth=[0.0, 0.0])

@@ -10,7 +10,7 @@ from solver.missions import integrate
 from solver.missions.block_run import BlockRun
 from solver.missions.mission import Passage
 from solver.outcome import Outcome
-from solver.wear.integrate import Like
+from solver.wear.integrate import Guide
 
 STUDY = """
 [study]
@@ -61,13 +61,13 @@ class FakedBlocks:
         block, contact = case.block, case.block.model.contact
         cycles = block.frequency.cycles if isinstance(block.frequency, Passage) else block.cycles
         rate = case.mission.wear_coefficient * block.excitation_amplitude * load_of(block) * block.ends[1] * 1e-5
-        rate = rate * (1.0 if case.like is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
+        rate = rate * (1.0 if case.guide is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
         response = 1e-6 * block.excitation_amplitude * (1.0 + case.depth.sum() + np.array([[0.0], [1.0]]))
         if block.name in self.fails:
             return Failure(self.fails[block.name])
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
         return BlockRun(
-            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, like=Like((), 1.0), iterations=7
+            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, guide=Guide((), 1.0), iterations=7
         )  # fmt: skip
 
 

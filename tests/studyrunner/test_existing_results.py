@@ -149,7 +149,7 @@ def test_a_finished_result_is_not_replaced_by_less(command, solver, capsys):
     assert main(command) == 130
     said = capsys.readouterr().err.splitlines()[-1]
     assert said.startswith("run-study: interrupted: ")
-    assert "points are kept, out.nc is the finished result that it was" in said
+    assert "are kept, out.nc is the finished result that it was" in said
     assert Path("out.nc").read_bytes() == before
     # a finished one takes its place
     solver.begin_again()

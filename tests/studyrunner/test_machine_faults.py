@@ -53,16 +53,16 @@ def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch):
     """With the solver itself, whose histories break off in their midst."""
     from solver.wear.wearing_joint import WearingJoint
 
-    own, n_calls = WearingJoint.noted, 0
+    own, n_calls = WearingJoint.with_rates, 0
 
-    def noted(self, *given):
+    def with_rates(self, *given):
         nonlocal n_calls
         n_calls += 1
         if n_calls in (3, 30):
             raise MemoryError("no room for an array")
         return own(self, *given)
 
-    monkeypatch.setattr(WearingJoint, "noted", noted)
+    monkeypatch.setattr(WearingJoint, "with_rates", with_rates)
     assert main([*SMALL, "--set", "solver.harmonics=3", "--set", "solver.samples=32"]) == 0
     assert n_calls > 30
     assert (results().outcome == 0).all()

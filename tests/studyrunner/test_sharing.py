@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import pack
 from solver.results.history import StartState
@@ -18,7 +17,6 @@ from solver.settings import Resolution
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.sharing import Integrated, ScaledHistory, describe_left_out, share_histories
 from studyrunner.kinds.wear_result import build_result
-from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import points_of, totals_of
 from tests.studyrunner.histories import history
@@ -138,21 +136,6 @@ def test_rtol_shares_sweeps_where_nothing_uses_it(overrides, n_sweeps):
     assert len(points) == points.total() == plan.n_points
     assert sum(plan.left_out.values()) == plan.n_points - sum(len(task.integrated) for task in plan.results)
     assert any(reason.startswith("rtol") for reason in plan.left_out) == (n_sweeps in (1, 5))
-
-
-def test_a_law_whose_rate_is_not_proportional_shares_no_other_wear_coefficient(monkeypatch):
-    study = study_with(["0", "1e-12", "2e-12"], ["100", "200"], SCHEMES)
-    assert len(share_histories(study)[0]) < 15
-    monkeypatch.setattr(Study, "wear_law", WearLaw("other", proportional=False))
-    tasks, causes = share_histories(study)
-    # adaptive steps do not depend on the step axis, whatever the law is
-    assert len(tasks) == 3 * (2 + 2 + 1)
-    for found in tasks:
-        assert len({wear for wear, _, _ in choices_of(found)}) == 1
-        assert not found.unworn
-    assert list(describe_left_out(causes).values()) == [3]
-    unworn = study_with(["0", "1e-12"], ["100", "200"], SCHEMES, "slow_time.cycles=0")
-    assert all(found.unworn for found in share_histories(unworn)[0])
 
 
 ADAPTIVE = ("axes.wear_coefficient=[2e-12, 1e-11, 4e-12]", "axes.scheme=adaptive", "axes.step=[1, 2]")

@@ -1,17 +1,25 @@
-"""Where the contact pairs of each surface lie: on a grid, in a plane, or nowhere that the file says."""
+"""Where the contact pairs of each surface lie: on a grid, in a plane, or nowhere that the file says; maps of them."""
 
 from __future__ import annotations
 
 import contextlib
+import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from studyrunner.report.panels import FloatArray
+from studyrunner.report.panels import FloatArray, add_colour_bar, add_map, is_narrow, label_outer, new_panels
 from studyrunner.result.grid import Grid, find_grid
 from studyrunner.result.scene_pairs import contact_pairs
+from studyrunner.result.units import Scale
 from studyrunner.result.view import Result
+from studyrunner.system.progress import count
 
 JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
 """The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
@@ -19,6 +27,7 @@ JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
 _ORIGIN = "Axial 0 is the leading edge, up the flank 0 the inner end"
 _LONE, _SLIM = 1e-3, 0.2  # m; width of a single row of pairs, or this part of its length where that is less
 _STRAIGHT = 0.999
+_MOST_FLANKS, _SLENDER, _LOW, _LABEL_WIDTH = 3, 0.12, 0.4, 14
 
 
 @dataclass(frozen=True)
@@ -129,3 +138,57 @@ def _edges(at: FloatArray, share: FloatArray, length: float, lone: float) -> Flo
         length = float(np.clip(np.nan_to_num(length, nan=np.inf), at[1], 2.0 * at[1]))
     start = float(np.mean(0.5 * (at[1:] + at[:-1]) - length * share[1:-1]))
     return np.asarray(start + length * share)
+
+
+# --- maps ---
+
+
+def most_of_flanks(result: Result, *values: FloatArray) -> tuple[tuple[Flank, ...], str]:
+    """Surfaces with the largest values (n_contact,), as many as fit side by side; how they are drawn, in sentences."""
+    flanks = find_flanks(result)
+    largest = [max(float(np.nanmax(value[flank.pairs])) for value in values) for flank in flanks]
+    kept = tuple(flanks[number] for number in sorted(np.argsort(largest)[::-1][:_MOST_FLANKS]))
+    others = len(flanks) - len(kept)
+    said = "The file has no positions of the pairs: they stand by their index"
+    if all(flank.seen is not None for flank in kept):
+        said = "The pairs lie on no grid: one dot is one contact pair"
+    if all(flank.cells is not None for flank in kept):
+        said = "One cell is one contact pair, as large as its area"
+    return kept, f"{said}. {count(others, 'more surface')} with lower values in the file" if others else said
+
+
+def map_height(flanks: Sequence[Flank]) -> float:
+    """Height of a row of maps of flanks side by side, inches."""
+    return 6.0 / len(flanks) * min(1.2, max(0.28, max(flank.height_over_width for flank in flanks)))
+
+
+def draw_fields(flanks: Sequence[Flank], fields: Mapping[str, FloatArray], scale: Scale, text: str) -> Figure:
+    """One row of maps a field (n_contact,), one column a flank, all in one colour scale."""
+    figure, panels = new_panels(len(fields), len(flanks), len(fields) * (map_height(flanks) + 0.62))
+    largest = max(float(np.nanmax(values, initial=0.0)) for values in fields.values())
+    norm = Normalize(0.0, scale(largest).item() or 1.0)
+    for row, (label, values) in zip(panels, fields.items(), strict=True):
+        for panel, flank in zip(row, flanks, strict=True):
+            draw_field(panel, flank, scale(values[flank.pairs]), norm)
+            panel.set_title(f"{flank.surface}, {label}")
+    label_outer(panels)
+    add_colour_bar(figure, panels, norm, scale.label(text), fraction=0.05)
+    return figure
+
+
+def draw_field(panel: Axes, flank: Flank, values: NDArray[Any], norm: Normalize, **look: Any) -> None:
+    """One field (n,) of a flank: cells of its grid, or dots at its pairs."""
+    if flank.cells is not None:
+        cells = flank.cells
+        add_map(panel, 1e3 * cells.x_edges, 1e3 * cells.y_edges, values[cells.pair], norm, **look)
+        # cells as they are in the flank, unless it is so slender that too little would be seen
+        panel.set_aspect("equal" if flank.height_over_width > (_LOW if is_narrow() else _SLENDER) else "auto")
+    elif flank.seen is not None:
+        dots: dict[str, Any] = {"edgecolors": "0.3", "linewidths": 0.4}
+        panel.grid(visible=False)
+        x, y = 1e3 * flank.seen.T
+        panel.scatter(x, y, 160 if look else 60, values, norm=norm, label="pairs", **(dots | look))
+        panel.margins(0.12)
+        panel.set_aspect("equal", adjustable="datalim")
+    panel.set_xlabel(f"{flank.directions[0]} (mm)")
+    panel.set_ylabel(textwrap.fill(f"{flank.directions[1]} (mm)", _LABEL_WIDTH, break_on_hyphens=False))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,10 @@ from matplotlib.figure import Figure
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
 from studyrunner.report.drawing import Drawn
 from studyrunner.report.figures.flanks import JOINT_WORDS
-from studyrunner.report.panels import FloatArray, add_legend, label_outer, line_style, new_panels
+from studyrunner.report.panels import FloatArray, label_outer, line_style, new_panels
 from studyrunner.result.scene_pairs import last_depth, tells_depth
-from studyrunner.result.units import Scale, scale_for
-from studyrunner.result.view import Result, as_sentences
+from studyrunner.result.units import scale_for
+from studyrunner.result.view import Result
 
 _MOST_PAIRS, _LABEL_WIDTH = 3, 25
 _NO_MOTION = 1e-15  # m; a range below this is round-off
@@ -32,66 +33,54 @@ def draw_fretting(result: Result) -> Drawn:
         depth = last_depth(result, result.shown_point()) if tells_depth(result) else np.zeros(1)
         deepest = int(result.dataset["contact"].values[np.argmax(np.nan_to_num(depth))])
         return f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
-    found = {
-        name: {
+    rows: dict[str, _Curves] = {}
+    for name in _TANGENTS:
+        curves = {
             pair: (_centred(loop, "displacement", name), _centred(loop, "force", name)) for pair, loop in loops.items()
         }
-        for name in _TANGENTS
-    }
-    rows = {name: curves for name, curves in found.items() if any(np.any(force) for _, force in curves.values())}
+        if any(np.any(force) for _, force in curves.values()):
+            rows[name] = curves
     if not rows:
         return None
     words = _words(result, len(rows))
-    scales = _scales(list(rows.values()), "m", "N")
     labels = [(f"displacement, {words[name]}", f"force, {words[name]}") for name in rows]
-    return _draw(result, list(rows.values()), scales, labels), as_sentences(
-        "Tangential force over relative displacement through a period, each about its mean: the area inside is the"
-        " energy of friction",
-        _tell_drift(result, loops, words),
-        *_how_made(result, loops),
-    )
+    figure = _draw(result, list(rows.values()), ("m", "N"), labels)
+    return figure, _describe_drift(result, loops, words), _how_made(result, loops)
 
 
 def draw_normal(result: Result) -> Drawn:
     """Normal force through a period."""
-    loops, curves = _read_loops(result), {}
+    loops, curves = _read_loops(result), _Curves()
     for pair, loop in loops.items():
         force = loop["force"].sel(component="normal").transpose("cycle", "phase").values
         if np.isfinite(force).all() and force.any():
             curves[pair] = np.broadcast_to(np.degrees(loop["phase"].values), force.shape), force
     if not curves:
         return None
-    figure = _draw(result, [curves], (Scale(1.0, "°"), _scales([curves], "1", "N")[1]), [("phase", "normal force")])
+    figure = _draw(result, [curves], ("°", "N"), [("phase", "normal force")])
     for panel in figure.axes:
         panel.set(xlim=(0, 360), xticks=[0, 90, 180, 270, 360])
         panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]) if panel.dataLim.ymin < 0.0 else 0.0)
-    opened = (
-        f"pair {pair} " + ", then ".join(f"{100.0 * np.mean(each[:-1] <= 0.0):.0f} %" for each in force)
-        for pair, (_, force) in curves.items()
-    )
-    said = f"Where the force is zero the pair is open: {', '.join(opened)} of the period"
-    return figure, as_sentences(said, *_how_made(result, loops))
+    return figure, _how_made(result, loops)
 
 
 def draw_motion(result: Result) -> Drawn:
     """Path of the relative displacement in the contact plane; nothing where pairs have one tangent only."""
-    loops, curves = _read_loops(result), {}
+    loops, curves = _read_loops(result), _Curves()
     for pair, loop in loops.items():
         if loop["displacement"].sel(component=list(_TANGENTS)).notnull().all():
             first, second = (_centred(loop, "displacement", name) for name in _TANGENTS)
             curves[pair] = first, second
     if not any(np.any(second) for _, second in curves.values()):
         return None
-    length, words = scale_for("m", *(each for pair in curves.values() for each in pair)), _words(result, 2)
-    first_label, second_label = (f"displacement, {words[name]}" for name in _TANGENTS)
-    figure = _draw(result, [curves], (length, length), [(first_label, second_label)])
+    first_label, second_label = (f"displacement, {each}" for each in _words(result, 2).values())
+    figure = _draw(result, [curves], ("m", "m"), [(first_label, second_label)])
     for panel in figure.axes:
         panel.set_aspect("equal", adjustable="datalim")
-    said = "Path of the relative displacement in the contact plane about its mean; a pair that sticks is a dot"
-    return figure, as_sentences(said, *_how_made(result, loops))
+    return figure, _how_made(result, loops)
 
 
-def find_loops(result: Result, point: dict[str, int]) -> list[int]:
+def find_loops(result: Result, point: Mapping[str, int]) -> list[int]:
     """Contact pairs whose loops the file holds at a point: those that the study asked for, without those of NaN."""
     if not result.has("loop_displacement", "loop_force"):
         return []
@@ -117,12 +106,6 @@ def _read_loops(result: Result) -> dict[int, xr.Dataset]:
     return {pair: ends.fretwear.loop(pair) for pair in sorted(pairs[:_MOST_PAIRS])}
 
 
-def _scales(rows: list[_Curves], across: str, upright: str) -> tuple[Scale, Scale]:
-    """Scales of x and y for all curves."""
-    x, y = ([pair[which] for curves in rows for pair in curves.values()] for which in (0, 1))
-    return scale_for(across, *x), scale_for(upright, *y)
-
-
 def _words(result: Result, n_directions: int) -> dict[str, str]:
     """The tangents in words: by the scene where it is known, else by their numbers."""
     named = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model")), ("tangent 1", "tangent 2"))
@@ -136,43 +119,46 @@ def _centred(loop: xr.Dataset, what: str, component: str) -> FloatArray:
     return np.where(np.ptp(values, axis=1, keepdims=True) >= _NO_MOTION, away, 0.0)
 
 
-def _tell_drift(result: Result, loops: dict[int, xr.Dataset], words: dict[str, str]) -> str:
+def _describe_drift(result: Result, loops: Mapping[int, xr.Dataset], words: Mapping[str, str]) -> str:
     """How far the mean of each pair has moved along each tangent between the two cycle counts."""
     if len(result.cycles) < 2:
         return ""
-    told = []
+    said = []
     for pair, loop in loops.items():
         means = loop["displacement"].isel(phase=slice(-1)).mean("phase")
         drift = {name: float(means.sel(component=name).diff("cycle").values[0]) for name in _TANGENTS}
-        drift = {name: each for name, each in drift.items() if np.isfinite(each)}
+        drift = {name: each * (abs(each) >= _NO_MOTION) for name, each in drift.items() if np.isfinite(each)}
         length = scale_for("m", *drift.values())
-        told.append(f"pair {pair} " + ", ".join(f"{length.show(each)} {words[name]}" for name, each in drift.items()))
-    return f"The mean displacement drifts between the two counts by: {'; '.join(told)}"
+        said.append(f"pair {pair} " + ", ".join(f"{length.show(each)} {words[name]}" for name, each in drift.items()))
+    return f"The mean displacement drifts between the two counts by: {'; '.join(said)}"
 
 
-def _how_made(result: Result, loops: dict[int, xr.Dataset]) -> tuple[str, str]:
-    """Which loops are not shown, and how those of a worn joint were computed again."""
+def _how_made(result: Result, loops: Mapping[int, xr.Dataset]) -> str:
+    """How loops of a worn joint were computed again, or which of the file are not shown."""
     if "loops" in result.again:
-        return "", str(result.again["loops"].attrs["how"])
+        return str(result.again["loops"].attrs["how"])
     others = ", ".join(str(pair) for pair in find_loops(result, result.shown_point()) if pair not in loops)
-    return f"The file also holds loops of the pairs {textwrap.shorten(others, 40)}" if others else "", ""
+    return f"The file also holds loops of the pairs {textwrap.shorten(others, 40)}" if others else ""
 
 
-def _draw(result: Result, rows: list[_Curves], scales: tuple[Scale, Scale], labels: list[tuple[str, str]]) -> Figure:
+def _draw(result: Result, rows: Sequence[_Curves], units: tuple[str, str], labels: Sequence[tuple[str, str]]) -> Figure:
     """One column a pair, one row a set of curves; a marker where the period begins, an arrow its way."""
     ends = [result.cycle_label(0), result.cycle_label(-1)]
+    values = [[pair[which] for curves in rows for pair in curves.values()] for which in (0, 1)]
+    scales = [scale_for(unit, *each) for unit, each in zip(units, values, strict=True)]
+    if units[0] == units[1]:
+        scales = 2 * [scale_for(units[0], *values[0], *values[1])]
     figure, panels = new_panels(len(rows), len(rows[0]), 0.5 + 2.7 * len(rows))
     for row, (curves, texts) in enumerate(zip(rows, labels, strict=True)):
         across, upright = (
             textwrap.fill(scale.label(text), _LABEL_WIDTH, break_on_hyphens=False)
             for scale, text in zip(scales, texts, strict=True)
         )
-        for column, (pair, (x_of_ends, y_of_ends)) in enumerate(curves.items()):
-            panel = panels[row, column]
+        for panel, (pair, (x_of_ends, y_of_ends)) in zip(panels[row], curves.items(), strict=True):
             for number, (x, y) in enumerate(zip(scales[0](x_of_ends), scales[1](y_of_ends), strict=True)):
                 look = line_style(number) | {"markevery": [0], "label": ends[number]}
                 panel.plot(x, y, **look)
-                if scales[0].unit != "°" and np.ptp(x) + np.ptp(y) > 0.0:
+                if units[0] == "m" and np.ptp(x) + np.ptp(y) > 0.0:
                     # where the line goes fastest on paper
                     at = int(np.argmax(np.hypot(np.diff(x) / (np.ptp(x) or 1.0), np.diff(y) / (np.ptp(y) or 1.0))))
                     way: dict[str, Any] = {"arrowstyle": "-|>", "color": look["color"], "lw": 0.0, "mutation_scale": 15}
@@ -180,7 +166,5 @@ def _draw(result: Result, rows: list[_Curves], scales: tuple[Scale, Scale], labe
             panel.set_title(f"pair {pair}" if row == 0 else "")
             panel.locator_params(nbins=5)
             panel.set(xlabel=across, ylabel=upright)
-    for row in range(len(rows)):
         label_outer(panels[row : row + 1])
-    add_legend(figure)
     return figure

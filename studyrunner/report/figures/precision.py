@@ -1,134 +1,263 @@
-"""Error against run time: a picture with a line for each scheme; its CSV file has all settings with their errors."""
+"""Error against run time of the numerical settings that a file compares; the CSV file of the figure has all of them."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from studyrunner.percent import show_percent
 from studyrunner.report.drawing import Drawn
-from studyrunner.report.figures.settings import KEYS, QUANTITIES, RESOLVED, ComparedPoint, Setting, compare_settings
-from studyrunner.report.panels import add_legend, line_style, new_panels, set_log
-from studyrunner.result.view import Result, as_sentences
+from studyrunner.report.panels import FloatArray, add_legend, line_style, new_panels, set_log
+from studyrunner.result.units import show_number
+from studyrunner.result.view import NO_VOLUME, Result, as_sentences
 from studyrunner.system.progress import count
 
-_MOST_POINTS = 3
-_SHAPES, _SIZE = "os^DvPX<>p", 5.5
-_RING: dict[str, Any] = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": "none"}
+KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
+"""Axes along which only the numbers change and not what is computed."""
+
+QUANTITIES = {"volume": "final worn volume", "response": "response at the end"}
+"""What is compared, in words."""
+
+RESOLVED = 3.0
+"""An error counts from so many times the uncertainty of the reference on."""
+
+_ROUND_OFF = 1e-12
+_AUTO, _OWN_STEPS, _EXPLICIT = "auto", ("adaptive", "final"), "explicit"
+_COMPARED = (
+    *("computed", "run_time", "worn_volume", "response_amplitude", "exact_worn_volume", "exact_response_amplitude"),
+    *("error_estimate", "response_error", "harmonics_used"),
+)
+_MOST_POINTS, _SHAPES = 3, "os^DvPX<>p"
+_NO_LINE: dict[str, Any] = {"linestyle": "none", "markersize": 5.5}
+_RING = {**_NO_LINE, "marker": "o", "markersize": 11, "markerfacecolor": "none", "markeredgecolor": "black"}
+
+
+class Setting(NamedTuple):
+    """Values of `KEYS`; None where the file has no such axis or the setting does not use it."""
+
+    scheme: str | None = None
+    step: float | None = None
+    harmonics: float | str | None = None
+    samples: float | str | None = None
+    tolerance: float | None = None
+    rtol: float | None = None
+
+    def describe(self) -> str:
+        """Those values that there are, in words."""
+        values = {key: value for key, value in self._asdict().items() if value is not None}
+        texts = {key: value if isinstance(value, str) else show_number(value, 4) for key, value in values.items()}
+        return ", ".join(text if key == "scheme" else f"{key} {text}" for key, text in texts.items())
+
+
+@dataclass(frozen=True)
+class ComparedPoint:
+    """What each setting gave at one point of the other axes; arrays (n_setting,).
+
+    label: the point in words, empty where nothing but settings varies. time: CPU s. worn: m3. errors: of `QUANTITIES`,
+    relative, NaN for the reference itself and what was not computed; of the volume infinite where the reference wears
+    nothing. reference: row of the finest setting, None where the exact answer is known, or nothing. uncertainty: of the
+    reference, relative, infinite where not known.
+    """
+
+    label: str
+    settings: tuple[Setting, ...]
+    time: FloatArray
+    worn: FloatArray
+    errors: Mapping[str, FloatArray]
+    reference: int | None
+    uncertainty: Mapping[str, float]
+
+    def is_clear(self, quantity: str) -> NDArray[np.bool_]:
+        """Which errors (n_setting,) are clearly more than round-off and the uncertainty of the reference."""
+        least = max(RESOLVED * self.uncertainty[quantity], _ROUND_OFF)
+        return np.asarray((self.errors[quantity] >= least) & np.isfinite(self.errors[quantity]))
+
+    def front(self, quantity: str, scheme: str | None = None) -> list[int]:
+        """Rows of settings, of all schemes or of one, than which no quicker one is as exact; the quickest first.
+
+        An error that is not resolved counts as the smallest that would be.
+        """
+        errors = np.maximum(self.errors[quantity], RESOLVED * self.uncertainty[quantity])
+        own = [row for row, each in enumerate(self.settings) if scheme in (None, each.scheme)]
+        own = sorted((row for row in own if np.isfinite(errors[row])), key=lambda row: (self.time[row], errors[row]))
+        least = np.minimum.accumulate([math.inf, *(errors[row] for row in own)])
+        return [row for row, before in zip(own, least, strict=False) if errors[row] < before]
+
+
+def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
+    """What the settings of a file cost and how wrong they are, at all points of the axes that are no settings.
+
+    Empty where the file does not compare at least two with a third one, or with the exact answer. Schemes alone are
+    compared with the exact answer only.
+    """
+    varying = [key for key in KEYS if key in result.varying]
+    alone = set(varying) <= {"scheme"} and not result.has("exact_worn_volume")
+    if alone or result.blocks is not None or not result.has("worn_volume", "response_amplitude"):
+        return ()
+    keys, others = ([name for name in result.axes if (name in KEYS) == each] for each in (True, False))
+    found = _list_settings(result, keys)
+    settings, rows = tuple(found), list(found.values())
+    unknown = xr.full_like(result.dataset["outcome"], np.nan, float)
+
+    def read(name: str) -> FloatArray:
+        """Values (n_points, n_setting, ...) at the last count; NaN where the file has none."""
+        values = unknown.copy(data=result.computed) if name == "computed" else unknown
+        values = result.read(name).isel(cycle=-1, missing_dims="ignore") if result.has(name) else values
+        table = values.stack(point=others, setting=keys, create_index=False).isel(setting=rows)
+        return np.asarray(table.transpose("point", "setting", ...).values, dtype=float)
+
+    tables = {name: read(name) for name in _COMPARED}
+    points = []
+    for number, place in enumerate(itertools.product(*(range(result.dataset.sizes[name]) for name in others))):
+        label = result.describe(dict(zip(others, place, strict=True)), set(result.varying) - set(KEYS))
+        points.append(_compare(label, settings, {name: table[number] for name, table in tables.items()}))
+    most = max(int(np.isfinite(each).sum()) for point in points for each in point.errors.values())
+    return tuple(points) if most > 1 else ()
+
+
+def _compare(label: str, settings: tuple[Setting, ...], own: Mapping[str, FloatArray]) -> ComparedPoint:
+    """The settings at one point. own (n_setting, ...): variables of `_COMPARED`."""
+
+    def rank(row: int) -> tuple[float, ...]:
+        """The highest of the finest setting: smallest estimated error, no explicit steps; then the most harmonics."""
+        error, setting = float(own["error_estimate"][row]), settings[row]
+        error = error if math.isfinite(error) and setting.scheme != _EXPLICIT else math.inf
+        used = isinstance(setting.harmonics, str)
+        harmonics = float(own["harmonics_used"][row]) if used else float(setting.harmonics or 0.0)
+        return -error, harmonics, -(setting.step or 0.0)
+
+    computed, worn, response = own["computed"] == 1.0, own["worn_volume"], own["response_amplitude"]
+    answer = [np.atleast_1d(own[f"exact_{name}"][0]) for name in ("worn_volume", "response_amplitude")]
+    reference, uncertainty = None, dict.fromkeys(QUANTITIES, 0.0)
+    if not all(np.isfinite(each).all() for each in answer):
+        reference = max(np.flatnonzero(computed).tolist(), key=rank, default=None)
+        if reference is None:
+            nothing = dict.fromkeys(QUANTITIES, np.full(len(settings), np.nan))
+            unknown = dict.fromkeys(QUANTITIES, math.inf)
+            return ComparedPoint(label, settings, own["run_time"], 0.0 * worn, nothing, None, unknown)
+        answer = [np.atleast_1d(each[reference]) for each in (worn, response)]
+        estimates = (own[name][reference] for name in ("error_estimate", "response_error"))
+        known = (float(np.nan_to_num(each, nan=math.inf)) for each in estimates)
+        uncertainty = dict(zip(QUANTITIES, known, strict=True))
+    volume = np.where(worn > NO_VOLUME, np.inf, np.nan)
+    if not answer[0][0] <= NO_VOLUME:
+        volume = np.abs(worn - answer[0]) / answer[0]
+    away = np.linalg.norm(response - answer[1], axis=-1) / (float(np.linalg.norm(answer[1])) or np.nan)
+    compared = computed & (np.arange(len(settings)) != reference)
+    errors = {name: np.where(compared, each, np.nan) for name, each in zip(QUANTITIES, (volume, away), strict=True)}
+    worn = np.where(computed, worn, np.nan)
+    return ComparedPoint(label, settings, own["run_time"], worn, errors, reference, uncertainty)
+
+
+def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:
+    """All settings, each with the number of its first place among the values of `keys`, the last axis fastest.
+
+    A setting holds no value that it does not use: the file may have it at several places.
+    """
+
+    def read(key: str, value: object) -> float | str:
+        # numbers beside "auto" are texts in the file
+        text = str(value)
+        return text if key == "scheme" or text == _AUTO else float(text)
+
+    by_depth = result.study.get("slow_time", {}).get("largest_depth") is not None
+    solver, found = result.study.get("solver", {}), dict[Setting, int]()
+    axes = ([read(key, value) for value in result.dataset[key].values] for key in keys)
+    for place, given in enumerate(itertools.product(*axes)):
+        setting = Setting(**dict(zip(keys, given, strict=True)))  # type: ignore[arg-type]
+        if setting.scheme in _OWN_STEPS or (setting.scheme == _EXPLICIT and by_depth):
+            setting = setting._replace(step=None)
+        if result.cycles[-1] == 0.0:
+            # only unworn states: no scheme takes a step
+            setting = setting._replace(scheme=None, step=None)
+        automatic = [getattr(setting, key) or solver.get(key, _AUTO) for key in ("harmonics", "samples")]
+        if setting.scheme not in _OWN_STEPS and _AUTO not in automatic:
+            setting = setting._replace(rtol=None)
+        found.setdefault(setting, place)
+    return found
 
 
 def draw_precision(result: Result) -> Drawn:
     """One row a point, one column a quantity; nothing where no settings are compared."""
     points = compare_settings(result)
-    shown = _choose(points)
-    if points and not shown:
+    clear = [point for point in points if any(point.is_clear(name).any() for name in QUANTITIES)]
+    if points and not clear:
         return "No error is clearly larger than the uncertainty of the reference: give finer values of a key."
-    if not shown:
+    if not clear:
         return None
+    # those that wear most
+    order = np.argsort([-float(np.nanmax(point.worn, initial=0.0)) for point in clear], kind="stable")
+    shown = [clear[number] for number in sorted(order[:_MOST_POINTS].tolist())]
     quantities = [name for name in QUANTITIES if any(point.is_clear(name).any() for point in shown)]
     figure, panels = new_panels(len(shown), len(quantities), 0.3 + 2.4 * len(shown))
-    marks = _Marks(points[0].settings, [key for key in KEYS if key in result.varying])
+    settings = points[0].settings
+    styles = {scheme: line_style(n) for n, scheme in enumerate(dict.fromkeys(each.scheme for each in settings))}
+    lines = {scheme: {key: look[key] for key in ("color", "linestyle")} for scheme, look in styles.items()}
+    # the first other key that varies has the shapes
+    key = next(
+        (key for key in ("harmonics", "rtol", "samples", "tolerance", "step") if key in result.varying), "scheme"
+    )
+    values = sorted({getattr(each, key) for each in settings if key != "scheme"} - {None}, key=_number)
+    shapes = dict(zip(values, itertools.cycle(_SHAPES), strict=False))
+    markers = [shapes.get(getattr(each, key), "h") for each in settings]
     for row, point in zip(panels, shown, strict=True):
         for panel, quantity in zip(row, quantities, strict=True):
-            _draw_panel(panel, point, quantity, marks)
+            _draw_panel(panel, point, quantity, lines, markers)
             panel.set_ylabel(f"error of {QUANTITIES[quantity]}")
         # one title a row: it goes on above the panels to its right
         row[0].set_title(point.label, loc="left")
     for panel in panels[-1]:
         panel.set_xlabel("CPU time of one point (s)")
-    add_legend(figure, marks.legend())
-    failed = sum(int((~point.computed).sum()) for point in points)
-    return figure, as_sentences(
-        "Each mark is one setting; a line joins those of a scheme than which no quicker one is as exact; rings: of all",
-        "Open marks, in the grey: errors below"
-        f" {RESOLVED:.0f} times the uncertainty of the reference, which tell no setting from another",
-        *_tell_references(shown),
-        f"Left out: {count(failed, 'result')} not computed to the end" if failed else "",
-        f"{count(len(points) - len(shown), 'other point')} not drawn" if len(points) > len(shown) else "",
-    )
-
-
-def _choose(points: Sequence[ComparedPoint]) -> list[ComparedPoint]:
-    """Of the points at which an error is clear those that wear most."""
-    clear = [point for point in points if any(point.is_clear(name).any() for name in QUANTITIES)]
-    worn = [float(np.nanmax(np.where(point.computed, point.worn, 0.0))) for point in clear]
-    chosen = sorted(np.argsort(np.negative(worn), kind="stable")[:_MOST_POINTS].tolist())
-    return [clear[number] for number in chosen]
-
-
-def _tell_references(points: Sequence[ComparedPoint]) -> list[str]:
-    """What the errors at each point are measured against, and how well this is known."""
-    told = []
-    for point in points:
+    meaning: list[tuple[str, dict[str, Any]]] = [(scheme or "all", look) for scheme, look in lines.items()]
+    for value, shape in shapes.items():
+        meaning.append((Setting(**{key: value}).describe(), {"marker": shape, "color": "0.3", **_NO_LINE}))
+    meaning.append(("cheapest for its error", _RING))
+    add_legend(figure, [Line2D([], [], label=label, **look) for label, look in meaning])
+    references = []
+    for point in shown:
         said = "errors are those against the exact answer"
         if point.reference is not None:
             each = (f"{show_percent(point.uncertainty[name])} ({words})" for name, words in QUANTITIES.items())
-            finest = point.settings[point.reference].describe()
+            finest = settings[point.reference].describe()
             said = f"errors are those against the finest setting ({finest}), known to {' and '.join(each)}"
-        told.append(f"{point.label or 'Reference'}: {said}")
-    return told
+        references.append(f"{point.label or 'Reference'}: {said}")
+    left = len(points) - len(shown)
+    return figure, as_sentences(*references), f"{count(left, 'other point')} not drawn" if left else ""
 
 
-class _Marks:
-    """Colour and dashes of each scheme; the shape of markers by the first other key, their size by the step."""
-
-    def __init__(self, settings: Sequence[Setting], keys: Sequence[str]) -> None:
-        schemes = dict.fromkeys(setting.scheme for setting in settings)
-        styles = {scheme: line_style(number) for number, scheme in enumerate(schemes)}
-        self.lines = {name: {key: style[key] for key in ("color", "linestyle")} for name, style in styles.items()}
-        ranked = [key for key in ("harmonics", "rtol", "samples", "tolerance", "step") if key in keys]
-        self.key = ranked[0] if ranked else "scheme"
-        values = {getattr(setting, self.key) for setting in settings if ranked} - {None}
-        self.values: list[Any] = sorted(values, key=lambda value: math.inf if isinstance(value, str) else value)
-        steps = sorted({setting.step for setting in settings if setting.step is not None})
-        self.steps = steps if len(steps) > 1 and self.key != "step" else []
-
-    def marker(self, setting: Setting) -> dict[str, Any]:
-        """Shape and size; small steps have small ones."""
-        value, size = getattr(setting, self.key), _SIZE
-        if self.steps and setting.step is not None:
-            size = 3.0 + 5.0 * self.steps.index(setting.step) / (len(self.steps) - 1)
-        shape = _SHAPES[self.values.index(value) % len(_SHAPES)] if value in self.values else "h"
-        return {"marker": shape, "markersize": size, "linestyle": "none"}
-
-    def legend(self) -> list[Line2D]:
-        """What the marks mean."""
-        found = [(scheme or "all", {"linewidth": 2.0, **style}) for scheme, style in self.lines.items()]
-        for value in self.values:
-            setting = Setting(**{self.key: value})
-            found.append((f"{self.key} {setting.words(self.key)}", {"color": "0.3", **self.marker(setting)}))
-        for step in self.steps[:1] + self.steps[-1:]:
-            setting = Setting(step=step)
-            found.append((f"step {setting.words('step')}", {"color": "0.3", **self.marker(setting), "marker": "o"}))
-        found.append(("cheapest for its error", {**_RING, "markersize": 10}))
-        return [Line2D([], [], label=label, **style) for label, style in found]
+def _number(value: float | str) -> float:
+    return math.inf if isinstance(value, str) else value
 
 
-def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, marks: _Marks) -> None:
-    errors, time, clear = point.errors[quantity], point.values["run_time"], point.is_clear(quantity)
+def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, lines: Mapping[Any, Any], markers: list[str]) -> None:
+    """lines: look of each scheme. markers: of each setting."""
+    errors, time, clear = point.errors[quantity], point.time, point.is_clear(quantity)
     if not clear.any():
         panel.text(0.5, 0.5, "the same for all settings", ha="center", va="center", transform=panel.transAxes)
         panel.set(xticks=[], yticks=[])
         return
     least = RESOLVED * point.uncertainty[quantity]
-    bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > 1e-12) & np.isfinite(errors)])
+    bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > _ROUND_OFF) & np.isfinite(errors)])
     drawn, known = np.maximum(errors, bottom), np.isfinite(errors)
-    for scheme, style in marks.lines.items():
+    for scheme, look in lines.items():
         rows = point.front(quantity, scheme)
-        panel.plot(time[rows], drawn[rows], linewidth=2.0, zorder=3, **style)
+        panel.plot(time[rows], drawn[rows], linewidth=2.0, zorder=3, **look)
     for row in np.flatnonzero(known):
         setting = point.settings[row]
-        colour = marks.lines[setting.scheme]["color"]
-        style = {"markerfacecolor": colour if clear[row] else "white", "markeredgecolor": colour}
-        label = setting.describe()
-        panel.plot(time[row], drawn[row], alpha=0.85, zorder=4, label=label, **style, **marks.marker(setting))
+        colour = lines[setting.scheme]["color"]
+        look = {"markerfacecolor": colour if clear[row] else "white", "markeredgecolor": colour, "zorder": 4}
+        panel.plot(time[row], drawn[row], marker=markers[row], label=setting.describe(), **_NO_LINE, **look)
     rows = point.front(quantity)
-    panel.plot(time[rows], drawn[rows], markersize=11, zorder=5, **_RING)
+    panel.plot(time[rows], drawn[rows], zorder=5, **_RING)
     set_log(panel.xaxis, float(time[known].min()), float(time[known].max()))
     set_log(panel.yaxis, bottom, float(errors[known].max()), percent=True)
     if 0.8 * bottom < least < math.inf:

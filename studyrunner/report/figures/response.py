@@ -8,22 +8,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
-from studyrunner.report.panels import (
-    COLOURS,
-    FloatArray,
-    add_legend,
-    add_line,
-    line_style,
-    mark_failed,
-    new_panel,
-    new_panels,
-    set_from_zero,
-    set_log,
-)
+from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.selection import Course, choose, find_course, labelled
 from studyrunner.result.units import Scale, scale_for
-from studyrunner.result.view import NO_VOLUME, Result, as_sentences
+from studyrunner.result.view import NO_VOLUME, Result
 
 _MOST_LINES, _MOST_RESPONSES, _MOST_FOLDS, _MOST_MODES = 3, 3, 12, 6
 _OF_WEAR = ("wear_coefficient", "step", "scheme")
@@ -46,28 +36,24 @@ def draw_responses(result: Result) -> Drawn:
     if again is not None:
         again = again.sel(response=list(result.responses))
     n_panels = min(len(result.responses), _MOST_RESPONSES)
-    figure, panels = new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
-    unit, told = str(result.dataset["response_amplitude"].attrs.get("units", "m")), ("", "")
+    figure, panels = plot.new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
+    unit = str(result.dataset["response_amplitude"].attrs.get("units", "m"))
     sizes = [each["response_amplitude"].isel(cycle=0).values for each in (result.dataset, again) if each is not None]
-    scale, peaks = scale_for(unit, *sizes), []
-    for number, panel in enumerate(panels[:, 0]):
-        if course is not None:
-            new, told = _draw_new(result, panel, course, scale, number)
-            peaks += new if number == 0 else []
-        if again is not None:
-            worn = _draw_again(panel, again, scale, number)
-            peaks += worn if number == 0 else []
-        set_from_zero(panel, panel.dataLim.ymax)
+    scale, peaks, left_out = scale_for(unit, *sizes), list[str](), ("", "")
+    for number, panel in reversed(list(enumerate(panels[:, 0]))):
+        new, left_out = _draw_new(result, panel, course, scale, number) if course else ([], left_out)
+        peaks = new + (_draw_again(panel, again, scale, number) if again is not None else [])
+        plot.set_from_zero(panel)
         panel.set_ylabel(scale.label(f"amplitude of {result.responses[number]}"))
     panels[-1, 0].set_xlabel("excitation frequency (Hz)")
-    add_legend(figure)
-    return figure, as_sentences(
+    return (
+        figure,
         f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(filter(None, peaks))}",
         f"One joint, {again.attrs['title']}: its response curve at that wear, without further wear" if again else "",
         f"{again.attrs['how']}" if again else "",
         f"Without the curve of the worn joint: {result.no_worn_response}" if result.no_worn_response else "",
         "More responses are in the file" if len(result.responses) > n_panels else "",
-        *told,
+        *left_out,
     )
 
 
@@ -91,13 +77,20 @@ def _draw_new(
             at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
         # the second colour is that of the worn joint
         panel.plot(at, values, **course.line_style(place + (place > 0)), label=text)
-        peaks.append(_tell_peak(scale, line, course.values, text))
+        peaks.append(_show_peak(scale, line, course.values, text))
     if result.has("exact_response_amplitude"):
         exact = course.read(result, "exact_response_amplitude", result.shown_point())[:, 0, number]
         if np.isfinite(exact).any():
             panel.plot(course.values, scale(exact), color="0.5", linewidth=5, alpha=0.45, zorder=1, label="exact")
-    _mark_folds(result, panel)
-    return peaks, (mark_failed(panel, course.values, np.isnan(lines)), choice.sentence)
+    if result.has("fold_frequency"):
+        fold = result.read("fold_frequency")
+        sweeps = fold["sweep"].values.tolist() if "sweep" in fold.dims else []
+        for style, sweep in zip(("--", ":", "--"), sweeps, strict=False):
+            values = fold.sel(sweep=sweep).values
+            label = f"fold, sweep {sweep}: jump to another branch"
+            for frequency in np.unique(values[np.isfinite(values)])[:_MOST_FOLDS]:
+                panel.axvline(frequency, color="0.4", linewidth=0.9, linestyle=style, label=label)
+    return peaks, (plot.mark_failed(panel, course.values, np.isnan(lines)), choice.sentence)
 
 
 def _draw_again(panel: Axes, again: xr.Dataset, scale: Scale, number: int) -> list[str]:
@@ -106,31 +99,18 @@ def _draw_again(panel: Axes, again: xr.Dataset, scale: Scale, number: int) -> li
     for cycle in range(again.sizes["cycle"]):
         is_new = again.sizes["cycle"] > 1 and cycle == 0
         values = again["response_amplitude"].isel(cycle=cycle, response=number).values
-        label, look = ("new joint", line_style(0)) if is_new else (str(again.attrs["title"]), _WORN)
+        label, look = ("new joint", plot.line_style(0)) if is_new else (str(again.attrs["title"]), _WORN)
         error = again["response_error"].isel(cycle=cycle).values * values
-        add_line(panel, frequency, scale(values), scale(error), label=label, **look)
-        peaks.append(_tell_peak(scale, values, frequency, label))
+        plot.add_line(panel, frequency, scale(values), scale(error), label=label, **look)
+        peaks.append(_show_peak(scale, values, frequency, label))
     return peaks
 
 
-def _tell_peak(scale: Scale, values: FloatArray, frequency: FloatArray, text: str) -> str:
+def _show_peak(scale: Scale, values: FloatArray, frequency: FloatArray, text: str) -> str:
     if np.isnan(values).all():
         return ""
     top = int(np.nanargmax(values))
     return labelled(f"{scale.show(float(values[top]))} at {frequency[top]:.6g} Hz", text)
-
-
-def _mark_folds(result: Result, panel: Axes) -> None:
-    """A line at each fold at which a sweep has left its branch."""
-    if not result.has("fold_frequency"):
-        return
-    fold = result.read("fold_frequency")
-    sweeps = result.dataset["sweep"].values.astype(str) if "sweep" in fold.dims else [""]
-    for number, sweep in enumerate(sweeps):
-        values = (fold.isel(sweep=number) if sweep else fold).values
-        label = f"fold, sweep {sweep}: jump to another branch"
-        for frequency in np.unique(values[np.isfinite(values)])[:_MOST_FOLDS]:
-            panel.axvline(frequency, color="0.4", linewidth=0.9, linestyle=("--", ":")[number % 2], label=label)
 
 
 def draw_after_wear(result: Result) -> Drawn:
@@ -141,50 +121,37 @@ def draw_after_wear(result: Result) -> Drawn:
         return None
     choice = choose(result, ["frequency"], _MOST_LINES)
     amplitudes = [course.read(result, "response_amplitude", point)[..., 0] for point in choice.points]
-    scale, (figure, panel) = scale_for("m", *amplitudes), new_panel(3.4)
+    scale, (figure, panel) = scale_for("m", *amplitudes), plot.new_panel(3.4)
     first = "new joint" if result.cycles[0] == 0.0 else f"each after its own {result.cycle_label(0)}"
+    panel.plot(course.values, scale(amplitudes[0][:, 0]), color="0.5", linewidth=1.0, label=first)
     for number, (amplitude, label) in enumerate(zip(amplitudes, choice.labels, strict=True)):
         text = ", ".join(filter(None, (label, f"each after its own {result.cycle_label(-1)}")))
-        if number == 0:
-            panel.plot(course.values, scale(amplitude[:, 0]), color="0.5", linewidth=1.0, label=first)
         look = course.line_style(number) | {"linestyle": "none"}
         panel.plot(course.values, scale(amplitude[:, -1]), **look, label=text)
-    set_from_zero(panel, panel.dataLim.ymax)
+    plot.set_from_zero(panel)
     panel.set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
     course.set_axis(panel)
-    add_legend(figure)
-    return figure, as_sentences(
-        "Each mark is another joint, which wore at its own frequency: the marks are no response curve",
-        "That they are low where the new joint resonates does not mean that wear protects",
-        "The response curves of one new and one worn joint are above",
-        choice.sentence,
-    )
+    return figure, choice.sentence
 
 
 def draw_mode(result: Result, name: str) -> Drawn:
     """Natural frequency or damping ratio of modes over the amplitude with error bars, a line for each wear state."""
-    course, unit = find_course(result, "modal_amplitude"), " Hz" if name == "natural_frequency" else ""
+    course = find_course(result, "modal_amplitude")
     if course is None:
         return "The study has one amplitude: give several under [axes] modal_amplitude."
     choice = choose(result, ["modal_amplitude"], _MOST_MODES, first=("cycle", "mode", "sweep"))
-    figure, panel = new_panel(3.6)
+    figure, panel = plot.new_panel(3.6)
     values = np.array([course.read(result, name, point) for point in choice.points])
     for number, (point, label) in enumerate(choice):
         error = course.read(result, f"{name}_error", point) if result.has(f"{name}_error") else None
         if np.isfinite(values[number]).any():
-            add_line(panel, course.values, values[number], error, **course.line_style(number), label=label or "mode")
-    panel.set_xlabel(course.label)
-    panel.set_ylabel(name.replace("_", " ") + (" (Hz)" if unit else ""))
-    set_log(panel.xaxis, float(course.values[0]), float(course.values[-1]))
+            plot.add_line(
+                panel, course.values, values[number], error, **course.line_style(number), label=label or "mode"
+            )
+    panel.set(xlabel=course.label, ylabel="natural frequency (Hz)" if name == "natural_frequency" else "damping ratio")
+    plot.set_log(panel.xaxis, float(course.values[0]), float(course.values[-1]))
     low, high = float(np.nanmin(values, initial=np.inf)), float(np.nanmax(values, initial=-np.inf))
     # negative damping, e.g. of the air, has no logarithm
     if name == "damping_ratio" and 0.0 < low <= high:
-        set_log(panel.yaxis, low, high, percent=True)
-    crosses = mark_failed(panel, course.values, np.isnan(values))
-    add_legend(figure)
-    return figure, as_sentences(
-        f"From {low:.6g}{unit} to {high:.6g}{unit}" if low <= high else "No point has a state",
-        "Bars: estimated errors; none where they are smaller than the markers" if result.has(f"{name}_error") else "",
-        crosses,
-        choice.sentence,
-    )
+        plot.set_log(panel.yaxis, low, high, percent=True)
+    return figure, plot.mark_failed(panel, course.values, np.isnan(values)), choice.sentence

@@ -2,105 +2,100 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
+from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
-from studyrunner.report.panels import (
-    FloatArray,
-    add_colour_bar,
-    add_legend,
-    add_line,
-    add_map,
-    line_style,
-    mark_failed,
-    new_panel,
-    new_panels,
-    set_from_zero,
-)
+from studyrunner.report.panels import FloatArray
 from studyrunner.report.selection import Choice, Course, cell_edges, choose, find_course, labelled, slow_time
 from studyrunner.result.certainty import show_error
-from studyrunner.result.units import Scale, scale_for, show_number
-from studyrunner.result.view import NO_VOLUME, Result, as_sentences
-from studyrunner.system.progress import count
+from studyrunner.result.units import Scale, scale_for
+from studyrunner.result.view import NO_VOLUME, Point, Result
 
 _MOST_LINES, _MOST_MAPS = 6, 4
-_CHARACTERS = 80  # of titles over panels side by side
 _LARGE: dict[str, Any] = {"linestyle": "none", "markersize": 9, "markerfacecolor": "none", "color": "black"}
-_BANDS = "Bands: estimated error"
 
 
 def draw_history(result: Result) -> Drawn:
     """Worn volume over cycles at the shown point, one line a scheme; a sentence where there is no history."""
-    shown, course = result.shown_point(), result.course_axis
-    largest = float(np.nanmax(result.read("worn_volume").values, initial=0.0))
     if len(result.cycles) == 1:
         return f"The file holds {result.cycle_label(0)} only: set [slow_time]."
-    if not result.has_history:
-        amount = scale_for("m3", largest).show(float(result.at("worn_volume", shown, -1)), 4)
-        said = f"The final state was found without slow time and has no history: {amount}{_tell_error(result, shown)}"
-        return f"{said} at {result.describe(shown)}."
+    largest = float(np.nanmax(result.read("worn_volume").values, initial=0.0))
     wears = largest > NO_VOLUME
-    scale, cycles = scale_for("m3", largest if wears else 0.0), scale_for(result.counted, result.cycles)
-    figure, panel = new_panel(3.4)
-    choice = choose(result, [course] if course else [], _MOST_LINES)
-    ends: list[str] = []
-    highest = latest = 0.0
+    free = [result.course_axis] if result.course_axis else []
+    scale, choice = scale_for("m3", largest if wears else 0.0), _choose_lines(result, *free)
+    (figure, panel), cycles = plot.new_panel(3.4), scale_for(result.counted, result.cycles)
+    highest, ends = _draw_over_cycles(result, panel, "worn_volume", choice, scale), []
     for number, (point, label) in enumerate(choice):
-        full = {**shown, **point}
-        worn, counts = result.at("worn_volume", full).values, result.counts(full)
-        style = line_style(number, 101) | {"label": label or "computed"}
-        if np.isnan(worn).all():
-            continue
-        if np.isinf(counts[-1]):
-            # it has no count: a level that histories come to
-            look = {"color": style["color"], "linestyle": "--", "label": f"{label}: final state".lstrip(": ")}
-            highest = max(highest, add_line(panel, cycles([0.0, result.cycles[-2]]), scale([worn[-1]] * 2), **look))
-        else:
-            error = result.at("worn_volume_error", full).values * worn if result.has("worn_volume_error") else None
-            wrong = None if error is None else scale(error)
-            highest = max(highest, add_line(panel, cycles(counts), scale(worn), wrong, band=True, **style))
-            latest = max(latest, float(counts[-1]))
+        worn = result.at("worn_volume", point).values
         if np.isfinite(worn[-1]):
-            ends.append(labelled(f"{scale.show(float(worn[-1]), 4)}{_tell_error(result, full)}", label))
-        _mark_events(result, panel, full, cycles, scale, style["color"])
-    panel.set_xlabel(slow_time(result, cycles))
+            ends.append(labelled(f"{scale.show(float(worn[-1]), 4)}{_show_error(result, point)}", label))
+        _mark_events(result, panel, point, cycles, scale, plot.line_style(number)["color"])
+    panel.set_xlim(0.0, panel.dataLim.xmax)
     panel.set_ylabel(scale.label("worn volume"))
-    panel.set_xlim(0.0, cycles(latest or result.cycles[-1]).item())
-    set_from_zero(panel, highest if wears else 0.0)
-    add_legend(figure)
+    plot.set_from_zero(panel, highest if wears else 0.0)
     when = "at the end" if result.has("cycle_count") else result.when(-1)
-    return figure, as_sentences(
+    return (
+        figure,
         f"Worn {when}: {', '.join(ends)}" if wears else "Nothing is worn at the counts kept",
-        _BANDS if result.has("worn_volume_error") and wears else "",
         choice.sentence,
     )
 
 
-def _mark_events(
-    result: Result, panel: Axes, point: Mapping[str, int], cycles: Scale, scale: Scale, colour: str
-) -> None:
+def draw_excitation(result: Result) -> Drawn:
+    """Frequency of an excitation that follows the resonance; nothing where the study gives the frequency."""
+    if not result.followed or len(result.cycles) == 1:
+        return None
+    choice, (figure, panel) = _choose_lines(result), plot.new_panel(3.4)
+    _draw_over_cycles(result, panel, "excitation_frequency", choice, Scale(1.0, "Hz"))
+    panel.set_ylabel("frequency (Hz)")
+    return figure, f"The excitation follows the {result.followed}", choice.sentence
+
+
+def _choose_lines(result: Result, *free: str) -> Choice:
+    """Combinations that have a line over slow time each, at the shown point along `free`."""
+    choice = choose(result, free, _MOST_LINES)
+    return replace(choice, points=tuple({**result.shown_point(), **point} for point in choice.points))
+
+
+def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: Choice, scale: Scale) -> float:
+    """A variable over slow time, a line a combination, with bands of its error; how high they reach."""
+    cycles, highest = scale_for(result.counted, result.cycles), 0.0
+    for number, (point, label) in enumerate(choice):
+        values, error = scale(result.at(name, point).values), None
+        if np.isnan(values).all():
+            continue
+        if result.has(f"{name}_error"):
+            wrong = result.at(f"{name}_error", point).values
+            error = wrong * values if result.dataset[f"{name}_error"].attrs.get("units") == "1" else scale(wrong)
+        look = plot.line_style(number, 101) | {"label": label or "computed"}
+        highest = max(highest, plot.add_line(panel, cycles(result.counts(point)), values, error, band=True, **look))
+    panel.set_xlabel(slow_time(result, cycles))
+    return highest
+
+
+def _mark_events(result: Result, panel: Axes, point: Point, cycles: Scale, scale: Scale, colour: str) -> None:
     """Where a branch was lost, where a history ended early, and the exact answer behind it."""
     worn, counts = result.at("worn_volume", point).values, result.counts(point)
     jump = float(result.at("jump_cycle", point).values) if result.has("jump_cycle") else np.nan
-    if np.isfinite(jump):
-        look: dict[str, Any] = {"color": colour, "markersize": 12, "label": "branch lost, jump"}
-        panel.plot(cycles(jump), scale(np.interp(jump, counts, worn)), "*", **look)
     reached = np.flatnonzero(np.isfinite(worn))
+    if np.isfinite(jump):
+        volume = scale(np.interp(jump, counts, worn))
+        panel.plot(cycles(jump), volume, "*", markersize=12, label="branch lost, jump", color=colour)
     if not result.computed[tuple(point[name] for name in result.axes)] and reached.size:
-        look = {"color": colour, "markersize": 9, "label": "ended early"}
-        panel.plot(cycles(float(counts[reached[-1]])), scale(worn[reached[-1]]), "X", **look)
+        last = reached[-1]
+        panel.plot(cycles(float(counts[last])), scale(worn[last]), "X", markersize=9, label="ended early", color=colour)
     if result.has("exact_worn_volume"):
         exact = result.at("exact_worn_volume", point).values
         panel.plot(cycles(counts), scale(exact), color="0.5", linewidth=4, alpha=0.4, zorder=1, label="exact")
 
 
-def _tell_error(result: Result, point: Mapping[str, int]) -> str:
+def _show_error(result: Result, point: Point) -> str:
     """The error of a final worn volume in words: " ± 3 %", with what is to be said where it is above rtol."""
     place = tuple(point[name] for name in result.axes)
     error = float(result.errors[place])
@@ -108,33 +103,6 @@ def _tell_error(result: Result, point: Mapping[str, int]) -> str:
         return ""
     remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
     return f" ± {show_error(result, place)}{remark}"
-
-
-def draw_excitation(result: Result) -> Drawn:
-    """Frequency of an excitation that follows the resonance; nothing where the study gives the frequency."""
-    if not result.followed or not result.has_history:
-        return None
-    name, shown, choice = "excitation_frequency", result.shown_point(), choose(result, [], _MOST_LINES)
-    cycles, (figure, panel) = scale_for("cycles", result.cycles), new_panel(3.4)
-    said = []
-    for number, (point, label) in enumerate(choice):
-        full = {**shown, **point}
-        counts, found = result.counts(full), result.at(name, full).values
-        known = np.flatnonzero(np.isfinite(found) & np.isfinite(counts))
-        if known.size:
-            error = result.at(f"{name}_error", full).values[known] if result.has(f"{name}_error") else None
-            style = line_style(number, found.size) | {"label": label or "computed"}
-            add_line(panel, cycles(counts[known]), found[known], error, band=True, **style)
-            ends = " to ".join(show_number(float(found[place])) for place in known[[0, -1]])
-            said.append(labelled(f"from {ends} Hz", label))
-    panel.set_xlabel(slow_time(result, cycles))
-    panel.set_ylabel("frequency (Hz)")
-    add_legend(figure)
-    return figure, as_sentences(
-        f"The excitation follows the {result.followed}: {', '.join(said)}",
-        _BANDS if result.has(f"{name}_error") else "",
-        choice.sentence,
-    )
 
 
 def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[Choice, list[FloatArray]]:
@@ -162,55 +130,38 @@ def draw_final(result: Result) -> Drawn:
     failed = np.array([np.isnan(course.read(result, "worn_volume", point)[:, 0]) for point in every])
     # of a point that ended early, what was worn by then
     reached = [np.where(np.isnan(field).all(axis=1), np.nan, np.nan_to_num(field).max(axis=1)) for field in fields]
-    largest = max(float(np.nanmax(each, initial=0.0)) for each in reached)
-    scale, (figure, panel) = scale_for("m3", largest), new_panel(3.4)
-    highest = scale(largest).item()
+    largest = [float(np.nanmax(each, initial=0.0)) for each in reached]
+    scale, (figure, panel) = scale_for("m3", largest), plot.new_panel(3.4)
+    top = highest = scale(max(largest)).item()
     for number, (point, field) in enumerate(zip(choice.points, fields, strict=True)):
         error = course.read(result, "error_estimate", point) if result.has("error_estimate") else np.zeros(len(field))
         style = course.line_style(number) | {"label": choice.labels[number] or "computed"}
-        at, wrong = scale(field[:, -1]), scale(error * field[:, -1])
-        highest = max(highest, min(add_line(panel, course.values, at, wrong, **style), 2.0 * scale(largest).item()))
-    marks = _mark_care(result, panel, course, choice, reached, scale)
-    set_from_zero(panel, highest)
-    crosses = mark_failed(panel, course.values, failed)
+        reach = plot.add_line(panel, course.values, scale(field[:, -1]), scale(error * field[:, -1]), **style)
+        highest = max(highest, min(reach, 2.0 * top))
+    _mark_care(result, panel, course, choice, scale(reached))
+    plot.set_from_zero(panel, highest)
+    crosses = plot.mark_failed(panel, course.values, failed)
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume {'at the end' if result.has('cycle_count') else result.when(-1)}"))
-    add_legend(figure)
-    number = int(np.argmax([np.nanmax(each, initial=-1.0) for each in reached]))
+    number = int(np.argmax(largest))
     at_largest = course.at(result, int(np.nanargmax(reached[number])))
-    return figure, as_sentences(
-        labelled(f"Largest: {scale.show(largest, 4)} at {at_largest}", choice.labels[number]),
-        "Each point is another joint, which wore at its own value of the horizontal axis",
-        "Bars: estimated error" if result.has("error_estimate") else "",
-        *marks,
+    return (
+        figure,
+        labelled(f"Largest: {scale.show(largest[number], 4)} at {at_largest}", choice.labels[number]),
         crosses,
         choice.sentence,
     )
 
 
-def _mark_care(
-    result: Result, panel: Axes, course: Course, choice: Choice, fields: list[FloatArray], scale: Scale
-) -> list[str]:
-    """Marks at points to be taken with care, and a sentence for each kind.
-
-    fields (n,) each: worn volumes at the last cycle count that each point has.
-    """
+def _mark_care(result: Result, panel: Axes, course: Course, choice: Choice, fields: FloatArray) -> None:
+    """Marks at points to be taken with care. fields (n_lines, n): their worn volumes, as shown."""
     sensitive, early = result.ended("sensitive"), result.held & ~result.computed
-    kinds = (
-        ("above rtol", "s", "Squares", result.above & ~sensitive, "whose worn volume is known less well than to rtol"),
-        ("sensitive", "D", "Diamonds", sensitive, "so sensitive that one number says little"),
-        ("ended early", "^", "Triangles", early, "that ended early, at what was worn by then"),
-    )
-    said = []
-    for label, marker, name, where, words in kinds:
-        marked = [course.along(result, where, point) for point in choice.points]
-        marked = [each & np.isfinite(field) for each, field in zip(marked, fields, strict=True)]
-        if number := sum(int(each.sum()) for each in marked):
-            x = np.concatenate([course.values[each] for each in marked])
-            y = np.concatenate([field[each] for field, each in zip(fields, marked, strict=True)])
-            panel.plot(x, scale(y), marker=marker, label=label, **_LARGE)
-            said.append(f"{name}: {count(number, 'point')} {words}")
-    return said
+    kinds = {"above rtol": ("s", result.above & ~sensitive), "sensitive": ("D", sensitive), "ended early": ("^", early)}
+    for label, (marker, where) in kinds.items():
+        marked = np.array([course.along(result, where, point) for point in choice.points]) & np.isfinite(fields)
+        if marked.any():
+            x = np.broadcast_to(course.values, marked.shape)[marked]
+            panel.plot(x, fields[marked], marker=marker, label=label, **_LARGE)
 
 
 def draw_map(result: Result, name: str) -> Drawn:
@@ -223,28 +174,24 @@ def draw_map(result: Result, name: str) -> Drawn:
         return None
     cycles = scale_for(result.counted, result.cycles)
     choice, fields = _read_known(result, course, name, _MOST_MAPS)
-    largest = max(float(np.nanmax(field, initial=0.0)) for field in fields)
+    largest = [float(np.nanmax(field, initial=0.0)) for field in fields]
     scale = scale_for("m3" if name == "worn_volume" else f"m3 per {result.counted[:-1]}", largest)
-    n_columns = 2 if len(fields) == _MOST_MAPS else len(fields)
-    n_rows = len(fields) // n_columns
-    figure, panels = new_panels(n_rows, n_columns, 0.6 + 2.7 * n_rows, sharex=True, sharey=True)
-    norm = Normalize(0.0, scale(largest).item() or 1.0)
+    figure, panels = plot.panel_grid(choice.labels, 2.7, sharex=True)
+    norm = Normalize(0.0, scale(max(largest)).item() or 1.0)
     # half a cell at both ends: nothing is known beyond
     rows = np.clip(cell_edges(cycles(result.cycles)), cycles(result.cycles[0]), cycles(result.cycles[-1]))
-    for panel, field, label in zip(panels.flat, fields, choice.labels, strict=True):
-        add_map(panel, course.edges, rows, scale(field.T), norm)
-        panel.set_title(textwrap.fill(label, _CHARACTERS // n_columns))
+    for panel, field in zip(panels.flat, fields, strict=True):
+        plot.add_map(panel, course.edges, rows, scale(field.T), norm)
     for panel in panels[:, 0]:
         panel.set_ylabel(slow_time(result, cycles))
     for panel in panels[-1]:
         course.set_axis(panel)
-    add_colour_bar(figure, panels, norm, scale.label(name.replace("_", " ")))
-    number = int(np.argmax([np.nanmax(field, initial=-1.0) for field in fields]))
+    plot.add_colour_bar(figure, panels, norm, scale.label(name.replace("_", " ")))
+    number = int(np.argmax(largest))
     place, cycle = map(int, np.unravel_index(int(np.nanargmax(fields[number])), fields[number].shape))
     at = f"{course.at(result, place)}, {result.cycle_label(cycle)}"
-    return figure, as_sentences(
-        labelled(f"Largest: {scale.show(largest, 4)} at {at}", choice.labels[number]),
-        "Each point is worn at its own value of the horizontal axis only",
-        "Hatched: points without a result" if any(np.isnan(field).any() for field in fields) else "",
+    return (
+        figure,
+        labelled(f"Largest: {scale.show(largest[number], 4)} at {at}", choice.labels[number]),
         choice.sentence,
     )

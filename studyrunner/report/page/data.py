@@ -12,6 +12,9 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.report.figures.loops import find_loops
+from studyrunner.report.root.surface import read_root
+from studyrunner.report.root.views import body_colours, find_views
+from studyrunner.result.scene_pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
 from studyrunner.result.units import Scale, scale_for, units_of
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import DRAWN
@@ -21,6 +24,9 @@ _CHARACTERS_A_FLOAT = 16.0 / 3.0
 _MOST_POINTS = 20_000
 """Points of a study with an interactive part: each takes time to draw."""
 
+_MOST_FACES, _MOST_PAIRS = 15_000, 10_000
+"""Faces, and contact pairs, that the page draws in three dimensions."""
+
 _MOST_MESSAGES, _MOST_PHASES = 500, 64
 _LOOPS = "pair_of_loop"
 """Dimension of those pairs that have loops."""
@@ -28,6 +34,7 @@ _LOOPS = "pair_of_loop"
 _ERRORS = dict.fromkeys(("response_amplitude", "response_amplitude_begin", "response_peak"), "response_error")
 """Variables whose error has another name than `<name>_error`."""
 
+_PERCENT = ("worn_volume_error", "error_estimate", "block_worn_volume_error", *CERTIFICATE)
 _FIRST = ("worn_volume", "natural_frequency", "response_amplitude")
 _COLOURED = ("worn_cycle", "scheme", "sweep", "cycle", "mode")
 _LINES = 10
@@ -53,20 +60,20 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
         return None
     if result.has("cycle_count"):
         notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
-    arrays = _fit(dict(_arrays(result)), limit / _CHARACTERS_A_FLOAT, notes)
-    variables = [_encode(array, kept, arrays) for array, kept in arrays.values()]
-    used = [*result.axes, *(str(dim) for array, _ in arrays.values() for dim in array.dims)]
-    shown: dict[str, int] = {**result.shown_point(), **({} if result.has_modes else {"cycle": -1})}
-    if "cycle" in shown:
-        shown["cycle"] = result.last_kept(result.shown_point())
-    dims = [_dimension(result, name, arrays) for name in dict.fromkeys(used)]
+    shown = result.shown_point()
+    last = 0 if result.has_modes else result.last_kept(shown)
+    floats = math.inf if result.has_modes else limit / _CHARACTERS_A_FLOAT
+    arrays, kept = _fit(dict(_arrays(result)), floats, notes)
+    used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])
+    if not result.has_modes:
+        shown["cycle"] = int(np.abs(kept - last).argmin())
     messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
     return {
-        "dims": dims,
+        "dims": [_dimension(result, name, arrays) for name in used],
         "axes": list(result.axes),
         "coords": list(_coordinates(result, set(used))),
-        "variables": variables,
-        "at": {str(entry["name"]): shown.get(str(entry["name"]), 0) for entry in dims},
+        "variables": [_encode(array, arrays) for array in arrays.values()],
+        "at": {name: shown.get(name, 0) for name in used},
         "start": _start(result, arrays),
         "sentences": {str(number): ending.sentence for number, ending in result.endings.items()},
         "messages": {str(place): text for place, text in enumerate(messages) if text and place < _MOST_MESSAGES},
@@ -88,71 +95,63 @@ def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
 
 
 def _fit(
-    arrays: Mapping[str, xr.DataArray], floats: float, notes: list[str]
-) -> dict[str, tuple[xr.DataArray, NDArray[np.intp] | None]]:
-    """Variables that fit, in the order of the file, and which cycles of each are held; None for all.
-
-    Small ones come first. Of what does not fit, cycles are thinned out evenly, down to the first and the last.
-    """
-    found: dict[str, NDArray[np.intp] | None] = {}
-    for n_before, name in enumerate(sorted(arrays, key=lambda name: arrays[name].size)):
-        array, share = arrays[name], floats / (len(arrays) - n_before)
-        n_cycles = array.sizes.get("cycle", 1)
-        keep = min(n_cycles, int(share * n_cycles // array.size))
-        if keep < min(2, n_cycles):
+    arrays: dict[str, xr.DataArray], floats: float, notes: list[str]
+) -> tuple[dict[str, xr.DataArray], NDArray[np.intp]]:
+    """Variables that fit, at the counts that are kept, and places of these: the first, the last, and some between."""
+    cycles = {name: array.sizes.get("cycle", 1) for name, array in arrays.items()}
+    small = {name: array.size // cycles[name] * min(2, cycles[name]) for name, array in arrays.items()}
+    n_cycles = max(cycles.values(), default=1)
+    for name in sorted(arrays, key=lambda name: -small[name]):
+        if sum(small[each] for each in arrays) > floats:
+            del arrays[name]
             notes.append(f"{name} does not fit into this page.")
-            continue
-        found[name] = None
-        if keep < n_cycles:
-            found[name] = np.unique(np.linspace(0, n_cycles - 1, keep).round().astype(np.intp))
-            notes.append(f"{name} is on this page at {keep} of {n_cycles} counts; the nearest one is shown.")
-        floats -= array.size * keep / n_cycles
-    return {name: (array, found[name]) for name, array in arrays.items() if name in found}
+    # a variable along the cycles takes as much at each of them
+    each = sum(array.size / n_cycles for array in arrays.values() if "cycle" in array.dims)
+    others = sum(array.size for array in arrays.values() if "cycle" not in array.dims)
+    keep = n_cycles if each * n_cycles + others <= floats else max(min(2, n_cycles), int((floats - others) / each))
+    kept = np.unique(np.linspace(0, n_cycles - 1, keep).round().astype(np.intp))
+    if keep < n_cycles:
+        notes.append(f"On this page are {len(kept)} of {n_cycles} counts.")
+        arrays = {name: array.isel(cycle=kept, missing_dims="ignore") for name, array in arrays.items()}
+    return arrays, kept
 
 
-def _encode(array: xr.DataArray, kept: NDArray[np.intp] | None, arrays: Mapping[str, Any]) -> dict[str, Any]:
-    """A variable: `dims`, `data` in SI, times `factor` in `unit`; `kept`, the places along dimensions held in part.
+def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
+    """A variable: `dims`, `data` in SI, times `factor` in `unit`.
 
     `error`: the variable that holds its error, `relative` or in the same unit. `words`: what its values mean.
     """
-    name = str(array.name)
-    values = (array if kept is None else array.isel(cycle=kept)).values.astype(float)
-    scale = scale_for(str(array.attrs.get("units", "")), values)
-    if name in ("worn_volume_error", "error_estimate", "block_worn_volume_error") or (
-        name in CERTIFICATE and name.endswith("_error")
-    ):
+    name, attributes = str(array.name), array.attrs
+    values = array.values.astype(float)
+    scale = scale_for(str(attributes.get("units", "")), values)
+    if name in _PERCENT and name.endswith(("_error", "_estimate")):
         scale = Scale(100.0, "%")
     error = _ERRORS.get(name, f"{name}_error")
-    words = dict(
-        zip(array.attrs.get("flag_values", ()), str(array.attrs.get("flag_meanings", "")).split(), strict=False)
-    )
+    flags = attributes.get("flag_values", ()), str(attributes.get("flag_meanings", "")).split()
     return {
         "name": name,
-        "label": str(array.attrs.get("long_name", name)),
+        "label": str(attributes.get("long_name", name)),
         "unit": scale.unit,
         "factor": scale.factor,
         "dims": [str(dim) for dim in array.dims],
-        "kept": {} if kept is None else {"cycle": kept.tolist()},
         "data": encode_floats(values),
         "error": error if error in arrays else None,
-        "relative": error in arrays and str(arrays[error][0].attrs.get("units")) != str(array.attrs.get("units")),
-        "words": {str(int(value)): word.replace("_", " ") for value, word in words.items()},
+        "relative": error in arrays and str(arrays[error].attrs.get("units")) != str(attributes.get("units")),
+        "words": {str(int(value)): word.replace("_", " ") for value, word in zip(*flags, strict=False)},
     }
 
 
-def _dimension(result: Result, name: str, arrays: Mapping[str, tuple[xr.DataArray, Any]]) -> dict[str, Any]:
+def _dimension(result: Result, name: str, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
     """A dimension with its values: numbers, or words."""
-    axis = next(array for array, _ in arrays.values() if name in array.dims)[name]
+    axis = next(array for array in arrays.values() if name in array.dims)[name]
     label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
-    words = axis.dtype.kind not in "fiu"
-    values = axis.values.tolist()
+    words, values = axis.dtype.kind not in "fiu", axis.values.tolist()
+    numbers = [str(each) if words else each if math.isfinite(each) else None for each in values]
     return {
         "name": name,
         "label": label,
         "unit": "" if name == "cycle" else units_of(axis),
-        "values": [str(each) for each in values]
-        if words
-        else [each if math.isfinite(each) else None for each in values],
+        "values": numbers,
         "words": words,
     }
 
@@ -168,14 +167,54 @@ def _coordinates(result: Result, dims: set[str]) -> Iterator[dict[str, Any]]:
             yield {"name": str(name), "dim": along[0], "label": label, "unit": scale.unit, "data": data}
 
 
-def _start(result: Result, arrays: Mapping[str, tuple[xr.DataArray, Any]]) -> dict[str, str]:
+def _start(result: Result, arrays: Mapping[str, xr.DataArray]) -> dict[str, str]:
     """What is shown first: a variable over the axis that figures are drawn over, or over slow time."""
     wears = result.has("worn_volume") and bool(np.nanmax(result.worn) > NO_VOLUME)
     usual = [name for name in _FIRST if name in arrays and (wears or name != "worn_volume")]
     name = next(iter((*usual, *arrays)))
-    sizes = arrays[name][0].sizes
+    sizes = arrays[name].sizes
     several = [str(dim) for dim in sizes if sizes[dim] > 1]
-    across = result.course_axis if result.course_axis in several else ("cycle" if "cycle" in several else "")
-    across = across or (several[0] if several else str(arrays[name][0].dims[0]))
+    over = [dim for dim in (result.course_axis, "cycle") if dim in several]
+    across = str(next(iter((*over, *several, *sizes))))
     colours = [dim for dim in _COLOURED if dim in several and dim != across and sizes[dim] <= _LINES]
     return {"variable": name, "x": across, "colour": colours[0] if colours else ""}
+
+
+def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | None:
+    """Faces and views as the script on the page reads them; None where there are none to draw, or too many.
+
+    `nodes`, m, three numbers each; `faces`, four nodes each; `body` and `flank` of each face; `seen`: bits of the views
+    that show a face; of `contact`: `nodes`, `pairs`, one at each node, and `normals`; all of these as `encode_floats`
+    has them. `well_seen`: m, the depth that is well seen. `scene`: index along the axes
+    along which scenes differ, of the one that is drawn.
+    """
+    n_pairs = result.dataset.sizes["contact"]
+    if n_pairs > _MOST_PAIRS:
+        notes.append(f"The contact is not on this page in three dimensions: it has {n_pairs} pairs.")
+        return None
+    whole = read_root(of_shown_scene(result))
+    if whole is None:
+        return None
+    surface = whole.near_contact(_MOST_FACES)
+    if len(surface.faces) < len(whole.faces):
+        notes.append(
+            f"In three dimensions are {len(surface.faces)} of {len(whole.faces)} faces, those near the contact."
+        )
+    views, contact, shown = find_views(surface), surface.contact, result.shown_point()
+    seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
+    of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": contact.flank}
+    pairs = pairs_of_scene(result, shown)[contact.pairs]
+    of_contact = {"nodes": contact.nodes, "pairs": pairs, "normals": contact.normals}
+    directions = [{"eye": view.to_eye, "up": view.up} for view in views]
+    return {
+        **{name: encode_floats(values) for name, values in (of_faces | {"seen": np.asarray(seen)}).items()},
+        "bodies": list(surface.bodies),
+        "colours": list(body_colours(surface.bodies)),
+        "contact": {name: encode_floats(values) for name, values in of_contact.items()},
+        "well_seen": surface.well_seen,
+        "scene": {name: shown[name] for name in axes_of_scenes(result)},
+        "views": [
+            {"title": view.title, "body": view.body, **{name: np.round(each, 6).tolist() for name, each in way.items()}}
+            for view, way in zip(views, directions, strict=True)
+        ],
+    }

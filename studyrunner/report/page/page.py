@@ -19,23 +19,27 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from studyrunner.report.drawing import Drawing, Missing, Table
-from studyrunner.report.page.data import build_page_data
-from studyrunner.report.page.root import build_root_numbers
-from studyrunner.report.page.study import describe_study
+from studyrunner.coordinates import COORDINATES
+from studyrunner.report.drawing import Drawing, Item, Missing, Table
+from studyrunner.report.page.data import build_page_data, build_root_numbers
+from studyrunner.result.certainty import advise_ended, describe_ended, tell_ends
+from studyrunner.result.points import CONVERGED
+from studyrunner.result.units import show_number, units_of
 from studyrunner.result.view import Result
+from studyrunner.summary.answer import summarise
+from studyrunner.summary.lines import summary_rows
+from studyrunner.system.progress import count
 from studyrunner.user_error import show_text
 
 DATA_LIMIT = 5e6
 """Most characters of numbers of the interactive part, those of the root in three dimensions aside."""
 
 _SCRIPTS = ("panel.js", "root.js", "page.js")  # each uses what stands in those before it
-_SVG = "http://www.w3.org/2000/svg"
-_XLINK = "http://www.w3.org/1999/xlink"
+_SVG, _XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
 _UNWANTED = {f"{{{_SVG}}}metadata", f"{{{_SVG}}}style"}
-_REFERENCE = re.compile(r"url\(#")
 _GREY = re.compile(r"#([0-9a-f]{2})\1\1\b")
 _DARKEST, _BRIGHTEST = 0x18, 0xE8
+_MOST_VALUES = 12
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Summary:
+class Written:
     """What was written. n_bytes: of the page."""
 
     n_drawings: int
@@ -60,22 +64,11 @@ class Summary:
     n_bytes: int
 
 
-def write_page(result: Result, items: Iterable[Drawing | Missing | Table], path: Path) -> Summary:
+def write_page(result: Result, items: Iterable[Item], path: Path) -> Written:
     """Write the page, and beside it the files of each drawing.
 
-    Parameters
-    ----------
-    result
-        The file that is shown.
-    items
-        What the page shows beside the interactive part, in its order.
-    path
-        Of the page, in a folder that exists. An older page is replaced when the new one is complete.
-
-    Raises
-    ------
-    OSError
-        Where something cannot be written.
+    items: what the page shows beside the interactive part, in its order. path: of the page, in a folder that exists;
+    an older page is replaced when the new one is complete. Raises OSError where something cannot be written.
     """
     parts = [_save(item, path.parent) if isinstance(item, Drawing) else item for item in items]
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
@@ -85,39 +78,7 @@ def write_page(result: Result, items: Iterable[Drawing | Missing | Table], path:
     finally:
         partial.unlink(missing_ok=True)
     kinds = Counter(type(part) for part in parts)
-    return Summary(kinds[Shown], kinds[Table], kinds[Missing], path.stat().st_size)
-
-
-def inline_svg(text: str, prefix: str, label: str) -> str:
-    """An SVG file of matplotlib as an element of the page.
-
-    Its ids begin with `prefix`, its style sheet is left out, and its greys, black and white among them, change places
-    on a dark page.
-    """
-    root = ElementTree.fromstring(text)
-    for parent in list(root.iter()):
-        for child in [child for child in parent if child.tag in _UNWANTED]:
-            parent.remove(child)
-    for element in root.iter():
-        for name, value in element.attrib.items():
-            if name == "id":
-                element.set(name, prefix + value)
-            elif name in ("href", f"{{{_XLINK}}}href"):
-                element.set(name, f"#{prefix}{value[1:]}" if value.startswith("#") else value)
-            else:
-                element.set(name, _REFERENCE.sub(f"url(#{prefix}", value))
-        if "style" in element.attrib:
-            element.set("style", _GREY.sub(_turn_grey, element.attrib["style"]))
-    root.set("role", "img")
-    root.set("aria-label", label)
-    ElementTree.register_namespace("", _SVG)
-    ElementTree.register_namespace("xlink", _XLINK)
-    return ElementTree.tostring(root, encoding="unicode")
-
-
-def _turn_grey(found: re.Match[str]) -> str:
-    level = _BRIGHTEST - (_BRIGHTEST - _DARKEST) * int(found[1], 16) // 255
-    return f"light-dark({found[0]}, #{level:02x}{level:02x}{level:02x})"
+    return Written(kinds[Shown], kinds[Table], kinds[Missing], path.stat().st_size)
 
 
 def _save(drawing: Drawing, folder: Path) -> Shown:
@@ -126,6 +87,37 @@ def _save(drawing: Drawing, folder: Path) -> Shown:
     files = [f"{drawing.name}.{kind}" for kind in ("svg", "png", "csv")] + [paths[1].name]
     there = tuple(name for name in files if (folder / name).exists())
     return Shown(drawing.name, drawing.title, drawing.caption, wide, narrow, there)
+
+
+def inline_svg(text: str, prefix: str, label: str) -> str:
+    """An SVG file of matplotlib as an element of the page.
+
+    Its ids begin with `prefix`, its style sheet is left out, and its greys, black and white among them, change places
+    on a dark page.
+    """
+
+    def turn_grey(found: re.Match[str]) -> str:
+        level = _BRIGHTEST - (_BRIGHTEST - _DARKEST) * int(found[1], 16) // 255
+        return f"light-dark({found[0]}, #{level:02x}{level:02x}{level:02x})"
+
+    root = ElementTree.fromstring(text)
+    for parent in list(root.iter()):
+        for child in [child for child in parent if child.tag in _UNWANTED]:
+            parent.remove(child)
+    for element in root.iter():
+        for name, value in element.attrib.items():
+            if name == "id":
+                value = prefix + value
+            elif name in ("href", f"{{{_XLINK}}}href"):
+                value = f"#{prefix}{value[1:]}" if value.startswith("#") else value
+            elif name == "style":
+                value = _GREY.sub(turn_grey, value)
+            element.set(name, value if name == "id" else value.replace("url(#", f"url(#{prefix}"))
+    root.set("role", "img")
+    root.set("aria-label", label)
+    ElementTree.register_namespace("", _SVG)
+    ElementTree.register_namespace("xlink", _XLINK)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str:
@@ -140,20 +132,50 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
     data = build_page_data(result, DATA_LIMIT, notes)
     if data is not None:
         data["root"] = build_root_numbers(result, notes)
-    scripts = [] if data is None else [get_plotlyjs(), "\n".join(map(_own_file, _SCRIPTS))]
     return environment.get_template("page.html").render(
         title=result.title,
         file=show_text(result.path.name),
         css=_own_file("page.css"),
-        study=describe_study(result),
+        answer=summary_rows(summarise(result)),
+        ends=tell_ends(result),
+        endings=_endings(result),
+        facts=_facts(result),
+        study=result.dataset.attrs.get("study"),
         parts=[part for part in parts if not isinstance(part, Missing)],
         missing=[part for part in parts if isinstance(part, Missing)],
         notes=notes,
         # nothing in it ends the script element that it stands in
         data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c") if data else "",
-        scripts=scripts,
+        scripts=[get_plotlyjs(), "\n".join(map(_own_file, _SCRIPTS))] if data else [],
     )
 
 
 def _own_file(name: str) -> str:
     return resources.files("studyrunner.report.page").joinpath("browser", name).read_text(encoding="utf-8")
+
+
+def _endings(result: Result) -> list[tuple[str, list[str]]]:
+    """How points ended but `converged`: how many, what that means and what may help; and lines on these points."""
+    numbers, found = Counter(result.dataset["outcome"].values.ravel().tolist()), []
+    for number, ending in sorted(result.endings.items()):
+        if numbers[number] and number != CONVERGED:
+            meaning = " ".join((ending.sentence, *advise_ended(result, number)))
+            found.append((f"{count(numbers[number], 'point')}: {meaning}", describe_ended(result, number)))
+    return found
+
+
+def _facts(result: Result) -> list[tuple[str, str]]:
+    """Names and values: axes, contact pairs, versions."""
+    facts = []
+    for name in result.axes:
+        axis = result.dataset[name]
+        numbers, units = axis.dtype.kind in "fiu", units_of(axis)
+        values = [show_number(float(value)) if numbers else str(value) for value in axis.values]
+        text = f"{values[0]} to {values[-1]}, {len(values)} values" if len(values) > _MOST_VALUES else ", ".join(values)
+        # of keys of [scene] and [wear] the file says what they are
+        meaning = "" if name in COORDINATES else str(axis.attrs.get("long_name", ""))
+        facts.append((name.replace("_", " "), f"{text} {units}".rstrip() + (f": {meaning}" if meaning else "")))
+    facts.append(("contact pairs", str(result.dataset.sizes["contact"])))
+    named = {"source": "source", "versions": "versions", "scene_sha256": "hash of the scene"}
+    attributes = result.dataset.attrs
+    return facts + [(label, str(attributes[name])) for name, label in named.items() if name in attributes]

@@ -1,55 +1,35 @@
-"""Pictures of the root: where it wears, slips and opens, and the disk that the sector is one of."""
+"""Pictures of the root: where it wears, slips and opens; the sector with its frequencies, and the disk (Fig. 2)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
+from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
-from studyrunner.report.panels import MAP, FloatArray, add_colour_bar, new_panel, new_panels
-from studyrunner.report.root.contact_faces import face_normals
-from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_edges, paint_faces, rgb
-from studyrunner.report.root.surface import RootSurface, known_counts, read_root
-from studyrunner.report.root.views import View, find_views
-from studyrunner.result.scene_pairs import NO_DEPTH, depths, tells_depth
+from studyrunner.report.panels import COLOURS, MAP, FloatArray
+from studyrunner.report.root.surface import MESH, RootSurface, face_normals, read_mesh, read_root
+from studyrunner.report.root.views import View, draw_scale_bar, find_views, from_aslant, paint_faces, rgb
+from studyrunner.result.scene_pairs import NO_DEPTH, last_depth, tells_depth
 from studyrunner.result.units import Scale, scale_for, show_number
-from studyrunner.result.view import Result, as_sentences
+from studyrunner.result.view import Result
+
+OF_SECTOR = (*MESH, "mesh_part", "natural_frequency")
+"""Variables that the figure of the sector shows."""
 
 _MOST_CLOSE_UPS, _FEWEST_SECTORS = 2, 3
 _MOST_PAIRS, _MOST_FACES, _MOST_OF_DISK = 20_000, 60_000, 300_000
 _TO_EYE, _FADED = np.array([0.35, 0.25, 1.0]), 0.45  # the disk: direction to the eye, paleness of the other sectors
 
 
-@dataclass(frozen=True)
-class _Picture:
-    """What is painted on the root. depth, values (n_contact,): m; in SI. factor: by which the depth is exaggerated."""
-
-    surface: RootSurface
-    views: tuple[View, ...]
-    depth: FloatArray
-    values: FloatArray
-    scale: Scale
-    label: str
-    factor: float = 1.0
-
-    @property
-    def close_ups(self) -> list[View]:
-        """Views of contact surfaces of the outer body from close by."""
-        return [view for view in self.views if view.flank >= 0 and view.body == self.views[0].body][:_MOST_CLOSE_UPS]
-
-    @property
-    def wears(self) -> bool:
-        """Whether there is a depth to be seen."""
-        return float(self.depth.max()) > NO_DEPTH
-
-
 def _read_surface(result: Result) -> RootSurface | None:
-    """The surface as it is drawn; None without a mesh, or with too many pairs to tell apart."""
+    """The surface as it is drawn; None without a mesh, or with too many pairs to see each."""
     surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
     return None if surface is None else surface.near_contact(_MOST_FACES)
 
@@ -57,27 +37,20 @@ def _read_surface(result: Result) -> RootSurface | None:
 def draw_root(result: Result) -> Drawn:
     """The worn shape of the shown point, coloured with its wear depth; the mean pressure where nothing is worn."""
     shown, surface = result.shown_point(), _read_surface(result)
-    fields = {"wear_depth": depths(result, shown)} if tells_depth(result) else {}
-    fields |= {name: result.at(name, shown).values for name in ("mean_pressure",) if result.has(name)}
-    known = known_counts(fields) if fields else np.zeros(0, int)
-    if surface is None or not known.size:
+    if surface is None or not (tells_depth(result) or result.has("mean_pressure")):
         return None
-    last = int(known[-1])
-    depth = fields["wear_depth"][last] if "wear_depth" in fields else np.zeros(result.dataset.sizes["contact"])
-    worn = float(depth.max()) > NO_DEPTH
-    name = "wear_depth" if worn or "mean_pressure" not in fields else "mean_pressure"
-    values, label = fields[name][last], name.replace("_", " ")
-    scale = scale_for("m" if name == "wear_depth" else "Pa", values)
-    factor = surface.exaggeration(float(depth.max())) if worn else 1.0
-    picture = _Picture(surface, find_views(result, surface), depth, values, scale, label, factor)
-    pair = result.dataset["contact"].values[int(np.argmax(values))]
-    return _paint(picture), as_sentences(
-        f"{label.capitalize()} {result.when(last, 'after')}",
-        f"Largest: {scale.show(float(values.max()))} at pair {pair}" if float(values.max()) > 0.0 else "",
-        f"The wear depth, of both surfaces together, is taken off each surface, {show_number(factor)} times exaggerated"
-        if worn
-        else "",
-        "Dashed: the edge of the contact surface before" if picture.close_ups and worn else "",
+    last = result.last_kept(shown)
+    depth = last_depth(result, shown) if tells_depth(result) else np.zeros(result.dataset.sizes["contact"])
+    name, values, units = "wear depth", depth, "m"
+    if result.has("mean_pressure") and not float(depth.max()) > NO_DEPTH:
+        name, values, units = "mean pressure", result.at("mean_pressure", shown, last).values, "Pa"
+    if not np.isfinite(values).all():
+        return None
+    factor, scale = surface.exaggeration(float(depth.max())), scale_for(units, values)
+    return (
+        _paint(surface, surface.worn(depth, factor), values, scale, name),
+        f"{name.capitalize()} {result.when(last, 'after')}{_largest(result, values, scale)}",
+        f"The wear depth is taken off each surface, {show_number(factor)} times exaggerated" if factor > 1.0 else "",
     )
 
 
@@ -88,54 +61,40 @@ def draw_fraction(result: Result, name: str) -> Drawn:
         return None
     if not np.isfinite(values).all():
         return "No point has a state."
-    label = f"fraction of the period {'in slip' if name == 'slip_fraction' else 'open'}"
-    nothing = np.zeros(len(values))
-    picture = _Picture(surface, find_views(result, surface), nothing, values, scale_for("1", values), label)
+    label, scale = f"fraction of the period {'in slip' if name == 'slip_fraction' else 'open'}", scale_for("1", values)
+    return _paint(surface, surface.nodes, values, scale, label), label.capitalize() + _largest(result, values, scale)
+
+
+def _largest(result: Result, values: FloatArray, scale: Scale) -> str:
     pair = result.dataset["contact"].values[int(np.argmax(values))]
-    largest = f"Largest: {values.max():.3g} at pair {pair}" if values.max() > 0.0 else "No pair does"
-    return _paint(picture), as_sentences(label.capitalize(), largest)
+    return f". Largest: {scale.show(float(values.max()), 3)} at pair {pair}" if float(values.max()) > 0.0 else ""
 
 
-def _paint(picture: _Picture) -> Figure:
-    """The root as a whole, and the contact surfaces of its outer body from close by."""
-    ratios = [1.0] + [2.0] * len(picture.close_ups)
-    figure, rows = new_panels(1, len(ratios), 3.4, width_ratios=ratios)
-    panels = rows[0]
-    norm = Normalize(0.0, picture.scale(float(picture.values.max())).item() or 1.0)
-    for panel, view in zip(panels, [picture.views[-1], *picture.close_ups], strict=True):
-        _paint_view(panel, picture, view, norm)
+def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale: Scale, label: str) -> Figure:
+    """The root as a whole, and the contact surfaces of its outer body from close by.
+
+    nodes: of its faces, worn. of_pairs (n_contact,): values in SI that colour the contact surfaces.
+    """
+    views = find_views(surface)
+    close_ups = [view for view in views[:-1] if view.body == views[0].body][:_MOST_CLOSE_UPS]
+    ratios = [1.0] + [2.0] * len(close_ups)
+    figure, (panels,) = plot.new_panels(1, len(ratios), 3.4, width_ratios=ratios)
+    norm = Normalize(0.0, scale(float(of_pairs.max())).item() or 1.0)
+    at_nodes = np.full(len(nodes), np.nan)
+    at_nodes[surface.contact.nodes] = scale(of_pairs[surface.contact.pairs])
+    colours, own = rgb(surface.bodies, surface.body), surface.contact.flank >= 0
+    colours[own] = mpl.colormaps[MAP](norm(at_nodes[surface.faces[own]].mean(axis=1)))[:, :3]
+    for panel, view in zip(panels, [views[-1], *close_ups], strict=True):
+        faces = surface.faces[view.faces]
+        paint_faces(panel, nodes, faces, colours[view.faces], view)
+        draw_scale_bar(panel, nodes[np.unique(faces)], view)
         panel.set_title(view.title)
-    add_colour_bar(figure, panels, norm, picture.scale.label(picture.label), fraction=0.05, panchor=False)
+    plot.add_colour_bar(figure, panels, norm, scale.label(label), fraction=0.05, panchor=False)
     return figure
 
 
-def _paint_view(panel: Axes, picture: _Picture, view: View, norm: Normalize) -> None:
-    surface, at_nodes = picture.surface, np.full(len(picture.surface.nodes), np.nan)
-    at_nodes[surface.contact.nodes] = surface.contact.values(picture.values)
-    worn, faces = surface.worn(picture.depth, picture.factor), surface.faces[view.faces]
-    own = surface.contact.flank[view.faces] >= 0
-    colours = rgb(body_colours(surface.bodies), surface.body[view.faces])
-    colours[own] = mpl.colormaps[MAP](norm(picture.scale(at_nodes[faces[own]].mean(axis=1))))[:, :3]
-    paint_faces(panel, worn, faces, colours, view)
-    if view.flank >= 0 and picture.wears:
-        looked_at = view.faces & (surface.contact.flank == view.flank)
-        paint_edges(panel, surface.nodes, surface.faces[looked_at], view)
-    if view.leading is not None:
-        _name_leading_edge(panel, surface.nodes[np.unique(faces)], view, view.leading)
-    draw_scale_bar(panel, worn[np.unique(faces)], view)
-
-
-def _name_leading_edge(panel: Axes, nodes: FloatArray, view: View, edge: FloatArray) -> None:
-    """The words at the side of the picture where the leading edge (3,), m, is, with a line to it."""
-    at, middle, seen = (view.seen(each) for each in (edge, nodes.mean(axis=0), nodes))
-    size = float(np.ptp(seen[:, 0]))
-    text = at + [np.sign(at[0] - middle[0]) * 0.02 * size, -0.28 * size]
-    line = {"arrowstyle": "-", "lw": 0.8, "shrinkB": 0}
-    panel.annotate("leading edge", (at[0], at[1]), (text[0], text[1]), ha="center", va="top", arrowprops=line)
-
-
 def draw_disk(result: Result) -> Drawn:
-    """The disk of all sectors, that of the mesh in full colour (Fig. 2a); only faces that look to the eye are drawn.
+    """The disk of all sectors, that of the mesh in full colour; only faces that look to the eye are drawn.
 
     None where the study names no sectors about z, or their faces are too many.
     """
@@ -145,20 +104,53 @@ def draw_disk(result: Result) -> Drawn:
         return None
     if number < _FEWEST_SECTORS or number * len(surface.faces) > _MOST_OF_DISK:
         return None
-    to_eye = _TO_EYE / np.linalg.norm(_TO_EYE)
-    view = View("", np.ones(1, np.bool_), to_eye, np.array([1.0, 0.0, 0.0]), -1, -1)
-    own = rgb(body_colours(surface.bodies), surface.body)
-    nodes, faces, colours = [], [], []
-    for sector, angle in enumerate(2.0 * np.pi * np.arange(number) / number):
-        turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
-        nodes.append(surface.nodes @ turn.T)
-        faces.append(surface.faces + sector * len(surface.nodes))
-        colours.append(own if sector == 0 else own + (1.0 - own) * _FADED)
-    all_nodes, all_faces, all_colours = np.concatenate(nodes), np.concatenate(faces), np.concatenate(colours)
-    looking = face_normals(all_nodes, all_faces) @ to_eye > 0.0
-    figure, panel = new_panel(4.6)
-    paint_faces(panel, all_nodes, all_faces[looking], all_colours[looking], view, lines=0.0)
-    return figure, as_sentences(
-        f"The {number} sectors of the disk, that of the mesh in full colour",
-        f"Axis of rotation: z, towards the reader; parts: {', '.join(surface.bodies)}",
-    )
+    to_eye, angles = _TO_EYE / np.linalg.norm(_TO_EYE), 2.0 * np.pi * np.arange(number) / number
+    turns = np.array([[[np.cos(a), np.sin(a), 0.0], [-np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]] for a in angles])
+    nodes = (surface.nodes @ turns).reshape(-1, 3)
+    faces = (surface.faces + len(surface.nodes) * np.arange(number)[:, None, None]).reshape(-1, 4)
+    colours = np.tile(rgb(surface.bodies, surface.body), (number, 1))
+    colours[len(surface.faces) :] += (1.0 - colours[len(surface.faces) :]) * _FADED
+    looking = face_normals(nodes, faces) @ to_eye > 0.0
+    figure, panel = plot.new_panel(4.6)
+    view = View("", looking, to_eye, np.array([1.0, 0.0, 0.0]))
+    paint_faces(panel, nodes, faces[looking], colours[looking], view, lines=0.0)
+    return figure, f"The {number} sectors of the disk, seen along its axis; parts: {', '.join(surface.bodies)}"
+
+
+def draw_sector(result: Result) -> Drawn:
+    """The natural frequencies over the nodal diameter, and the mesh beside them where the file holds one."""
+    if not result.has("natural_frequency") and "natural_frequencies" not in result.again:
+        return "Use study-report --natural-frequencies, or add natural_frequency to [outputs] variables."
+    has_mesh = result.has(*MESH)
+    ratios = [1.0, 1.7] if has_mesh else [1.0]
+    figure, (panels,) = plot.new_panels(1, len(ratios), 4.0, width_ratios=ratios)
+    if has_mesh:
+        nodes, faces, parts = read_mesh(result)
+        names, body = np.unique(parts, return_inverse=True)
+        view = from_aslant(nodes, len(faces))
+        paint_faces(panels[0], nodes, faces, rgb(tuple(names.tolist()), body), view)
+        draw_scale_bar(panels[0], nodes, view)
+    said = f"Of the sector at {result.describe(result.shown_point(), result.fixed)}" if result.fixed else ""
+    return figure, _draw_frequencies(result, panels[-1]), said
+
+
+def _draw_frequencies(result: Result, panel: Axes) -> str:
+    """Frequencies (nodal_diameter, mode) over the nodal diameter, one line a mode; what is seen."""
+    source = result.again.get("natural_frequencies", result.dataset)
+    frequencies = source["natural_frequency"].transpose("nodal_diameter", "mode").values
+    for number, mode in enumerate(frequencies.T):
+        style = {"linewidth": 0.8, "markersize": 3.5, "marker": plot.line_style(number)["marker"], "color": "0.35"}
+        label = f"_mode {number + 1}"
+        panel.plot(source["nodal_diameter"].values, mode, markerfacecolor=COLOURS[0], label=label, **style)
+    plot.set_from_zero(panel, float(np.nanmax(frequencies)))
+    panel.set(xlabel="nodal diameter", ylabel="natural frequency (Hz)")
+    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+    diameter = result.study.get("scene", {}).get("nodal_diameter")
+    text = f"With the joint stuck, {frequencies.shape[1]} modes, the lowest at {np.nanmin(frequencies):.4g} Hz"
+    if not isinstance(diameter, int) or "frequency" not in result.dataset.coords:
+        return text
+    ends = [float(end(result.dataset["frequency"].values)) for end in (np.min, np.max)]
+    star: dict[str, Any] = {"marker": "*", "markersize": 11, "label": "this study", "clip_on": False, "zorder": 5}
+    panel.plot([diameter, diameter], ends, color=COLOURS[1], **star)
+    span = " to ".join(dict.fromkeys(f"{each:.6g}" for each in ends))
+    return f"{text}. Star: this study, {span} Hz at nodal diameter {diameter}"

@@ -1,24 +1,29 @@
-"""From where the root is looked at: the whole, and the contact surfaces of each body from close by."""
+"""From where the root is looked at, and faces in space on paper: those nearer to the eye over those behind.
+
+By hand: `mplot3d` leaves a wide margin, and draws both sides of a face alike.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
-from studyrunner.report.root.surface import RootSurface
-from studyrunner.result.view import Result
+from studyrunner.report.root.surface import Floats, Places, RootSurface, face_normals
 
 MOST_VIEWS = 8
-
-LEADING = {"dovetail_sector": np.array([0.0, 0.0, -1.0])}
-"""Bundled scenes whose flow is known, by model: the direction to the leading edge."""
 
 _AROUND = 0.16  # of a close-up: how much is seen around the contact surfaces, over their size
 _BEFORE = 0.06  # what stands before a contact surface is cut off from here on, over the same size
 _WHOLE = np.array([0.35, -0.6, -0.72])  # to the eye, where upwards is x
 _ASLANT, _FROM_ABOVE = 0.55, 0.3
+# colours of the bodies in their order: their lightness differs, in print as well
+_BODIES, _NAMED = ("#d9b38c", "#9ecae1", "#c7c7c7", "#b5d99c"), {"blade": "#9ecae1", "disk": "#d9b38c"}
+_INSIDE, _EDGEWAYS = 0.42, 1e-9
 
 
 @dataclass(frozen=True)
@@ -26,99 +31,132 @@ class View:
     """Faces that are seen and the direction they are seen from.
 
     title: in words. faces (n_faces,): which are seen. to_eye, up (3,): unit vectors. body: the one in the view, -1 for
-    all. flank: the contact surface that is looked at, -1 for none in particular. leading (3,): the middle of its
-    leading edge, m; None where it is not known.
+    all.
     """
 
     title: str
     faces: NDArray[np.bool_]
-    to_eye: NDArray[np.float64]
-    up: NDArray[np.float64]
-    body: int
-    flank: int
-    leading: NDArray[np.float64] | None = None
+    to_eye: Floats
+    up: Floats
+    body: int = -1
 
     @property
-    def frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def frame(self) -> tuple[Floats, Floats, Floats]:
         """Unit vectors to the right and upwards on paper, and to the eye."""
         up = self.up - (self.up @ self.to_eye) * self.to_eye
         up /= np.linalg.norm(up)
         return np.cross(up, self.to_eye), up, self.to_eye
 
-    def seen(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    def seen(self, places: Floats) -> Floats:
         """Places (..., 3), m, on paper (..., 2), mm."""
         right, up, _ = self.frame
         return 1e3 * np.stack([places @ right, places @ up], axis=-1)
 
 
-def find_views(result: Result, surface: RootSurface) -> tuple[View, ...]:
+def find_views(surface: RootSurface) -> tuple[View, ...]:
     """Close-ups of each contact surface of each body, the outermost body first, then the whole."""
-    leading = LEADING.get(str(result.study.get("scene", {}).get("model")))
-    up = _upwards(surface.nodes)
-    contact = surface.contact.flank >= 0
+    up, contact = _upwards(surface.nodes), surface.contact.flank >= 0
     # by where they are along the direction upwards
     height = {
         body: float((surface.nodes[np.unique(surface.faces[surface.body == body])] @ up).mean())
         for body in np.unique(surface.body[contact]).tolist()
     }
-    closer = []
-    for body in sorted(height, key=lambda body: -height[body]):
-        own = surface.body == body
-        for flank in np.unique(surface.contact.flank[own & contact]).tolist():
-            title = f"{surface.bodies[body]}: {surface.flanks[flank] or 'contact'}"
-            closer.append(_close_up(surface, title, body, flank, up, leading))
+    closer = [
+        _close_up(surface, body, flank, up)
+        for body in sorted(height, key=lambda body: -height[body])
+        for flank in np.unique(surface.contact.flank[(surface.body == body) & contact]).tolist()
+    ]
     return (*closer[: MOST_VIEWS - 1], from_aslant(surface.nodes, len(surface.faces)))
 
 
-def from_aslant(nodes: NDArray[np.float64], n_faces: int) -> View:
+def from_aslant(nodes: Floats, n_faces: int) -> View:
     """All faces of a mesh of these nodes (n_nodes, 3), from aslant."""
     up = _upwards(nodes)
     place = int(np.argmax(np.abs(up)))
     to_eye = np.roll(_WHOLE, place) * np.where(np.arange(3) == place, up[place], 1.0)
-    return View("whole mesh", np.ones(n_faces, dtype=np.bool_), to_eye / np.linalg.norm(to_eye), up, -1, -1)
+    return View("whole mesh", np.ones(n_faces, dtype=np.bool_), to_eye / np.linalg.norm(to_eye), up)
 
 
-def _close_up(
-    surface: RootSurface,
-    title: str,
-    body: int,
-    flank: int,
-    up: NDArray[np.float64],
-    leading: NDArray[np.float64] | None,
-) -> View:
+def _close_up(surface: RootSurface, body: int, flank: int, up: Floats) -> View:
     """The faces of a body around its contact surfaces, without those that stand before the one looked at."""
     own = surface.body == body
     inside = surface.nodes[np.unique(surface.faces[own & (surface.contact.flank >= 0)])]
     looked_at = own & (surface.contact.flank == flank)
-    normal = surface.mean_normal(looked_at)
+    normal = face_normals(surface.nodes, surface.faces[looked_at]).sum(axis=0)
+    normal /= max(float(np.linalg.norm(normal)), 1e-300)
     size = float(np.linalg.norm(np.ptp(inside, axis=0)))
     low, high = inside.min(axis=0) - _AROUND * size, inside.max(axis=0) + _AROUND * size
-    centre = surface.nodes[surface.faces].mean(axis=1)
     near = ((surface.nodes >= low) & (surface.nodes <= high)).all(axis=1)[surface.faces].any(axis=1)
     on_it = surface.nodes[np.unique(surface.faces[looked_at])]
+    centre = surface.nodes[surface.faces].mean(axis=1)
     behind = centre @ normal <= float((on_it @ normal).max()) + _BEFORE * size
-    edge = None
-    if leading is not None:
-        along = on_it @ leading
-        edge = on_it[along >= along.max() - 1e-6 * size].mean(axis=0)
-    return View(title, own & near & behind | looked_at, *_aslant(normal, up), body, flank, edge)
-
-
-def _upwards(nodes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Along the longest axis of the mesh, away from the origin: outwards in a sector whose blade stands on an axis."""
-    size = np.ptp(nodes, axis=0)
-    up = np.zeros(3)
-    place = int(np.argmax(np.round(size, 9)))
-    up[place] = -1.0 if nodes[:, place].mean() < 0.0 else 1.0
-    return up
-
-
-def _aslant(normal: NDArray[np.float64], up: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """To the eye and upwards for a surface with this normal, looked at from a side and from above."""
+    # looked at from a side and from above
     aside = np.cross(up, normal)
     if np.linalg.norm(aside) < 0.1:
         # a surface that looks upwards or downwards
         other = np.eye(3)[np.argmin(np.abs(up))]
         aside, up = np.cross(other, normal), other
     to_eye = normal + _ASLANT * aside / np.linalg.norm(aside) + _FROM_ABOVE * up
-    return to_eye / np.linalg.norm(to_eye), up
+    title = f"{surface.bodies[body]}: {surface.flanks[flank] or 'contact'}"
+    return View(title, own & near & behind | looked_at, to_eye / np.linalg.norm(to_eye), up, body)
+
+
+def _upwards(nodes: Floats) -> Floats:
+    """Along the longest axis of the mesh, away from the origin: outwards in a sector whose blade stands on an axis."""
+    up = np.zeros(3)
+    place = int(np.argmax(np.round(np.ptp(nodes, axis=0), 9)))
+    up[place] = -1.0 if nodes[:, place].mean() < 0.0 else 1.0
+    return up
+
+
+# --- on paper ---
+
+
+def body_colours(names: tuple[str, ...]) -> tuple[str, ...]:
+    """One colour a body; blade and disk have those of the other pictures of the mesh."""
+    return tuple(_NAMED.get(name.lower(), _BODIES[number % len(_BODIES)]) for number, name in enumerate(names))
+
+
+def rgb(names: tuple[str, ...], which: Places) -> Floats:
+    """Colours (n, 3) of bodies of these names and places among them (n,)."""
+    return np.array([to_rgb(colour) for colour in body_colours(names)])[which]
+
+
+def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View, *, lines: float = 0.2) -> None:
+    """Faces (n, 4) with their colours (n, 3) as seen in a view, darker where they turn away from the eye, in mm.
+
+    The inner side of a face, which is seen where a mesh is cut, is grey. lines: width of the edges, points; 0 for none.
+    """
+    order = np.argsort(nodes[faces].mean(axis=1) @ view.to_eye, kind="stable")
+    normals = face_normals(nodes, faces)
+    turned = normals @ view.to_eye / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    lit = np.where((turned < -_EDGEWAYS)[:, None], _INSIDE, colours * (0.55 + 0.45 * np.abs(turned))[:, None])
+    painted = PolyCollection(
+        list(view.seen(nodes)[faces[order]]),
+        facecolors=lit[order],
+        edgecolors="0.25" if lines else "none",
+        linewidths=lines,
+        # smooth edges of neighbouring faces would let what is behind them shine through
+        antialiaseds=lines > 0.0,
+        rasterized=True,
+    )
+    panel.add_collection(painted)
+    panel.set_aspect("equal")
+    panel.autoscale_view()
+    panel.grid(visible=False)
+    panel.set_axis_off()
+
+
+def draw_scale_bar(panel: Axes, nodes: Floats, view: View) -> None:
+    """A bar of a round length under what is seen, in place of axes."""
+    seen = view.seen(nodes)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    size = float((high - low).max())
+    if not size > 0.0:
+        return
+    length = 10.0 ** np.floor(np.log10(0.4 * size))
+    length *= max(factor for factor in (1.0, 2.0, 5.0) if factor * length <= 0.4 * size or factor == 1.0)
+    bottom = low[1] - 0.05 * size
+    panel.fill_between([low[0], low[0] + length], bottom - 0.006 * size, bottom + 0.006 * size, color="0.1", lw=0.0)
+    panel.text(low[0] + 0.5 * length, bottom - 0.02 * size, f"{length:g} mm", ha="center", va="top")
+    panel.set_ylim(bottom - 0.1 * size, high[1] + 0.02 * size)

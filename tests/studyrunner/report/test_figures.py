@@ -16,13 +16,11 @@ from studyrunner.report import contents
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, fit_into_column, style
 from studyrunner.report.figures.flanks import find_flanks
-from studyrunner.report.figures.trends import find_peak, find_quantities
 from studyrunner.result.view import Result
 from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, lines_of, values_of
 from tests.studyrunner.report.root_cases import dovetail_file
-from tests.studyrunner.report.test_settings import finest_file
+from tests.studyrunner.report.test_precision import finest_file
 from tests.studyrunner.results import (
-    N_SAMPLES,
     make_result,
     sample_file,
     with_endings,
@@ -41,7 +39,7 @@ NOTHING = (
     *("response_error", "wear_rate_error", "energy_error"),
 )
 FLAT = "worn_volume_map final_worn_volume wear_depth worn_profile"
-SAMPLED = "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs deciding_input"
+SAMPLED = "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs"
 # of each result what is drawn, what is not, as there is nothing to see, and whether it is tried on paper
 CASES = {
     "complete": (lambda: with_sector(with_loops(make_result())), ALL_DRAWINGS, "", False),
@@ -344,34 +342,18 @@ def test_words_of_the_joint_are_the_same_in_maps_and_loops():
     assert draw_figure(make_result(), "worn_profile").figure.axes[2].get_xlabel() == "z (mm)"
 
 
-def test_a_peak_is_the_vertex_of_the_parabola_through_its_neighbours():
-    frequency = np.array([200.0, 201.0, 202.0, 204.0])
-    amplitude = 3.0 - (frequency - 201.7) ** 2
-    top, height, top_error, height_error = (float(each[0]) for each in find_peak(frequency, amplitude, 0))
-    assert (top, height) == pytest.approx((201.7, 3.0))
-    assert (top_error, height_error) == pytest.approx((0.3, 0.09))
-    for values in ([1.0, 2.0, 3.0], [3.0, 2.0, 1.0], [np.nan, 2.0, 1.0]):
-        assert np.isnan(find_peak(np.arange(3.0), np.array(values), 0)).all()
-
-
 def test_trends_are_those_of_the_file():
     result = make_result(wear_coefficient=(1e-12, 5e-12, 5e-11), sweep=("up", "down"))
-    amplitude = result.dataset["response_amplitude"].copy(deep=True)
-    frequency = result.dataset["frequency"]
-    for cycle, centre in ((0, 201.7), (-1, 202.4)):
-        parabola = 2e-3 - 1e-5 * (frequency - centre) ** 2
-        amplitude[{"cycle": cycle}] = parabola.broadcast_like(amplitude.isel(cycle=cycle))
-    result = with_variables(result, response_amplitude=amplitude)
-    shift = next(one for one in find_quantities(result) if one.units == "Hz")
-    np.testing.assert_allclose(shift.values, 0.7, rtol=1e-6)
-    place = tuple(result.shown_point()[name] for name in result.axes)
-    worn = result.dataset["worn_volume"].isel(cycle=-1).values
+    last, place = result.dataset.isel(cycle=-1), tuple(result.shown_point()[name] for name in result.axes)
+    worn, largest = last["worn_volume"].values, last["response_amplitude"].isel(response=0).max("frequency").values
     panels = draw_figure(result, "trends").figure.axes
-    first = [panel for panel in panels if panel.get_subplotspec().rowspan.start == 0]
-    for panel, axis in zip(first, (0, 1, 4, 5), strict=True):
-        own = worn[(*place[:axis], slice(None), *place[axis + 1 :])]
-        (drawn,) = [np.asarray(each.get_ydata(), dtype=float) for each in panel.get_lines() if each.get_marker() == "o"]
-        np.testing.assert_allclose(drawn / drawn.max(), own / own.max(), rtol=1e-12)
+    rows = [[panel for panel in panels if panel.get_subplotspec().rowspan.start == row] for row in (0, 1)]
+    for row, axes, values in ((rows[0], (0, 1, 4, 5), worn), (rows[1], (1, 4, 5), largest[None])):
+        at = place if values is worn else (0, *place[1:])
+        for panel, axis in zip(row, axes, strict=True):
+            own = values[(*at[:axis], slice(None), *at[axis + 1 :])]
+            (drawn,) = [np.asarray(line.get_ydata(), float) for line in panel.get_lines() if line.get_marker() == "o"]
+            np.testing.assert_allclose(drawn / drawn.max(), own / own.max(), rtol=1e-12)
 
 
 def test_samples_are_those_of_the_file():
@@ -384,13 +366,6 @@ def test_samples_are_those_of_the_file():
     bars = draw_figure(result, "deciding_inputs").figure.axes[0]
     names = [text.get_text().replace("\n", " ") for text in bars.get_xticklabels()]
     assert names[int(np.argmax([patch.get_height() for patch in bars.patches]))] == "wear coefficient"
-    for place, panel in enumerate(draw_figure(result, "deciding_input").figure.axes):
-        (points,) = [found for found in panel.collections if found.get_label() == "samples"]
-        drawn = dataset["sample_wear_coefficient"].values, dataset["worn_volume"].values[place, 0, :, -1] * 1e9
-        np.testing.assert_allclose(np.asarray(points.get_offsets()).T, drawn)
-    two = draw_figure(Result(Path("two.nc"), sample_file(factor=1.05, jump=1.0)), "deciding_input").figure.axes[0]
-    groups = {each.get_label(): len(each.get_offsets()) for each in two.collections if "group" in str(each.get_label())}
-    assert groups == {"lower group": N_SAMPLES // 2, "upper group": N_SAMPLES // 2}
 
 
 def test_the_page_on_the_report_lists_all_figures():

@@ -9,7 +9,6 @@ from studyrunner.api import open_result
 from studyrunner.report.cli import main
 from studyrunner.report.page.page import write_page
 from studyrunner.result.certainty import certainty_of, describe_ended
-from studyrunner.result.view import Result
 from tests.studyrunner.report.figure_numbers import draw_figure
 from tests.studyrunner.results import build_file, make_result, with_endings
 
@@ -41,16 +40,6 @@ def test_certainty_and_the_points_that_ended_otherwise_stand_on_the_page(tmp_pat
     assert len(lines) == 10
     assert all(";" in line for line in lines)
     assert re.fullmatch(r"and \d+ more points", left)
-
-
-def test_errors_that_were_never_estimated_say_so():
-    result = mixed()
-    estimates = result.dataset["error_estimate"].copy(deep=True)
-    estimates.values.flat[[0, 1]] = np.nan
-    unknown = Result(result.path, result.dataset.assign(error_estimate=estimates))
-    assert certainty_of(unknown).n_unknown == 2
-    none = certainty_of(Result(result.path, result.dataset.assign(error_estimate=estimates * np.nan)))
-    assert (none.n_known, none.n_less, none.n_unknown, none.n_short) == (0, 0, 6, 2)
 
 
 def test_an_inaccurate_state_is_no_volume_above_rtol():

@@ -10,11 +10,9 @@ import pytest
 from studies.scene_answers import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.figures.flanks import find_flanks
-from studyrunner.report.page.data import build_page_data
-from studyrunner.report.page.root import build_root_numbers
+from studyrunner.report.page.data import build_page_data, build_root_numbers
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.vtu import find_writer
-from studyrunner.report.selection import choose
 from studyrunner.result.opening import check_dataset
 from studyrunner.result.scene_pairs import last_depth, of_scene, of_shown_scene
 from studyrunner.result.view import Result
@@ -53,13 +51,6 @@ def test_a_scene_has_its_own_pairs(meshes):
     np.testing.assert_array_equal(
         shown.at("wear_depth", shown.shown_point()), meshes.at("wear_depth", meshes.shown_point())[:, :FEW]
     )
-
-
-def test_axes_of_the_scene_are_named_with_their_unit(meshes):
-    shown = of_shown_scene(meshes)
-    assert "rpm, mesh 1" in shown.describe(shown.shown_point())
-    choice = choose(shown, [], 4)
-    assert choice.sentence == "Shown for mesh 1; the file also holds 1 other value of mesh."
 
 
 def test_figures_show_the_pairs_of_the_shown_scene(meshes):

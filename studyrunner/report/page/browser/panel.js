@@ -42,21 +42,8 @@ function place(name, index) {
   return words ? values[index] : values[index] === null ? "not finite" : withUnit(digits(values[index], 9), unit);
 }
 
-// Where a variable stands, index along each dimension: of what is held in part, the nearest that is.
-function position(entry, at) {
-  let index = 0;
-  for (const name of entry.dims) {
-    const kept = entry.kept[name];
-    let here = at[name];
-    if (kept) {
-      here = 0;
-      kept.forEach((each, i) => { if (Math.abs(each - at[name]) < Math.abs(kept[here] - at[name])) here = i; });
-    }
-    index = index * (kept ? kept.length : size(name)) + here;
-  }
-  return index;
-}
-
+// Where a value stands, by the index along each dimension.
+const position = (entry, at) => entry.dims.reduce((index, name) => index * size(name) + at[name], 0);
 const valueAt = (entry, at) => entry.values[position(entry, at)];
 // Absolute error in the unit that is shown; NaN where there is none.
 function errorAt(entry, at) {

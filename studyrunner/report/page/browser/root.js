@@ -11,7 +11,7 @@ const DEPTH = ["wear_depth", "wear_depth_last"].find((name) => variables[name]);
 
 if (root) {
   for (const name of ["nodes", "faces", "body", "flank", "seen"]) root[name] = decode(root[name]);
-  for (const name of ["nodes", "pairs", "weights", "normals"]) root.contact[name] = decode(root.contact[name]);
+  for (const name of ["nodes", "pairs", "normals"]) root.contact[name] = decode(root.contact[name]);
 }
 
 // Triangles of some faces: a face of four nodes is two, one that repeats its last node is one.
@@ -63,14 +63,7 @@ function exaggeration() {
 }
 
 // Values at the nodes in contact, from those of the pairs.
-function atNodes(values) {
-  const { pairs, weights, columns, nodes } = root.contact;
-  return Array.from(nodes, (_, i) => {
-    let sum = 0;
-    for (let j = i * columns; j < (i + 1) * columns; j++) if (weights[j] > 0) sum += weights[j] * values[pairs[j]];
-    return sum;
-  });
-}
+const atNodes = (values) => Array.from(root.contact.pairs, (pair) => values[pair]);
 
 function drawRoot() {
   if (byId("root-part").hidden) return;
@@ -87,12 +80,12 @@ function drawRoot() {
   const depth = DEPTH ? atNodes(pairValues(variables[DEPTH])) : [];
   const values = atNodes(pairValues(entry));
   const intensity = x.map(() => 0), hover = x.map(() => "");
-  const { nodes, normals, pairs, columns } = root.contact;
+  const { nodes, normals, pairs } = root.contact;
   nodes.forEach((node, i) => {
     const moved = Number.isFinite(depth[i]) ? factor * depth[i] * 1e3 : 0;
     x[node] -= moved * normals[3 * i]; y[node] -= moved * normals[3 * i + 1]; z[node] -= moved * normals[3 * i + 2];
     intensity[node] = values[i] * entry.factor;
-    hover[node] = `at pair ${pairs[i * columns]}<br>${plain(withUnit(digits(intensity[node]), entry.unit))}`;
+    hover[node] = `at pair ${pairs[i]}<br>${plain(withUnit(digits(intensity[node]), entry.unit))}`;
   });
   const view = root.views[shape.view], parts = facesOf(shape.view), front = root.views[0].body;
   const lightposition = Object.fromEntries(["x", "y", "z"].map((name, axis) => [name, view.eye[axis] * 1e5]));

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studyrunner.report.figures.precision import draw_precision
-from studyrunner.report.figures.settings import Setting, compare_settings
+from studyrunner.report.figures.precision import Setting, compare_settings, draw_precision
 from studyrunner.result.view import Result
 from tests.studyrunner.results import build_file
 
@@ -90,7 +89,7 @@ def test_of_the_finest_the_one_with_the_least_error_is_the_reference_but_no_expl
 
 def test_the_front_is_that_of_all_pairs_compared():
     (point, _) = compare_settings(finest_file(math.nan, exact=True))
-    time, error = point.values["run_time"], point.errors["volume"]
+    time, error = point.time, point.errors["volume"]
     undominated = {
         row
         for row in range(len(time))

@@ -1,22 +1,109 @@
-"""The condensed structure against the full equations, and a folded sector against its whole ring."""
+"""Fourier basis, condensed structure and penalty: definitions, full equations, a folded sector against its ring."""
 
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from solver import build_model
 from solver.model import needed_nodal_diameters
+from solver.settings import Resolution, SolverSettings
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, frequency_slope, relative_indices
-from solver.structure.fourier import change_orders, from_complex, to_complex
+from solver.structure.fourier import build_basis, change_orders, derivative, from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
-from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model, scene
+from solver.structure.joint import build_case
+from solver.structure.penalty import build_penalty
+from tests.solver.models import (
+    MASS,
+    OMEGA,
+    STIFFNESS,
+    cyclic_model,
+    definite,
+    dovetail,
+    random_model,
+    scene,
+    with_free_masses,
+)
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
 HARMONICS = 3
 ORDERS = (1, 2, 3)
 AMPLITUDE = 60.0
+DOVETAIL_OMEGA = 2 * np.pi * 212.0
+
+# --- Fourier basis ---
+
+
+def test_synthesis_is_the_series_0_cos_1_sin_1_cos_2_sin_2():
+    time = np.arange(32) / 32 * 2 * np.pi / OMEGA
+    expected = 0.3 + 1.1 * np.cos(OMEGA * time) - 0.4 * np.sin(OMEGA * time) + 2.5 * np.sin(2 * OMEGA * time)
+    assert np.array([0.3, 1.1, -0.4, 0.0, 2.5]) @ build_basis((1, 2), 32).synthesis == pytest.approx(
+        expected, abs=1e-14
+    )
+
+
+def test_a_complex_amplitude_is_the_real_part_of_a_rotation_forwards():
+    amplitudes = np.array([[0.7 - 0.2j, 1.5j], [-2.0, 0.1 + 0.4j]])
+    static = np.array([0.5, -1.0])
+    phase = 2 * np.pi * np.arange(16) / 16
+    expected = static[:, None] + sum(np.real(amplitudes[:, n - 1, None] * np.exp(1j * n * phase)) for n in (1, 2))
+    values_h = from_complex(static, amplitudes)
+    assert values_h @ build_basis((1, 2), 16).synthesis == pytest.approx(expected, abs=1e-14)
+    assert np.array_equal(to_complex(values_h), amplitudes)
+    assert np.array_equal(values_h[:, 0], static)
+
+
+def test_derivative_multiplies_the_amplitude_of_harmonic_n_by_i_n_omega():
+    values_h = np.random.default_rng(1).normal(size=(2, 3, 9))
+    rate_h = derivative(values_h, OMEGA * np.arange(1, 5))
+    assert to_complex(rate_h) == pytest.approx(1j * OMEGA * np.arange(1, 5) * to_complex(values_h), abs=1e-12)
+    assert not rate_h[..., 0].any()
+
+
+@pytest.mark.parametrize(("orders", "samples"), [((1,), 2), ((1, 2, 3), 6), ((1, 3, 5), 10), ((7,), 4), ((), 0)])
+def test_samples_that_alias_are_refused(orders, samples):
+    with pytest.raises(ValueError, match="samples"):
+        build_basis(orders, samples)
+
+
+@given(orders=st.sets(st.integers(1, 30), max_size=8), extra=st.integers(1, 20), seed=st.integers(0, 2**31))
+def test_analysis_undoes_synthesis_for_any_orders(orders, extra, seed):
+    ascending = tuple(sorted(orders))
+    basis = build_basis(ascending, 2 * max(ascending, default=0) + extra)
+    assert basis.n_harmonics == len(orders)
+    values_h = np.random.default_rng(seed).normal(size=(3, 2 * len(orders) + 1))
+    assert values_h @ basis.synthesis @ basis.analysis == pytest.approx(values_h, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("orders", "wanted"),
+    [
+        ((1, 2), (1, 2, 3, 4)),
+        ((1, 2, 3, 4), (1,)),
+        ((1, 2, 3, 4, 5), (1, 3, 5)),
+        ((1, 3, 5), (1, 2, 3, 4, 5)),
+        ((1, 3, 5), (1, 2, 5, 8)),
+        ((), (1, 3)),
+        ((1, 3), ()),
+    ],
+)
+def test_changed_orders_keep_the_harmonics_that_both_have(orders, wanted):
+    values_h = np.random.default_rng(3).normal(size=(2, 3, 2 * len(orders) + 1))
+    changed = change_orders(values_h, orders, wanted)
+    assert changed.shape == (2, 3, 2 * len(wanted) + 1)
+    assert np.array_equal(changed[..., 0], values_h[..., 0])
+    before, after = to_complex(values_h), to_complex(changed)
+    for place, order in enumerate(wanted):
+        if order in orders:
+            assert np.array_equal(after[..., place], before[..., orders.index(order)])
+        else:
+            assert not after[..., place].any()
+
+
+# --- condensation ---
 
 
 @pytest.mark.parametrize("n_inner", [0, 1, 6])
@@ -182,3 +269,78 @@ def only_pairs(linear, n_contact):
     square = {name: getattr(linear, name)[:n, :n] for name in ("mass", "damping", "stiffness")}
     loads = {name: getattr(linear, name)[:n] for name in ("load_static", "load_harmonic")}
     return replace(linear, **square, **loads, response=linear.response[:, :n])
+
+
+# --- penalty ---
+
+
+@pytest.mark.parametrize("n_harmonics", [1, 5, 21])
+@pytest.mark.parametrize(
+    ("name", "values", "omega", "inertial"),
+    [
+        ("sdof_slider", {}, 2 * np.pi * 160, True),
+        ("sdof_slider", {"normal_stiffness": 0.0}, 2 * np.pi * 160, True),
+        ("two_masses", {}, 0.5, True),
+        ("vibro_impact", {}, 1.2, False),
+    ],
+)
+def test_a_mass_directly_on_a_slider_is_marched_with_its_mass(name, values, omega, inertial, n_harmonics):
+    penalty = build_penalty(scene(name, n_harmonics, **values), omega, n_harmonics)
+    assert penalty.inertial.tolist() == [inertial]
+
+
+@pytest.mark.parametrize("n_harmonics", [1, 3, 7])
+def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness(n_harmonics):
+    model = dovetail()
+    penalty = build_penalty(model, DOVETAIL_OMEGA, n_harmonics)
+    assert not penalty.inertial.any()
+    relative = model.contact.dofs.ravel()
+    full = model.linear[0].stiffness
+    inner = np.setdiff1d(np.arange(full.shape[0]), relative)
+    condensed = full[np.ix_(relative, relative)] - full[np.ix_(relative, inner)] @ np.linalg.solve(
+        full[np.ix_(inner, inner)], full[np.ix_(inner, relative)]
+    )
+    largest = np.linalg.eigvalsh(condensed).max()
+    assert (penalty.tangential < largest * 1.5).all()
+    assert (penalty.tangential > largest * 1e-3).all()
+    assert (penalty.normal > largest * 1e-3).all()
+
+
+@pytest.mark.parametrize("orders", [(1, 2, 3), (1, 3, 5), (1,)])
+@pytest.mark.parametrize("free", [[], [0, 2], [0, 1, 2]])
+def test_motion_and_surplus_of_a_joint_are_inverse(free, orders):
+    model = with_free_masses(random_model(4), free)
+    case = build_case(model, 0.4, OMEGA, SolverSettings(), Resolution(orders, 16))
+    penalty = case.penalty
+    assert np.flatnonzero(penalty.inertial).tolist() == free
+    joint = case.joint(OMEGA, 60.0)
+    correction = np.random.default_rng(5).normal(size=(3, 3, 2 * len(orders) + 1))
+    motion = joint.law.motion(correction)
+    assert joint.law.force(motion) == pytest.approx(correction, abs=1e-12)
+    several = np.random.default_rng(6).normal(size=(*correction.shape, 4))
+    together = joint.law.motion(several)
+    for column in range(4):
+        alone = joint.law.motion(several[..., column])
+        assert together[..., column] == pytest.approx(alone, rel=1e-13, abs=1e-13 * np.abs(alone).max())
+    for pair in range(3):
+        assert motion[pair, 0] == pytest.approx(correction[pair, 0] / penalty.normal[pair], rel=1e-12, abs=0.0)
+        if pair not in free:
+            assert motion[pair, 1] == pytest.approx(correction[pair, 1] / penalty.tangential[pair], rel=1e-12, abs=0.0)
+
+
+def test_the_motion_of_a_marched_mass_is_that_of_newtons_law_as_the_steps_get_short():
+    model = scene("sdof_slider")
+    errors = []
+    for samples in (32, 64, 128):
+        case = build_case(model, 0.4, OMEGA, SolverSettings(), Resolution((1, 3, 5), samples))
+        joint, penalty = case.joint(OMEGA, 60.0), case.penalty
+        correction = np.random.default_rng(5).normal(size=(1, 3, 7))
+        moved, force = to_complex(joint.law.motion(correction))[0, 1], to_complex(correction)[0, 1]
+        rates = 1j * OMEGA * np.array([1, 3, 5])
+        exact = force / (rates * (rates * penalty.mass[0] + penalty.drag[0]))
+        errors.append(np.abs(moved / exact - 1.0).max())
+        assert joint.law.motion(correction)[0, 1, 0] == pytest.approx(correction[0, 1, 0] / penalty.mean[0], rel=1e-12)
+    # the trapezoidal rule: its error falls with the square of the step
+    assert errors[0] < 0.1
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)

@@ -1,0 +1,222 @@
+"""Wear depth and pressure of the pairs: by number, on their surfaces, over a scar (Figs. 3, 5, 10, 11, 12)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from studyrunner.report import panels as plot
+from studyrunner.report.drawing import Drawn
+from studyrunner.report.figures.flanks import (
+    Flank,
+    draw_field,
+    draw_fields,
+    find_flanks,
+    map_height,
+    most_of_flanks,
+)
+from studyrunner.report.panels import COLOURS, FloatArray
+from studyrunner.report.selection import choose, labelled
+from studyrunner.result.scars import Scar, find_scar
+from studyrunner.result.scene_pairs import NO_DEPTH, depths, last_depth, tells_depth
+from studyrunner.result.units import Scale, scale_for
+from studyrunner.result.view import Result
+
+_MOST_SERIES, _MOST_PROFILES = 4, 5
+_MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _SLENDER, _LONGEST_NAME = 150, 4, 120, 0.12, 20
+
+
+def _worn_depth(result: Result) -> FloatArray | None:
+    """Wear depths (n_contact,), m, of the shown point at its last count; None where nothing is worn."""
+    depth = last_depth(result, result.shown_point()) if tells_depth(result) else np.zeros(1)
+    return depth if len(result.cycles) > 1 and float(depth.max()) > NO_DEPTH else None
+
+
+def _largest(result: Result, values: FloatArray, scale: Scale) -> str:
+    return f"{scale.show(float(np.nanmax(values)))} at pair {result.dataset['contact'].values[np.nanargmax(values)]}"
+
+
+def draw_depths(result: Result) -> Drawn:
+    """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
+    if not tells_depth(result):
+        return result.lacks("wear_depth")
+    if _worn_depth(result) is None or result.dataset.sizes["contact"] == 1:
+        return None
+    shown, course = result.shown_point(), result.course_axis
+    choice = choose(result, [course] if course else [], _MOST_SERIES)
+    series = {label: last_depth(result, {**shown, **point}) for point, label in choice}
+    series = {label: depth for label, depth in series.items() if not np.isnan(depth).all()}
+    scale = scale_for("m", *series.values())
+    figure, panel = _draw_stems(result, {label: scale(depth) for label, depth in series.items()})
+    panel.set_ylabel(scale.label(f"wear depth {result.when(result.last_kept(shown))}"))
+    if "contact_surface" in result.dataset.coords:
+        _name_surfaces(panel, result)
+    deepest = [labelled(_largest(result, depth, scale), label) for label, depth in series.items()]
+    return figure, f"Deepest: {', '.join(deepest)}", choice.sentence
+
+
+def _draw_stems(result: Result, series: Mapping[str, FloatArray]) -> tuple[Figure, Axes]:
+    """Values per pair (n_contact,), as shown, each on a line from zero."""
+    (figure, panel), pairs = plot.new_panel(3.3), result.dataset["contact"].values
+    apart = 0.8 / len(series) if len(pairs) <= _MANY_PAIRS else 0.0
+    for number, (label, values) in enumerate(series.items()):
+        at = pairs + (number - 0.5 * (len(series) - 1)) * apart
+        style = plot.line_style(number) | {"linestyle": "none", "markevery": 1}
+        panel.vlines(at, 0.0, values, color=style["color"], linewidth=1.2)
+        panel.plot(at, values, label=label or "computed", **style)
+    plot.set_from_zero(panel, max(float(np.nanmax(values, initial=0.0)) for values in series.values()))
+    panel.set(xlim=(pairs[0] - 0.8, pairs[-1] + 0.8), xlabel="contact pair")
+    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+    panel.grid(visible=False, axis="x")
+    return figure, panel
+
+
+def _name_surfaces(panel: Axes, result: Result) -> None:
+    """Name the surfaces above their pairs, with a line between them; nothing where pairs of one are not in a row."""
+    pairs, labels = result.dataset["contact"].values, result.dataset["contact_surface"].values.astype(str)
+    starts = np.flatnonzero(np.r_[True, labels[1:] != labels[:-1]])
+    if len(starts) == len(np.unique(labels)) > 1:
+        for start, end in zip(starts, np.r_[starts[1:], len(labels)], strict=True):
+            panel.axvline(pairs[start] - 0.5, color="0.8", linewidth=0.8, zorder=0)
+            # a name that is wider than its figure would leave its panel no room
+            name, middle = labels[start][:_LONGEST_NAME], 0.5 * (pairs[start] + pairs[end - 1])
+            panel.text(middle, 1.01, name, transform=panel.get_xaxis_transform(), ha="center", va="bottom")
+
+
+def draw_pressure(result: Result) -> Drawn:
+    """Mean pressure on each flank at the first and the last cycle count (Figs. 10, 11)."""
+    shown, scar = result.shown_point(), find_scar(result)
+    if scar is None and result.dataset.sizes["contact"] == 1:
+        return None
+    kept = sorted({0, result.last_kept(shown)})
+    fields = {result.cycle_label(cycle): result.at("mean_pressure", shown, cycle).values for cycle in kept}
+    scale = scale_for("Pa", *fields.values())
+    flanks, said = most_of_flanks(result, *fields.values())
+    if scar is not None:
+        figure, panel, said = _draw_scar(scar, fields, scale, "mean pressure")
+        plot.set_from_zero(panel)
+    elif all(flank.seen is None for flank in flanks):
+        figure, panel = _draw_stems(result, {label: scale(values) for label, values in fields.items()})
+        panel.set_ylabel(scale.label("mean pressure"))
+    else:
+        figure = draw_fields(flanks, fields, scale, "mean pressure")
+    largest = [labelled(_largest(result, values, scale), label) for label, values in fields.items()]
+    return figure, f"Mean over a period. Largest: {', '.join(largest)}", said
+
+
+def draw_profile(result: Result) -> Drawn:
+    """Wear depth on each flank at the last cycle count: map, and lines along it (Fig. 12); or the scar."""
+    depth, scar = _worn_depth(result), find_scar(result)
+    if depth is None:
+        return None
+    if scar is not None:
+        return _draw_scar_depth(result, scar, depth)
+    # without positions there is nothing that the wear depth per pair does not show
+    if any(flank.seen is None for flank in find_flanks(result)):
+        return None
+    last, scale = result.last_kept(result.shown_point()), scale_for("m", depth)
+    flanks, said = most_of_flanks(result, depth)
+    on_grid = all(flank.cells is not None for flank in flanks)
+    if on_grid:
+        figure = _draw_profiles(flanks, depth, scale)
+    else:
+        figure = draw_fields(flanks, {result.cycle_label(last): depth}, scale, "wear depth")
+    return figure, f"{result.when(last, 'after').capitalize()}. Deepest: {_largest(result, depth, scale)}", said
+
+
+def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -> Figure:
+    """A map of each flank, and under it the depth along its first direction, downwards as the surface sinks."""
+    inches = map_height(flanks)
+    figure, panels = plot.new_panels(2, len(flanks), inches + 3.3, sharex="col", height_ratios=(inches, 2.0))
+    deepest = scale(float(np.nanmax(depth))).item() or 1.0
+    norm = Normalize(0.0, deepest)
+    rows = [flank.cells.y for flank in flanks if flank.cells is not None]
+    same = all(len(y) == len(rows[0]) and np.allclose(y, rows[0]) for y in rows)
+    for (above, panel), flank in zip(panels.T, flanks, strict=True):
+        values, cells = scale(depth[flank.pairs]), flank.cells
+        assert cells is not None
+        draw_field(above, flank, values, norm)
+        above.set_title(flank.surface)
+        n_rows, own = len(cells.y), "" if same else f"{flank.surface}: "
+        for number, row in enumerate(np.unique(np.linspace(0, n_rows - 1, min(n_rows, _MOST_PROFILES)).round())):
+            label = f"{own}{1e3 * cells.y[int(row)]:.3g} mm {flank.directions[1]}"
+            panel.plot(1e3 * cells.x, values[cells.pair[int(row)]], label=label, **plot.line_style(number))
+        panel.set_ylim(1.06 * deepest, -0.04 * deepest)
+        panel.set(xlabel=f"{flank.directions[0]} (mm)", ylabel=scale.label("wear depth"))
+    plot.label_outer(panels)
+    plot.add_colour_bar(figure, panels, norm, scale.label("wear depth"), fraction=0.05)
+    return figure
+
+
+def _draw_scar(
+    scar: Scar, fields: Mapping[str, FloatArray], scale: Scale, text: str, error: FloatArray | None = None
+) -> tuple[Figure, Axes, str]:
+    """Fields (n_contact,) over x, the last with its errors, with the panel and a sentence; of a sphere its map, too."""
+    along, last = scale_for("m", scar.x), list(fields.values())[-1]
+    figure, panels = plot.new_panels(1, 2 if scar.width else 1, 3.4)
+    panel, pairs = panels[0, -1], scar.pairs[scar.line]
+    at = along(scar.x[scar.line])
+    for number, (label, values) in enumerate(fields.items()):
+        wrong = scale(error[pairs]) if error is not None and values is last else None
+        plot.add_line(panel, at, scale(values[pairs]), wrong, band=True, label=label, **plot.line_style(number))
+    panel.set_xlim(1.02 * float(np.min(at)), 1.02 * float(np.max(at)))
+    panel.set(xlabel=along.label("x"), ylabel=scale.label(text))
+    if not scar.width:
+        return figure, panel, "The contact is symmetric: one half is computed, the whole is drawn"
+    # square patches at their places; nothing where there is none
+    columns, rows = (np.round(each / scar.width - 0.5).astype(int) for each in (scar.x, scar.y))
+    low = int(min(columns.min(), rows.min()))
+    grid = np.full((-2 * low, -2 * low), np.nan)
+    grid[rows - low, columns - low] = scale(last)[scar.pairs]
+    edges, norm = along(np.arange(low, -low + 1) * scar.width), Normalize(0.0, scale(float(np.nanmax(last))).item())
+    panels[0, 0].grid(visible=False)
+    panels[0, 0].pcolormesh(edges, edges, np.ma.masked_invalid(grid), norm=norm)
+    panels[0, 0].set(xlabel=along.label("x"), ylabel=along.label("y"), aspect="equal")
+    plot.add_colour_bar(figure, panels[0, :1], norm, scale.label(text), fraction=0.05)
+    return figure, panel, "The contact is symmetric: a quarter is computed, the whole is drawn, here along x"
+
+
+def _draw_scar_depth(result: Result, scar: Scar, after: FloatArray) -> Drawn:
+    """Depth over x before and after wear, downwards as the surface sinks, with a measured one where there is one."""
+    shown, measured, error = result.shown_point(), result.measured, None
+    last = result.last_kept(shown)
+    scale = scale_for("m", after, *([measured.depth] if measured else []))
+    if result.has("wear_depth_error"):
+        error = np.asarray(result.at("wear_depth_error", shown, last).values, dtype=float)
+    fields = {"before": np.nan_to_num(depths(result, shown)[0]), f"after {result.cycle_label(last)}": after}
+    figure, panel, said = _draw_scar(scar, fields, scale, "depth", error)
+    if measured is not None:
+        along = scale_for("m", scar.x)
+        # a measured profile may have piled-up edges above the surface
+        panel.plot(along(measured.x), scale(measured.depth), color=COLOURS[2], linewidth=1.2, label="measured")
+    panel.invert_yaxis()
+    deepest = f"{result.when(last, 'after').capitalize()}. Deepest: {scale.show(float(np.nanmax(after)))}"
+    return figure, deepest, said, f"Measured: {measured.name}" if measured else ""
+
+
+def draw_numbers(result: Result) -> Drawn:
+    """The number of each pair where it lies on its surface (Fig. 3b); nothing without positions, or with many pairs."""
+    flanks, names = find_flanks(result), result.dataset["contact"].values
+    placed = all(flank.seen is not None for flank in flanks)
+    if not placed or len(names) == 1 or len(flanks) > _MOST_NUMBERED or len(names) > _MOST_NUMBERS * len(flanks):
+        return None
+    height = 0.6 + 6.0 * min(1.2, max(_SLENDER, max(flank.height_over_width for flank in flanks)))
+    figure, panels = plot.new_panels(len(flanks), 1, min(height * len(flanks), 8.0))
+    for panel, flank in zip(panels[:, 0], flanks, strict=True):
+        # the colour says nothing: cells without one
+        plain, own = ListedColormap(["#ffffff00"]), names[flank.pairs].astype(float)
+        draw_field(panel, flank, own, Normalize(0.0, max(own.max(), 1.0)), cmap=plain, edgecolors="0.6")
+        places = np.asarray(flank.seen)
+        if flank.cells is not None:
+            middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (flank.cells.x_edges, flank.cells.y_edges)]
+            places[flank.cells.pair] = np.stack(np.meshgrid(*middles), axis=-1)
+        for name, (x, y) in zip(own, 1e3 * places, strict=True):
+            panel.text(x, y, f"{name:.0f}", ha="center", va="center", fontsize=8, clip_on=False)
+        panel.set_title(flank.surface)
+    plot.label_outer(panels)
+    return figure, f"As along the dimension contact: {len(names)} pairs", flanks[0].origin
