@@ -93,6 +93,7 @@ class TaskProgress(Office):
         self.tasks = [*self._sweeps, *(task for task in completion.plan.results if not completion.is_finished(task))]
         self._n_faults: Counter[str] = Counter()
         self._n_given: Counter[str] = Counter()
+        self._words: dict[str, str] = {}  # where a sweep is
         self._shares: dict[str, tuple[float, float]] = {}  # what of a task is done, and when it said so, s
         self._suspects: list[Task] = []  # they wait for the one that is under way
         self._tried = ""
@@ -129,7 +130,9 @@ class TaskProgress(Office):
 
     def keep(self, task: Task, progress: object) -> None:
         """Takes the progress of a task as `Keep` does."""
-        if isinstance(progress, float):
+        if isinstance(progress, str):
+            self._words[task.key] = progress
+        elif isinstance(progress, float):
             self._shares[task.key] = progress, time.monotonic()
         else:
             self._completion.keep(task, progress)
@@ -200,7 +203,9 @@ class TaskProgress(Office):
     def _describe(self, task: Task, n_left: int) -> str:
         """A running task in words."""
         what = task.describe(task.places[task.n_results - n_left])
-        return f"{what} ({100.0 * self._shares[task.key][0]:.0f} %)" if task.key in self._shares else what
+        if task.key in self._shares:
+            return f"{what} ({100.0 * self._shares[task.key][0]:.0f} %)"
+        return f"{what} ({self._words[task.key]})" if task.key in self._words else what
 
 
 class StudyRun(TaskProgress):

@@ -55,7 +55,7 @@ class _Delivery:
 
 @dataclass(frozen=True)
 class _Progress:
-    """Progress of a task: data to continue from, or the share that is done."""
+    """Progress of a task: data to continue from, words, or the share that is done."""
 
     number: int
     progress: object

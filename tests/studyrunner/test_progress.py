@@ -166,3 +166,13 @@ def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks):
     assert found.longest_way == pytest.approx(8.0 + 10.0)
     shortest = max(found.longest_way, found.work / n_ranks)
     assert found.makespan == pytest.approx(shortest)
+
+
+def test_a_sweep_says_where_it_is():
+    """What a sweep sends on its way, by `Keep`, stands behind its name."""
+    progress = TaskProgress(MemoryIndex(plan_of()))
+    (sweep, *_) = progress.begin()
+    progress.keep(sweep, "at 211.5 Hz, 3 of 48 pairs slip or open")
+    assert (
+        progress.look([(sweep, sweep.n_results, 1.0)]).running[0].endswith("(at 211.5 Hz, 3 of 48 pairs slip or open)")
+    )
