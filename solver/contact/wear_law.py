@@ -1,6 +1,6 @@
 """Wear laws. Each law is Archard's law with another work in place of the slip work.
 
-The wear depth of a pair grows in a cycle by, Eqs. (7), (21),
+The wear depth of a pair grows in a cycle by, Eqs. (2), (7), (21),
 
     g = k_w / alpha * X,      X = c f(p, W) max(S - q alpha, 0)
 
