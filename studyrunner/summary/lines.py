@@ -183,6 +183,6 @@ def _failure(failure: Failure, n_points: int) -> str:
     if len(reason) > _LONGEST:
         reason = f"{reason[:_LONGEST].rsplit(' ', 1)[0]} ..."
     first = ": ".join(filter(None, (failure.where, reason)))
-    said.append(f"First: {first}" if failure.where else reason)
+    said.append(f"First: {first}" if failure.where else reason[:1].upper() + reason[1:])
     text = ". ".join(each.rstrip(".") if each != said[-1] else each for each in said if each)
     return f"{failure.n_points} of {count(n_points, 'point')}: {text}" if n_points > 1 else text
