@@ -54,6 +54,7 @@ class Certainty:
         if self.n_points == 1:
             return f"the {self.of} is not known: the point was not computed to the end"
         text = f"{self.n_known} of {count(self.n_points, self.of)} are known within {aim}"
+        text += f", {self.n_less} less well" if self.n_short and self.n_less else ""
         text += f", {self.n_short} not computed to the end" if self.n_short else ""
         text += f", {self.n_unknown} without an estimate" if self.n_unknown else ""
         if not self.worst > 0.0:

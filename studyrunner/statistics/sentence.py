@@ -20,6 +20,7 @@ def describe_volumes(point: xr.Dataset) -> str:
     probabilities, n_without = point["quantile"].values, int(point["n_without_value"])
     share = 100.0 * (probabilities[-1] - probabilities[0])
     text = f"{share:.4g} % of {int(point['n_samples'])} samples wear {_range(ends[0, 0], ends[-1, 1])} mm3"
+    (n_lower, n_upper), (lower, upper) = point["group_size"].values.tolist(), point["group_gap"].values * _MM3
     if 0.5 in probabilities:
         middle = ends[probabilities == 0.5][0]
         moved = point["worn_volume_quantile_error"].values[probabilities == 0.5][0] * _MM3
@@ -29,12 +30,13 @@ def describe_volumes(point: xr.Dataset) -> str:
         error = "not known"
         if finite.any() and np.isfinite(by).all():
             error = show_percent(float(by.sum() / middle[finite].sum()) if by.any() else 0.0)
-        text += f", median {_range(*middle)} mm3 (numerical error {error})"
+        between = "between two groups, " if n_upper and lower < middle.mean() < upper else ""
+        text += f", median {_range(*middle)} mm3 ({between}numerical error {error})"
     text += f"; {n_without} have no volume that can be trusted" if n_without else ""
-    n_lower, n_upper = point["group_size"].values.tolist()
     if n_upper:
-        lower, upper = point["group_gap"].values * _MM3
+        rest = int(point["n_samples"]) - n_without - n_lower - n_upper
         text += f"; two groups, {n_lower} samples up to {lower:.3g} mm3 and {n_upper} from {upper:.3g} mm3"
+        text += f" ({rest} known too badly to tell)" if rest > 0 else ""
         contact = int(point["deciding_contact"])
         text += "" if contact < 0 else f", which differ in the wear depth of contact pair {contact}"
     return text
@@ -89,7 +91,8 @@ def describe_ranking(point: xr.Dataset) -> str:
         too_few = n_samples < FEWEST * (2 if name == "first_index" else 1)
         return f"{n_samples} samples are too few to say which input decides" if too_few else ""
     without = [word for word, row in zip(words, values, strict=True) if np.isnan(row).all()]
-    more = f"; {' and '.join(without)} {'is' if len(without) == 1 else 'are'} not ranked" if without else ""
+    inputs = "input" if len(without) == 1 else "inputs"
+    more = f"; {inputs} not ranked: {', '.join(without)}" if without else ""
     most = leading_input(point)
     low, high = intervals[most]
     if name == "first_index":

@@ -100,7 +100,7 @@ def _deepest(deepest: Deepest, where: str) -> str:
     if deepest.edge_share > max(_SHARE, deepest.edge_area):
         shown = "all" if deepest.edge_share > 0.995 else show_percent(deepest.edge_share)
         what = f"the wear of {deepest.surface}" if deepest.surface else "the wear"
-        text += f"; {shown} of {what} is in edge pairs: correct if the contact ends there, otherwise extend it"
+        text += f"; {shown} of {what} is in edge pairs: valid if the real contact ends there, else extend the model"
     return text
 
 
@@ -132,8 +132,10 @@ def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
     if summary.n_points > 1:
         case = " in that sample" if summary.samples else " in this case"
         at = case if worn else f", most at {vibration.where}"
-    text = f"{vibration.of}{at}: {first}"
+    text = f"{vibration.of}{at}: amplitude {first}"
     text += f" when new, {last} when worn" if worn else ""
+    start_of, end_of = vibration.amplitude
+    text += " (its resonance may lie elsewhere)" if worn and end_of.value < start_of.value else ""
     text += " (errors not known)" if without_error else ""
     if math.isfinite(start):
         text += f"; the new joint responds most at {start:.6g} Hz ({_show(vibration.peak, 'm')})"
@@ -161,12 +163,12 @@ def _mode(mode: ModeRange) -> str:
     if not mode.n_found:
         return f"found at none of {count(mode.n_points, 'point')}"
     frequency, damping = (
-        " to ".join(dict.fromkeys(f"{factor * each:.{digits}g}" for each in ends))
-        for ends, factor, digits in ((mode.frequency, 1.0, 6), (mode.damping, 100.0, 3))
+        " to ".join(dict.fromkeys(f"{factor * each:.{digits}g}{unit}" for each in ends))
+        for ends, factor, digits, unit in ((mode.frequency, 1.0, 6, ""), (mode.damping, 100.0, 3, " %"))
     )
     found = "" if mode.n_found == mode.n_points else f", found at {mode.n_found} of {mode.n_points} points"
     over = f" over {mode.over}" if mode.over else ""
-    return f"natural frequency {frequency} Hz, damping ratio {damping} %{over}{found}"
+    return f"natural frequency {frequency} Hz, damping ratio {damping}{over}{found}"
 
 
 def _mesh(summary: Summary) -> str:

@@ -100,7 +100,7 @@ def test_every_statistic_is_labelled_and_stands_over_the_other_dimensions():
     # the mean over the pairs would say nothing of what their own draws decide
     assert correlation.sel(input="gap").isnull().all()
     text = r"90 % of 128 samples wear 0.256 to 0.969 mm3, median 0.506 mm3 \(numerical error 1 %\); wear coefficient .*"
-    assert re.fullmatch(f"{text}decides most .*; gap is not ranked", said(found))
+    assert re.fullmatch(f"{text}decides most .*; input not ranked: gap", said(found))
     assert "numerical error not known" in said(worn_volume_statistics(dataset.drop_vars("worn_volume_error")))
 
 
