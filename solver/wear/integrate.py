@@ -204,7 +204,7 @@ class Integrations:
         resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in guide.resolutions)
         # a short history may consist of its first steps, which do not depend on rtol
         steps = Adaptive(RTOL_RATIO * self._case.settings.rtol, 2.0 if asked.ends_at_last else 1.0)
-        line = WearLine(work, steps, end if asked.ends_at_last else math.inf)
+        line = WearLine(work, steps, end if asked.ends_at_last else math.inf, bounded=False)
         check = partial(report_only, resolutions=resolutions, with_resonance=asked.shifts)
         first = partial(begin_reference, work, guide.step_limit)
         course = Course(work.area, smooth=True, counts=compared)

@@ -128,11 +128,16 @@ class Step:
 
 @dataclass(frozen=True)
 class WearLine:
-    """A joint along its cycles: the line of `take_step`. end: cycle count beyond which no step goes; inf for none."""
+    """A joint along its cycles: the line of `take_step`.
+
+    end: cycle count beyond which no step goes; inf for none.
+    bounded: whether a step or a jump that moves many times the normal forces is a failure.
+    """
 
     work: WearingJoint
     steps: Steps
     end: float
+    bounded: bool = True
 
     def begin(self, state: WearState) -> WearState:
         """The first state with the length of its step, if that is adaptive; at least two steps lead to `end`."""
@@ -220,6 +225,8 @@ class WearLine:
 
     def _refused(self, state: WearState, wear_depth: FloatArray, length: float) -> Failure | None:
         """Why a step or a jump to depths (n_contact,), m, after so many cycles is no result; None if it is."""
+        if not self.bounded:
+            return None
         said = too_long(self.work.at(state), state.point.evaluation, wear_depth, state.cycle, length)
         return None if said is None else Failure(Outcome.STEP_TOO_LONG, said)
 
