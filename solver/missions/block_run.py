@@ -182,7 +182,7 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     volume, slope = float(depth[-1] @ work.area), None
     if case.with_slope:
         pairs = case.depth + depth[-1] > 0.0
-        rates = rate_slope(work.at(state), at, work.gain(1.0), work.wearing, pairs, work.run)
+        rates = rate_slope(work.joint_of(state), at, work.gain(1.0), work.wearing, pairs, work.run)
         # the flow of the linearised wear rate
         slope = np.asarray(scipy.linalg.expm(cycles * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
@@ -305,7 +305,7 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
     assert before is not None
     work, begins = case.begin(carried)
     at = begins.point.evaluation
-    balance = Balance(work.at(begins), at.history, at.wear_depth)
+    balance = Balance(work.joint_of(begins), at.history, at.wear_depth)
     found = run.solve(balance, at.predicted_h)
     if not found.converged:
         return replace(carried, state=None, outcome=Outcome.BRANCH_LOST)

@@ -111,7 +111,7 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
         if not state.density.any():
             return np.zeros((pairs.size, pairs.size))
         work, begun = case.begin(state.start)
-        slope = rate_slope(work.at(begun), begun.point.evaluation, work.gain(1.0), work.wearing, pairs, work.run)
+        slope = rate_slope(work.joint_of(begun), begun.point.evaluation, work.gain(1.0), work.wearing, pairs, work.run)
         return np.asarray(slope * state.frequency / passage.rate)
 
     growth, slope = in_order(states, map(slope_of, states))
@@ -248,7 +248,7 @@ def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Fa
         if computing_time() > case.deadline:
             return Failure(Outcome.TIME_LIMIT)
         work, begun = case.begin(start)
-        at, joint, frequency = begun.point.evaluation, work.at(begun), float(frequencies[index])
+        at, joint, frequency = begun.point.evaluation, work.joint_of(begun), float(frequencies[index])
         density = work.rate(at) * frequency / passage.rate
         response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, at)))

@@ -121,14 +121,13 @@ class JacobianSolver:
 
     _factor: Factor | None = None
 
-    def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = FORCING) -> FloatArray:
-        """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
-        return np.asarray(self.solve_all(tangent, [right], rtol)[0])
-
-    def solve_all(
+    def solve(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
     ) -> FloatArray:
-        """As `solve` for k right-hand sides: steps (k, n_rel, m); a small system is factorised once."""
+        """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`.
+
+        A small system is factorised once for all k right-hand sides.
+        """
         rows, rest = tangent.active_rows, tangent.passive_rows
         steps = np.zeros((len(rights), *rights[0].shape))
         if 0 < rows.size * steps.shape[2] <= DENSE_UNKNOWNS:

@@ -152,7 +152,7 @@ def bordered_step(
     tangent = here.balance.linearise(here.at)
     slopes, by_values = problem.by_values(here)
     rights = np.array([-here.at.residual, *(-slope for slope in slopes)])
-    steps = solver.solve_all(tangent, rights, rtol)
+    steps = solver.solve(tangent, rights, rtol)
     own, *others = (problem.by_step(here, tangent, step) for step in steps)
     reduced = by_values + np.stack(others, axis=1)
     if not np.isfinite(reduced).all():
@@ -162,7 +162,7 @@ def bordered_step(
     # the steps may cancel each other, not so their errors
     left = right - tangent.apply(step)
     if np.linalg.norm(left) > rtol * np.linalg.norm(here.at.residual):
-        step = step + solver.solve(tangent, left)
+        step = step + solver.solve(tangent, [left])[0]
     return problem.fraction(here, step, change) * np.concatenate([step.ravel(), change]), reduced
 
 
@@ -276,7 +276,7 @@ class Run:
         self, balance: Balance, at: Evaluation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
     ) -> FloatArray:
         """Steps (k, n_rel, m), N, for k right-hand sides, as `step`."""
-        return self.solver.solve_all(balance.linearise(at), rights, rtol)
+        return self.solver.solve(balance.linearise(at), rights, rtol)
 
     def is_stable(self, balance: Balance, at: Evaluation) -> bool:
         """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`).

@@ -59,7 +59,7 @@ def full_check(
         """Report with certificate; its estimated errors come from the last choice of the harmonics."""
         if isinstance(chosen, Failure):
             return chosen
-        joint, at, estimate = work.at(chosen), chosen.point.evaluation, chosen.choice.estimate
+        joint, at, estimate = work.joint_of(chosen), chosen.point.evaluation, chosen.choice.estimate
         certificate = replace(
             certify(joint, at),
             response_error=estimate.response,
@@ -85,10 +85,10 @@ def full_check(
         if not estimate.largest < worst.largest:
             worst = UNKNOWN if unknown else estimate
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
-    if state.hold is not None and creeps(work.at(state), state.hold, at):
+    if state.hold is not None and creeps(work.joint_of(state), state.hold, at):
         return Failure(Outcome.ADRIFT)
     if _vibrates_otherwise(state):
-        if (unstable := find_instability(work.case, work.at(state), at, work.run, False)) is not None:
+        if (unstable := find_instability(work.case, work.joint_of(state), at, work.run, False)) is not None:
             return unstable
         state = replace(state, judged_h=at.predicted_h)
     return state, reported
@@ -103,12 +103,14 @@ def report_only(
     """
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
-        work.at(state)
+        work.joint_of(state)
         joint = work.case.at(wanted).joint(state.omega, work.excitation_amplitude)
         point = work.run.move(work.case, joint, state.point)
         moved = point and work.at_followed(replace(state, point=point, resolution=wanted))
         state = moved if isinstance(moved, WearState) else state
-    return state, report_state(work.at(state), state.point.evaluation, NOT_CERTIFIED, with_resonance=with_resonance)
+    return state, report_state(
+        work.joint_of(state), state.point.evaluation, NOT_CERTIFIED, with_resonance=with_resonance
+    )
 
 
 def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
@@ -135,7 +137,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
 
 def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    work.at(state)
+    work.joint_of(state)
     refined = refine(work.case, state.omega, work.excitation_amplitude, state.point, work.run)
     resolution = refined.case.resolution
     choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
@@ -154,7 +156,7 @@ def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
     if state.cycle == 0.0 and work.follow is None and not _vibrates_otherwise(state):
         return None
-    joint, at = work.at(state), state.point.evaluation
+    joint, at = work.joint_of(state), state.point.evaluation
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, at) is None and not work.is_stable(joint, at):
         return Failure(Outcome.UNSTABLE)
@@ -187,7 +189,7 @@ def is_steady(work: WearingJoint, state: WearState, course: Course) -> bool:
 
     Every pair that carries load slips, and the wear rate is constant although the wear is deep enough to act back.
     """
-    joint, at = work.at(state), state.point.evaluation
+    joint, at = work.joint_of(state), state.point.evaluation
     normal = at.force_h[:, 0, 0]
     pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))
     if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():

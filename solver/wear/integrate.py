@@ -287,7 +287,7 @@ def begin_reference(work: WearingJoint, step_limit: float) -> WearState:
     if fine is None or reference is None:
         return begun
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
-    balance, first = Balance(work.at(begun), history, begun.depth), begun.point.evaluation.predicted_h
+    balance, first = Balance(work.joint_of(begun), history, begun.depth), begun.point.evaluation.predicted_h
     point = work.run.state(balance, first, most=NEAR_ITERATIONS)
     return begun if point is None else work.with_rates(replace(begun, point=point))
 

@@ -51,7 +51,7 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: boo
     drifts: whether the joint is known to slide as a whole, although some pairs still stick.
     """
     at, before = state.point.evaluation, state.depth
-    hold = None if state.hold is not None else free_slide(work.at(state), at, drifts=drifts)
+    hold = None if state.hold is not None else free_slide(work.joint_of(state), at, drifts=drifts)
     if hold is None:
         return None
     joint = work.case.held(hold).joint(state.omega, work.excitation_amplitude)
@@ -74,7 +74,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    joint, last = work.at(state), state.point
+    joint, last = work.joint_of(state), state.point
     found = relax_to_periodic(work.case, joint, worn, last, joint, work.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)

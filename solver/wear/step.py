@@ -15,12 +15,12 @@
 
   The first step, also behind a jump, is an implicit Euler step. Its error is the difference to the trapezoidal rule.
 
-The wear of other pairs changes the force of a pair, which slides a little in each cycle at its friction limit, to a
-place that depends on the way. A balance alone takes one slide for the whole way, an error of first order in the step
-(dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the way in parts 0.4 %). So the law is
-applied at parts of a straight line from the predicted force towards the extrapolated one, at each until the period
-repeats. The last part is left to the balance: with the whole line, pairs may keep the history of a way that the joint
-did not go (48 pairs, 211.5 Hz: 1.667 mm3, another branch, for 2.284 mm3; 2.261 by time integration).
+The wear of other pairs changes the force of a pair, which slides a little in each cycle at its friction limit.
+Where it ends depends on the path of the force. A balance alone takes one slide for the whole path, an error of first
+order in the step (dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the path divided 0.4 %). So
+the law is applied at points of a straight line from the predicted force towards the extrapolated one, at each until the
+period repeats. The last part is left to the balance: with the whole line, pairs may keep the history of a path that the
+joint did not take (48 pairs, 211.5 Hz: 1.667 mm3, another branch, for 2.284 mm3; 2.261 by time integration).
 
 Where the shortest step is not found, `WearLine.rescue` tries in this order, each once: an implicit Euler step, a longer
 step across corners of the branch (both in adaptive histories only), and a jump to a state behind the end of the branch.
@@ -227,35 +227,35 @@ class WearLine:
         """Why a step or a jump to depths (n_contact,), m, after so many cycles is no result; None if it is."""
         if not self.bounded:
             return None
-        said = too_long(self.work.at(state), state.point.evaluation, wear_depth, state.cycle, length)
+        said = too_long(self.work.joint_of(state), state.point.evaluation, wear_depth, state.cycle, length)
         return None if said is None else Failure(Outcome.STEP_TOO_LONG, said)
 
 
 def attempt_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | None:
     """A step of `length` cycles by one balance; None where its end is not found."""
     before, depth, rate = state.point.evaluation, state.depth, work.rate(state.point.evaluation)
-    base, implicit = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
+    worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
     w, grown = 0.0, np.zeros_like(depth)
     if scheme == "adaptive" and state.previous is not None:
         w, grown = length / state.previous.length, depth - state.previous.depth
-        base = depth + w**2 / (1.0 + 2.0 * w) * grown
-        implicit = (1.0 + w) / (1.0 + 2.0 * w) * length
-    balance = Balance(work.at(state), state.point.history, base, work.gain(implicit), work.wearing)
-    start, balance = predicted(work, state, balance, length)
+        worn_before = depth + w**2 / (1.0 + 2.0 * w) * grown
+        implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
+    balance = Balance(work.joint_of(state), state.point.history, worn_before, work.gain(implicit_cycles), work.wearing)
+    start, balance = first_guess(work, state, balance, length)
     end = work.solve(balance, start, state)
     if end is None:
         return None
     error = 0.5 * length * (work.rate(end.point.evaluation) - rate)
     if w > 0.0:
-        explicit = depth + (1.0 + w) * length * rate - w**2 * grown
+        explicit_depth = depth + (1.0 + w) * length * rate - w**2 * grown
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
-        error = own / (own + other) * (end.depth - explicit)
+        error = own / (own + other) * (end.depth - explicit_depth)
     last = LastStep(length, depth, before.predicted_h, state.omega, state.resolution)
     end = work.with_rates(replace(end, cycle=state.cycle + length, previous=last))
     return Step(end, float(np.abs(error) @ work.area))
 
 
-def predicted(work: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[FloatArray, Balance]:
+def first_guess(work: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[FloatArray, Balance]:
     """First predicted force of a step (n_rel, 2H+1), N, and the balance with its first frequency and its history.
 
     Extrapolated from the last step; those of the state where this residual is lower.
@@ -286,7 +286,7 @@ def history_along(joint: Joint, state: WearState, ahead: Marched) -> FloatArray:
 def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | None:
     """An Euler step to a stable state, or None. A followed resonance may be unstable at constant frequency."""
     step = attempt_step(work, state, length, scheme)
-    if step is None or work.follow is not None or work.is_stable(work.at(state), step.state.point.evaluation):
+    if step is None or work.follow is not None or work.is_stable(work.joint_of(state), step.state.point.evaluation):
         return step
     return None
 

@@ -158,7 +158,7 @@ class WearingJoint:
             self._joint = self.case.joint(omega, self.excitation_amplitude)
         return self._joint
 
-    def at(self, state: WearState) -> Joint:
+    def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
         return self.joint(state.resolution, state.hold, state.omega)
 
@@ -213,14 +213,14 @@ class WearingJoint:
         largest = np.maximum(state.largest_rates, np.abs(rates))
         state = replace(state, rates=rates, largest_rates=largest, most_rate=max(state.most_rate, most))
         if np.isnan(state.step_limit) and state.wears:
-            limit = explicit_step_limit(self.at(state), at, self.gain(1.0), self.wearing, self.run)
+            limit = explicit_step_limit(self.joint_of(state), at, self.gain(1.0), self.wearing, self.run)
             state = replace(state, step_limit=limit)
         return state
 
     def solve(
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS
     ) -> WearState | None:
-        """The state before with the solution of a balance, whose frequency is the first one that follows; or None.
+        """The state before with the solution of a balance, or None. A followed frequency starts at that of the balance.
 
         start (n_rel, 2H+1): first predicted force, N. most: Newton iterations.
         """
@@ -247,7 +247,7 @@ class WearingJoint:
         if self.follow is None:
             return state
         at = state.point.evaluation
-        balance = Balance(self.at(state), at.history, at.wear_depth)
+        balance = Balance(self.joint_of(state), at.history, at.wear_depth)
         found = self.solve(balance, at.predicted_h, state, MOST_ITERATIONS)
         return found or self.lost(state, Failure(Outcome.RESONANCE_LOST))
 

@@ -52,7 +52,7 @@ def iteration() -> None:
 
     def once(solver: JacobianSolver) -> None:
         at = balance.evaluate(predicted)
-        solver.solve(balance.linearise(at), -at.residual + 1e-3)
+        solver.solve(balance.linearise(at), [-at.residual + 1e-3])
 
     for name, solve in (("kept", lambda: once(kept)), ("own", lambda: once(JacobianSolver()))):
         spent = float(np.median([measure(solve).seconds for _ in range(8)][1:]))
