@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
+from studyrunner.percent import show_percent
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
 from studyrunner.report.panels import FloatArray
@@ -132,9 +133,11 @@ def draw_final(result: Result) -> Drawn:
     reached = [np.where(np.isnan(field).all(axis=1), np.nan, np.nan_to_num(field).max(axis=1)) for field in fields]
     largest = [float(np.nanmax(each, initial=0.0)) for each in reached]
     scale, (figure, panel) = scale_for("m3", largest), plot.new_panel(3.4)
-    top = highest = scale(max(largest)).item()
+    top, errors = scale(max(largest)).item(), []
+    highest = top
     for number, (point, field) in enumerate(zip(choice.points, fields, strict=True)):
         error = course.read(result, "error_estimate", point) if result.has("error_estimate") else np.zeros(len(field))
+        errors.append(error)
         style = course.line_style(number) | {"label": choice.labels[number] or "computed"}
         reach = plot.add_line(panel, course.values, scale(field[:, -1]), scale(error * field[:, -1]), **style)
         highest = max(highest, min(reach, 2.0 * top))
@@ -144,10 +147,12 @@ def draw_final(result: Result) -> Drawn:
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume {'at the end' if result.has('cycle_count') else result.when(-1)}"))
     number = int(np.argmax(largest))
-    at_largest = course.at(result, int(np.nanargmax(reached[number])))
+    place = int(np.nanargmax(reached[number]))
+    known = f" ± {show_percent(errors[number][place])}" if errors[number][place] > 0.0 else ""
+    text = f"Largest: {scale.show(largest[number], 4)}{known} at {course.at(result, place)}"
     return (
         figure,
-        labelled(f"Largest: {scale.show(largest[number], 4)} at {at_largest}", choice.labels[number]),
+        labelled(text, choice.labels[number]),
         crosses,
         choice.sentence,
     )
