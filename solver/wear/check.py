@@ -103,6 +103,7 @@ def report_only(
     """
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
+        # sets `work.case` to that of the state, with its harmonics and its hold
         work.joint_of(state)
         joint = work.case.at(wanted).joint(state.omega, work.excitation_amplitude)
         point = work.run.move(work.case, joint, state.point)
