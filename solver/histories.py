@@ -89,10 +89,10 @@ def march_wear(
         history count from there.
     between
         Range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance that the
-        sweep meets in the range. "resonance" is phase resonance: in the first harmonic, the vibration is in quadrature
-        with the excitation, `F^H x` has no real part. "peak" is the largest amplitude of the first response in its
-        first harmonic, over the frequency at constant wear depth. Under strong damping both differ: for one degree of
-        freedom with the damping ratio zeta the peak lies lower by a factor sqrt(1 - 2 zeta^2).
+        sweep meets in the range. "resonance" is phase resonance: `F^H x` of the first harmonics of excitation and
+        motion has no real part. "peak" is the largest amplitude of the first response in its first harmonic, over the
+        frequency at constant wear depth; for one degree of freedom with the damping ratio zeta it lies lower by a
+        factor sqrt(1 - 2 zeta^2).
 
     Raises
     ------
@@ -108,21 +108,19 @@ def march_wear(
     counts = check_numbers("cycles", 0.0 if to_the_end else cycles, least=0.0)
     if (np.diff(counts) <= 0.0).any():
         raise ValueError("cycles: give ascending counts")
+    counts = counts if counts[0] == 0.0 else np.append(0.0, counts)
     check_word("scheme", scheme, (*get_args(Scheme), "final"))
     if scheme == "final" and (not to_the_end or until is not None):
         raise ValueError('scheme: "final" goes with cycles = inf and without until')
+    if to_the_end and scheme == "explicit":
+        raise ValueError('scheme: explicit steps cannot grow: give "adaptive" or "implicit" with cycles inf')
     if step is None and scheme not in ("adaptive", "final"):
         raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
     length = math.inf if step is None else check_number("step", step, above=0.0)
-    counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
-    if to_the_end and scheme == "explicit":
-        raise ValueError('scheme: explicit steps cannot grow: give "adaptive" or "implicit" with cycles inf')
     if to_the_end and outputs < 2:
         raise ValueError(f"outputs = {outputs}: give at least 2, the unworn and the final state")
     check_number("final_share", final_share, above=0.0)
-    if until is not None:
-        check_word("until.quantity", until.quantity, TARGETS)
-        check_number("until.value", until.value, above=0.0)
+    _check_target(until, TARGETS)
     if wear_depth is not None and law.name == "table":
         raise ValueError('wear_depth: give another law: the factors of a "table" depend on depths that count from 0')
     model = worn_model(model, wear_depth)
@@ -154,6 +152,13 @@ def _check_frequency(
     return math.nan, FollowedFrequency(frequency, float(ends[0]), float(ends[1]))
 
 
+def _check_target(until: WearTarget | None, known: tuple[str, ...]) -> None:
+    """Raises ValueError where a target is not one of the known quantities, or not above 0."""
+    if until is not None:
+        check_word("until.quantity", until.quantity, known)
+        check_number("until.value", until.value, above=0.0)
+
+
 def integrate_mission(
     blocks: Sequence[Block],
     wear_coefficient: float,
@@ -167,8 +172,8 @@ def integrate_mission(
 ) -> MissionHistory:
     """Mission history of a joint from its unworn state on: blocks of vibration in order, repeated many times.
 
-    Depths are carried from block to block. Thousands of missions are integrated in steps of many missions at once
-    (`solver.missions.step`). A failure is no exception: `outcome` and `message` of the history give the reason.
+    Depths are carried from block to block. Thousands of missions are integrated in steps of many missions at once. A
+    failure is no exception: `outcome` and `message` of the history give the reason.
 
     Parameters
     ----------
@@ -203,9 +208,7 @@ def integrate_mission(
     counts = check_numbers("missions", missions, least=0.0)
     if (np.diff(counts) <= 0.0).any() or (counts != np.round(counts)).any() or counts[-1] < 1.0:
         raise ValueError("missions: give ascending whole numbers, the last of at least 1")
-    if until is not None:
-        check_word("until.quantity", until.quantity, TARGETS[:2])
-        check_number("until.value", until.value, above=0.0)
+    _check_target(until, TARGETS[:2])
     if largest_step is not None and largest_step != round(check_number("largest_step", largest_step, least=1.0)):
         raise ValueError(f"largest_step: give a whole number instead of {largest_step:g}")
     wanted = tuple(sorted({0, *(int(count) for count in counts)}))

@@ -50,20 +50,19 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: boo
 
     drifts: whether the joint is known to slide as a whole, although some pairs still stick.
     """
-    at, before = state.point.evaluation, state.depth
-    hold = None if state.hold is not None else free_slide(work.joint_of(state), at, drifts=drifts)
+    case, joint = work.of(state)
+    hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    joint = work.case.held(hold).joint(state.omega, work.excitation_amplitude)
+    joint = case.held(hold).joint(state.omega, work.excitation_amplitude)
 
     def balance_at(fraction: float, _: FloatArray) -> Balance:
-        return Balance(joint, state.point.history, before + fraction * (worn - before))
+        return Balance(joint, state.point.history, state.depth + fraction * (worn - state.depth))
 
     found, arrived = follow_naturally(balance_at, replace(state.point, parameter=0.0), 1.0, work.run)
     there = found.evaluation
-    if not arrived or not work.is_stable(joint, there) or creeps(joint, hold, there):
-        return None
-    if vibration_change(at, there) > OTHER_BRANCH:
+    stable = arrived and work.run.is_stable(Balance(joint, there.history, there.wear_depth), there)
+    if not stable or creeps(joint, hold, there) or vibration_change(state.at, there) > OTHER_BRANCH:
         return None
     return replace(state, point=State(there, found.history), hold=hold, held_from=state.cycle)
 
@@ -74,12 +73,12 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    joint, last = work.joint_of(state), state.point
-    found = relax_to_periodic(work.case, joint, worn, last, joint, work.run)
+    case, joint = work.of(state)
+    found = relax_to_periodic(case, joint, worn, state.point, joint, work.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners
-    if vibration_change(last.evaluation, found.evaluation) > OTHER_BRANCH:
+    if vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
         state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))
     return replace(state, point=found)
 

@@ -69,7 +69,7 @@ def followed_states(
         checked = full_check(work, after)
         assert not isinstance(checked, Failure)
         states.append(checked[0])
-        errors.append(checked[1].excitation_frequency_error)
+        errors.append(checked[1]["excitation_frequency_error"])
         if states[-1].cycle >= cycles[-1] * (1.0 - 1e-12):
             break
         step = line.step(states[-1])
@@ -93,7 +93,7 @@ def responses_around(work: WearingJoint, state: WearState, width: float, n: int)
         place, step, history, predicted = 0.0, 0.0, state.point.history, state.point.evaluation.predicted_h
         while place + step <= width * (1.0 + 1e-9):
             frequency = state.omega / (2.0 * np.pi) + sign * (place + step)
-            joint = work.joint(state.resolution, state.hold, 2.0 * np.pi * frequency)
+            joint = work.of(state)[0].joint(2.0 * np.pi * frequency, work.excitation_amplitude)
             balance = Balance(joint, history, state.depth)
             end = Run(work.case.settings.tolerance).solve(balance, predicted)
             if not end.converged:

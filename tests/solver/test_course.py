@@ -3,18 +3,17 @@
 import numpy as np
 import pytest
 
-from solver.accuracy.certificate import Certificate
-from solver.results.state_report import StateReport
-from solver.settings import Resolution, WearTarget
+from solver.settings import WearTarget
 from solver.wear import course as course_module
-from solver.wear.course import CERTIFIED, INTERPOLATED, Course
+from solver.wear.course import CERTIFIED, Course, Node
 
 AREA = np.array([1.0, 3.0])
 LOOP = np.ones((1, 128, 3))
-RESOLUTIONS = (Resolution((1, 2, 3), 64), Resolution((1, 2, 3, 4, 5), 128))
+INTERPOLATED = ("mean_pressure", "response", "response_peak", "loop_force", "excitation_frequency")
+RESOLUTIONS = ((3, 64), (5, 128))
 
 
-def report(depth, value, resolution=RESOLUTIONS[0], **more):
+def node(count, depth, rate, value, resolution=RESOLUTIONS[0], **more):
     """All numbers of a state but its depths are `value`."""
     numbers = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), np.full(2, value))
     numbers |= dict.fromkeys(("excitation_frequency", "excitation_frequency_error"), value)
@@ -23,10 +22,8 @@ def report(depth, value, resolution=RESOLUTIONS[0], **more):
         "response": np.full(1, value * 1j),
         **dict.fromkeys(("response_mean", "response_peak"), np.full(1, value)),
     }
-    certificate = Certificate(*([value] * 8))
-    return StateReport(
-        wear_depth=np.array(depth, float), certificate=certificate, resolution=resolution, **numbers, **more
-    )
+    numbers |= dict.fromkeys(CERTIFIED, value) | dict(zip(("harmonics_used", "samples_used"), resolution, strict=True))
+    return Node(count, np.array(depth, float), np.array(rate, float), numbers | more)
 
 
 def taken(counts, smooth=False, n_steps=3, **more):
@@ -34,8 +31,8 @@ def taken(counts, smooth=False, n_steps=3, **more):
     course = Course(AREA, smooth, np.array(counts or (), float), **more)
     for n in range(n_steps + 1):
         at = 10.0 * n
-        state = report([at**2, 0.0], float(n), RESOLUTIONS[n // 2 % 2])
-        course = course.after(at, state, np.array([2.0 * at, 0.0]), 0.5)
+        end = node(at, [at**2, 0.0], [2.0 * at, 0.0], float(n), RESOLUTIONS[n // 2 % 2], local=0.5 * (n + 1))
+        course = course.after(end)
     return course
 
 
@@ -69,8 +66,8 @@ def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the
 
 
 def test_a_cubic_never_falls_however_steep_its_ends_are():
-    course = Course(AREA, smooth=True).after(0.0, report([0.0, 0.0], 0.0), np.array([100.0, 0.0]), 0.0)
-    course = course.after(10.0, report([1.0, 1.0], 1.0), np.array([0.0, 100.0]), 0.0)
+    course = Course(AREA, smooth=True).after(node(0.0, [0.0, 0.0], [100.0, 0.0], 0.0))
+    course = course.after(node(10.0, [1.0, 1.0], [0.0, 100.0], 1.0))
     depth = course.read(np.linspace(0.0, 10.0, 101))["wear_depth"]
     assert (np.diff(depth, axis=0) >= 0.0).all()
     assert depth[-1].tolist() == [1.0, 1.0]
@@ -91,7 +88,7 @@ def shifting(resonances, wanted):
     """A course of steps of 10 cycles, in each of which every pair wears by 1."""
     course = Course(AREA, smooth=False, target=WearTarget("frequency_shift", wanted))
     for n, resonance in enumerate(resonances):
-        course = course.after(10.0 * n, report([n, n], 0.0, resonance=resonance, resonance_error=0.0), np.ones(2), 0.0)
+        course = course.after(node(10.0 * n, [n, n], [1.0, 1.0], 0.0, resonance=resonance, resonance_error=0.0))
     return course
 
 
@@ -126,7 +123,7 @@ def test_of_many_steps_those_that_go_far_and_those_that_are_read_are_kept(monkey
     monkeypatch.setattr(course_module, "KEPT_STEPS", 20)
     course = taken(asked, n_steps=200)
     assert len(course.nodes) <= 26
-    assert course.dense.counts[[0, -1]].tolist() == [0.0, 2000.0]
+    assert course.counts[[0, -1]].tolist() == [0.0, 2000.0]
     assert course.ends == tuple(np.arange(201) * 10.0)
     counts = np.linspace(0.0, 2000.0, 11)
     one, other = (each.read(counts)["wear_depth"] for each in (course, whole))

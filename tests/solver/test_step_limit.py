@@ -65,9 +65,10 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
     case = build_case(model, 0.6, start.penalty_omega, COARSE, start.resolution)
     work = WearingJoint(case, start, AREA)
     state = work.begin()
-    joint, at = work.joint_of(state), state.point.evaluation
+    work.run = Run(1e-13)
+    joint, at = work.joint_of(state), state.at
     gain, slips = work.gain(1.0), at.slip_work > 0.0
-    slopes = rate_slope(joint, at, gain, work.wearing, slips, Run(1e-13))
+    slopes = rate_slope(work, state, slips)
     step = 1e-5 * float((gain * at.slip_work).max() / np.abs(slopes).max())
     for pair in np.flatnonzero(slips):
         rates = []

@@ -10,7 +10,7 @@ from solver.missions import integrate
 from solver.missions.block_run import BlockRun
 from solver.missions.mission import Passage
 from solver.outcome import Outcome
-from solver.wear.integrate import Guide
+from solver.wear.slow_time import Guide
 
 STUDY = """
 [study]
