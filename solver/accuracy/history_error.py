@@ -18,13 +18,12 @@ HISTORY_SAFETY = 1.5
 
 PAIR_OVER_VOLUME = 2.0
 """Relative error of the depth of a pair over that of the worn volume, at least, where four or more pairs wear. With 1
-the deepest pairs of the dovetail at mu = 0.3 are outside of their errors by 2.7 times, and explicit steps at 212.5 Hz,
-48 pairs, by 3.2 times."""
+deep pairs of the dovetail are outside of their errors by 2.7 (mu = 0.3) to 3.2 times (212.5 Hz, 48 pairs, explicit)."""
 
 CROSSING_WINDOW = 0.5
-"""Fraction of the cycle count from which on the largest difference is the error: histories in which an event happens at
-different counts cross each other (dovetail, 211.25 Hz, steps of 2000 cycles: without it the estimate at the crossing is
-a quarter of the true error). Later differences are not used: an error does not depend on the length of the study."""
+"""Fraction of the cycle count from which on the largest difference is the error: histories with an event at different
+counts cross each other (dovetail, 211.25 Hz, steps of 2000 cycles: else a quarter of the true error at the crossing).
+Later differences are not used: an error does not depend on the length of the study."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +76,18 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
     difference = HISTORY_SAFETY * _depth_change(outputs)
     error = np.fmax(difference @ area, crossing(_depth_change(steps) @ area))
-    # the error of the start state remains, even where later states agree by chance
-    at_start = np.fmax(_start_error(outputs, area), fine["wear_rate_error"][0])
+    # the error of the start state remains, even where later states agree by chance: its rates, pair by pair
+    rate, other = (rates[0] * area for rates in (fine["depth_rate"], outputs.other("depth_rate")))
+    known = rate.sum() > 0.0 and np.isfinite(other).all()
+    at_start = np.fmax(np.abs(rate - other).sum() / rate.sum() if known else 0.0, fine["wear_rate_error"][0])
     # start state and steps have nothing to do with each other: the worst case is their sum
     error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume + fine["local"])
-    # no pair is known better than the volume: one that agrees with the reference solution does so by chance. Without
-    # this 5 and 7 of 24 deep pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times
-    of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(_pairs_that_count(depth * area))) * _over(error, volume)
+    # a pair that agrees with the reference solution better than the volume does so by chance (else 5 and 7 of 24 deep
+    # pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times). By the root of the
+    # number of equal pairs that would share the volume its relative error is smaller than that of independent pairs
+    squares = ((depth * area) ** 2).sum(axis=1)
+    n_equal = np.divide(volume**2, squares, out=np.ones_like(squares), where=squares > 0.0)
+    of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(n_equal)) * _over(error, volume)
     with np.errstate(invalid="ignore"):
         of_pairs = np.fmax(largest(_depth_change), np.where(depth > 0.0, of_pair[:, None] * depth, 0.0))
     unknown = np.asarray(~np.isfinite(difference).all(axis=1))
@@ -95,8 +99,7 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
 def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray) -> HistoryError:
     """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter.
 
-    outputs: the history, and the adaptive one in place of the reference solution, at the counts to report.
-    adaptive: errors of the adaptive history at these counts. area (n_contact,): m2.
+    outputs: the history, and the adaptive one in place of the reference solution. adaptive: errors of the latter.
     """
     apart, other = _depth_change(outputs), outputs.other("wear_depth") @ area
     found = HistoryError(
@@ -175,7 +178,7 @@ def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> Fl
 def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
     """Largest difference (n_output, ...) from `CROSSING_WINDOW` times each count up to this count; 0 if none.
 
-    cycles (n,): ascending counts of the differences (n, ...), which are NaN beyond the end of the reference solution.
+    cycles (n,): ascending counts of the differences (n, ...), NaN beyond the end of the reference solution.
     """
     known = np.isfinite(differences).all(axis=tuple(range(1, differences.ndim)))
     at, differences = cycles[known], differences[known]
@@ -206,21 +209,6 @@ def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: Flo
         if size > 0.0:
             found[place] = np.linalg.norm(moved, axis=0).max() / size
     return found
-
-
-def _start_error(both: Both, area: FloatArray) -> float:
-    """Relative difference of the wear rates of both start states, pair by pair; 0 where nothing wears."""
-    rate, other = both.fine["depth_rate"][0] * area, both.other("depth_rate")[0] * area
-    whole = float(rate.sum())
-    return float(np.abs(rate - other).sum()) / whole if whole > 0.0 and np.isfinite(other).all() else 0.0
-
-
-def _pairs_that_count(volumes: FloatArray) -> FloatArray:
-    """Number (n,) of equal pairs that would share the volume as these (n, n_contact); 1 where nothing has worn. By its
-    root the relative error of the volume is smaller than that of its pairs, where their errors are independent.
-    """
-    squares = (volumes**2).sum(axis=1)
-    return np.asarray(np.divide(volumes.sum(axis=1) ** 2, squares, out=np.ones_like(squares), where=squares > 0.0))
 
 
 def _depth_change(both: Both) -> FloatArray:

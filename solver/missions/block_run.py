@@ -55,8 +55,7 @@ class Begun:
     """The way by which a block began in an earlier mission.
 
     nodes: frequencies, rad/s, or load factors of the nodes of its sweep; of a passage the frequencies that count, Hz.
-    start, resolution: the state to which the sweep led, with its errors, and harmonics and samples of the last node;
-        None for a passage.
+    start, resolution: state behind the sweep, and harmonics and samples of the last node; None for a passage.
     """
 
     nodes: tuple[float, ...]
@@ -207,16 +206,16 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
 
 def _last(state: WearState, start: StartState) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
-    at, choice = state.at, state.choice
+    at = state.at
     assert start.state is not None
     here = replace(start.state, displacement_h=at.displacement_h, contact_force_h=at.force_h)
     return replace(
         start,
-        outcome=Outcome.CONVERGED if choice.accurate else Outcome.INACCURATE,
+        outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
         state=replace(here, start_history=state.point.history),
         resolution=state.resolution,
-        response_error=choice.estimate.response,
-        wear_rate_error=choice.estimate.wear_rate,
+        response_error=state.estimate.response,
+        wear_rate_error=state.estimate.wear_rate,
         message="",
         reference=None,
     )
@@ -239,11 +238,11 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
 
 
 def _again(case: BlockCase, begun: Begun) -> StartState | None:
-    """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None.
+    """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None: where the way
+    has jumped over a fold, there is no stable state, or the way may lead to another branch.
 
     With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
-    Where each pair slips or opens within the period, the state follows from the depths alone. None where the way has
-    jumped over a fold, where there is no stable state, or where the way may lead to another branch.
+    Where each pair slips or opens within the period, the state follows from the depths alone.
     """
     start, run = begun.start, case.run()
     if start is None or start.state is None or start.branch > 0:

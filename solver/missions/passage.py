@@ -13,15 +13,14 @@ the first frequencies acts back on the later ones: the depth y since the start o
 with the implicit trapezoidal rule in the order of the passage. The square of this correction, relative to the wear, is
 a part of the error, and falls with the wear of one passage.
 
-The vibration follows the frequency with a delay: what it differs from that of the steady state dies out as
-exp(-zeta omega t), so that it belongs to a frequency passed before, by the lag |df/dt| / (2 pi zeta f). A passage wears
-less or more than its steady states by at most the lag times the largest wear over frequency: a part of the error. The
-damping ratio zeta is that of the structure with its closed pairs sticking; friction damps more where pairs slip. The
-sweep rate |df/dt| / (zeta f)^2 says how fast a passage is. Without damping the wear is not known.
+The vibration follows the frequency with a delay: its difference to the steady state dies out as exp(-zeta omega t), so
+that it belongs to a frequency passed before, by the lag |df/dt| / (2 pi zeta f). A passage wears less or more than its
+steady states by at most the lag times the largest wear over frequency: a part of the error. The damping ratio zeta is
+that of the structure with its closed pairs sticking; friction damps more where pairs slip. The sweep rate
+|df/dt| / (zeta f)^2 says how fast a passage is. Without damping the wear is not known.
 
-A vibration passes df in the time df / |df/dt|, in which it does not tell apart frequencies that are closer than
-1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of frequencies suffices at
-the resonance of a structure without damping that friction does not limit: its integral is infinite.
+A vibration does not tell apart frequencies that are closer than the inverse of the time between them: an interval far
+below sqrt(|df/dt|) is not divided. At a resonance without damping or friction the integral is infinite.
 """
 
 from __future__ import annotations

@@ -16,9 +16,8 @@ falls, and each block has its part of the sum. With the third divided difference
     e = w H (H + a) (H - 1) (H - 1 + a) / (2H - 1 + a).
 
 Z is found by Newton's method. The derivative of R is the product of the flows of the linearised wear rates of the
-blocks, corrected by Broyden's method where a second iteration is needed. As the parabola through three nodes before is
-near, one mission is enough for most steps: by how much the derivative misses the change of the wear since the last
-node is a part of the error of the step.
+blocks, corrected by Broyden's method where a second iteration is needed. Mostly one mission is enough: by how much the
+derivative misses the change of the wear since the last node is a part of the error of the step.
 """
 
 from __future__ import annotations
@@ -109,7 +108,11 @@ def attempt_step(nodes: Nodes, length: int, area: FloatArray, run: RunMission, s
         rates = np.array([each.growth for each in runs])
         rate = rates.sum(axis=0)
         if last is None:
-            slope = mission_slope(runs)
+            whole = unit
+            for each in runs:
+                assert each.slope is not None
+                whole = (unit + each.slope) @ whole
+            slope = whole - unit
         else:
             moved, change = depth - last[0], rate - last[1]
             slope = slope + np.outer(change - slope @ moved, moved) / max(float(moved @ moved), 1e-300)
@@ -151,16 +154,6 @@ def _one_mission(nodes: Nodes, area: FloatArray, runs: tuple[BlockRun, ...], sha
     error = two.share * growth * float(np.abs(after - two.first) @ area)
     most = 2.0 * allowed_error(share, float(before @ area), float(after @ area), now.count, 1)
     return Step(end, runs, float(min(0.25 * error / most, 1.0)))
-
-
-def mission_slope(runs: tuple[BlockRun, ...]) -> FloatArray:
-    """Derivative (n_contact, n_contact) of the wear of a mission with respect to the depth before it."""
-    unit = np.eye(runs[0].growth.size)
-    whole = unit
-    for each in runs:
-        assert each.slope is not None
-        whole = (unit + each.slope) @ whole
-    return np.asarray(whole - unit)
 
 
 def values_of(runs: tuple[BlockRun, ...]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from solver.stability.floquet import find_instability
 from solver.wear.course import Course
 from solver.wear.jump import creeps, free_slide
 from solver.wear.slow_time import AS_ASKED
-from solver.wear.wearing_joint import Choice, WearingJoint, WearState
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
 """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
@@ -36,9 +36,8 @@ STEPS_TO_THE_END, LONGEST_HISTORY = 20_000, 1e25
 """Most steps and most cycles of a history without a steady state; a joint takes 2 to 10 steps a pair."""
 
 ACTED_BACK = 100.0
-"""Change of the normal force by the depth of one pair alone, all other pairs held, over the normal force of this pair.
-A wear rate counts as steady above only: less wear may not have acted back on the joint yet. Long waves of n pairs are
-about n times as soft."""
+"""Change of the normal force by the depth of one pair alone, all other pairs held, over the normal force of this pair,
+above which a wear rate may be steady: less wear has not acted back yet. Long waves of n pairs are n times as soft."""
 
 Checked = tuple[WearState, dict[str, Any]]
 """A state that passed the check, possibly with other harmonics than before, and its report."""
@@ -47,22 +46,19 @@ Checked = tuple[WearState, dict[str, Any]]
 def full_check(
     work: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
 ) -> Checked | Failure:
-    """A state of a reported history with its report (`report_state`), or the reason of its rejection.
-
-    Raises OutOfTimeError, LinAlgError.
-    """
+    """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
     anew, certified = chosen_for_another(work, state), partial(_certified, work, loops, with_resonance=with_resonance)
     checked = certified(choose_anew(work, state) if anew else state)
-    if isinstance(checked, Failure) and not anew and state.choice.accurate and work.case.settings.automatic:
+    if isinstance(checked, Failure) and not anew and state.accurate and work.case.settings.automatic:
         # more harmonics or samples may suffice
         checked = certified(choose_anew(work, state))
     if isinstance(checked, Failure):
         return checked
     state, reported = checked
-    estimate, worst = state.choice.estimate, state.worst
+    estimate, worst = state.estimate, state.worst
     # NaN for given harmonics and samples, where no state with others was found for a comparison
     unknown = np.isnan(estimate.largest)
-    if unknown or not state.choice.accurate:
+    if unknown or not state.accurate:
         if not estimate.largest < worst.largest:
             worst = UNKNOWN if unknown else estimate
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
@@ -82,7 +78,7 @@ def _certified(
     """A state with its report, whose estimated errors come from the last choice of the harmonics."""
     if isinstance(state, Failure):
         return state
-    joint, estimate = work.joint_of(state), state.choice.estimate
+    joint, estimate = work.joint_of(state), state.estimate
     wear_rate_error = work.wearing.amplification(*worn_by(state.at)) * estimate.wear_rate
     certificate = certify(joint, state.at)
     certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
@@ -97,7 +93,7 @@ def report_only(
 ) -> Checked:
     """A state of a reference solution with its report, with the harmonics wanted at its count where it is found there.
 
-    resolutions: cycle count from which on a resolution holds, and this resolution; ascending counts, the first 0.
+    resolutions: as in `Guide`, of the reference solution.
     """
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
@@ -109,33 +105,31 @@ def report_only(
 
 
 def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
-    """Whether the state differs so much from the last choice of harmonics and samples that a new choice is necessary.
-
-    The part of the contact force in harmonics that are left out grows with the error of the state. A new choice is
-    necessary where this part is so large that the error may be above rtol, or so small that fewer harmonics may do.
+    """Whether harmonics and samples have to be chosen again: where the part of the contact force in harmonics that are
+    left out, which grows with the error, is so large that the error may be above rtol, or so small that fewer may do.
     """
-    choice, settings, orders = state.choice, work.case.settings, state.resolution.orders
+    settings, orders = work.case.settings, state.resolution.orders
     if not settings.automatic:
         return False
     if settings.harmonics == "auto" and lacks_even(orders, state.at):
         return True
-    now, error = left_out(orders, state.at), choice.estimate.largest
+    now, error = left_out(orders, state.at), state.estimate.largest
     if not np.isfinite(error):
         return _vibrates_otherwise(state)
     if error == 0.0:
         # the last choice was for a joint without slip and separation
         return now > NEGLIGIBLE
-    if now > LEFT_OUT_GROWN * choice.left_out:
-        return error * now > settings.rtol * choice.left_out
-    return now < KEPT_FRACTION**2 * choice.left_out
+    if now > LEFT_OUT_GROWN * state.left_out:
+        return error * now > settings.rtol * state.left_out
+    return now < KEPT_FRACTION**2 * state.left_out
 
 
 def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
     refined = refine(work.of(state)[0], state.omega, work.excitation_amplitude, state.point, work.run)
-    resolution = refined.case.resolution
-    choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
-    return work.at_followed(replace(state, point=refined.point, resolution=resolution, choice=choice))
+    resolution, point = refined.case.resolution, refined.point
+    state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
+    return work.at_followed(replace(state, estimate=refined.estimate, accurate=refined.accurate))
 
 
 def _vibrates_otherwise(state: WearState) -> bool:
@@ -176,9 +170,8 @@ def why_endless(work: WearingJoint, state: WearState, course: Course, final_shar
 
 
 def is_steady(work: WearingJoint, state: WearState, course: Course) -> bool:
-    """Whether wear goes on without end.
-
-    Every pair that carries load slips, and the wear rate is constant although the wear is deep enough to act back.
+    """Whether wear goes on without end: every pair that carries load slips, and the wear rate is constant although the
+    wear is deep enough to act back.
     """
     normal = state.at.force_h[:, 0, 0]
     pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))

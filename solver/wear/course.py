@@ -15,8 +15,8 @@ from solver.packing import packable
 from solver.settings import WearTarget
 
 KEPT_STEPS = 800
-"""Most stored steps of a history beside those with an output; half as many after the steps with the least progress are
-dropped. A result has 101 outputs by default, an adaptive history of 1e5 cycles about 100 steps."""
+"""Most stored steps of a history beside those with an output; half as many after those with the least progress are
+dropped. An adaptive history of 1e5 cycles has about 100 steps."""
 
 CERTIFIED = tuple(each.name for each in fields(Certificate) if each.name != "periodicity_error")
 """Values of a certificate; within a step, the larger value of both ends holds."""
@@ -30,8 +30,8 @@ BISECTIONS = 100
 class Node:
     """The end of a step.
 
-    count: of cycles or missions. depth, rate (k,): worn depths, m, and their rates, m per count; of missions those of
-    all blocks in one row. values: other numbers and arrays, by name.
+    count: of cycles or missions. depth, rate (k,): worn depths, m, and their rates, m per count, of the pairs; of
+    missions those of all blocks in one row. values: other numbers and arrays, by name.
     """
 
     count: float
@@ -45,11 +45,10 @@ class Node:
 class Course:
     """The steps of a history so far, with a dense output.
 
-    Between the ends of a step the depth is linear in the count, or a smooth cubic with the rates at both ends, whose
-    slopes are at most three times the mean slope, so that the depth never falls (Fritsch and Carlson 1980). All other
-    values are linear in the count, or over a smooth step in the worn volume.
+    Within a step the depth is a cubic with the rates at both ends, whose slopes are at most three times the mean slope,
+    so that the depth never falls (Fritsch and Carlson 1980). All other values are linear in the worn volume.
 
-    area (n_contact,): m2. smooth: whether the depth is a cubic; for adaptive steps.
+    area (n_contact,): m2.
     outputs (n_output,): ascending counts to be read, whose steps are stored; empty for counts not known beforehand.
     target: wear whose count is sought; None for none.
     nodes: first state and ends of the steps, ascending, thinned where the steps are many.
@@ -57,7 +56,6 @@ class Course:
     """
 
     area: FloatArray
-    smooth: bool
     outputs: FloatArray = field(default_factory=lambda: np.zeros(0))
     target: WearTarget | None = None
     nodes: tuple[Node, ...] = ()
@@ -65,7 +63,7 @@ class Course:
 
     @cached_property
     def counts(self) -> FloatArray:
-        """Counts (n_node,) at the nodes."""
+        """Counts (n_node,) at the nodes; `depths`, m, `rates`, m per count, (n_node, k), `volumes`, m3, as well."""
         return np.array([node.count for node in self.nodes])
 
     @cached_property
@@ -111,8 +109,6 @@ class Course:
         start, end, fraction = self._steps_of(counts)
         s, length = fraction[:, None], (self.counts[end] - self.counts[start])[:, None]
         grown = self.depths[end] - self.depths[start]
-        if not self.smooth:
-            return np.asarray(self.depths[start] + s * grown)
         first, last = (np.minimum(self.rates[place] * length, 3.0 * grown) for place in (start, end))
         bent = (1.0 - s) ** 2 * s * first - s**2 * (1.0 - s) * last
         return np.asarray(self.depths[start] + s**2 * (3.0 - 2.0 * s) * grown + bent)
@@ -133,13 +129,11 @@ class Course:
     def read(self, counts: FloatArray) -> dict[str, Any]:
         """Values at ascending counts (n,), by name; beyond the last step NaN, whole numbers 0.
 
-        `wear_depth`, `depth_rate` (n, k): m, m per count. `wear_rate` (n,): m3 per count. And the values of the nodes;
-        whole numbers are those at the end of the step.
+        `wear_depth`, `depth_rate` (n, k): m, m per count; `wear_rate` (n,): m3 per count; and the values of the nodes.
         """
         (start, end, fraction), depth = self._steps_of(counts), self.depth_at(counts)
-        if self.smooth:
-            grown, part = self.volumes[end] - self.volumes[start], self._volumes(depth) - self.volumes[start]
-            fraction = np.divide(part, grown, out=fraction, where=grown > 0.0)
+        grown, part = self.volumes[end] - self.volumes[start], self._volumes(depth) - self.volumes[start]
+        fraction = np.divide(part, grown, out=fraction, where=grown > 0.0)
 
         def between(each: FloatArray) -> FloatArray:
             return np.asarray(each[start] + fraction.reshape(-1, *[1] * (each.ndim - 1)) * (each[end] - each[start]))
@@ -157,9 +151,8 @@ class Course:
         return found
 
     def even_counts(self, n_outputs: int) -> FloatArray:
-        """Counts (n_outputs,) to the end or the target, evenly spaced in the shares of worn volume and cycles together.
-
-        So neither a burst of wear nor a long calm phase is missed.
+        """Counts (n_outputs,) to the end or the target, evenly spaced in the shares of worn volume and cycles together:
+        neither a burst of wear nor a long calm phase is missed.
         """
         end = self.nodes[-1].count if math.isnan(self.reached) else self.reached
         whole = float(self._volumes(self.depth_at(np.array([end])))[0])

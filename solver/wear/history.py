@@ -41,11 +41,9 @@ def integrate_together(
 
     Each is that which it would be alone. All those with given steps are compared with one adaptive history.
 
-    model, friction_coefficient, settings, start: the case, and the unworn state at the start of the histories.
-    asked: steps of each history; they differ in nothing else but their counts up to one last count.
-    keep: called from time to time with the progress.
-    resume: progress, as given to `keep`, of a computation of some of these histories, which goes on from there. The
-        results are equal to the last bit, except `run_time`.
+    asked: they differ in nothing else but their steps, and their counts up to one last count.
+    keep: called from time to time with the progress. resume: such progress of some of these histories, which go on from
+        there; the results are equal to the last bit, except `run_time`.
     """
     integrations = None
     if start.state is not None:
@@ -76,7 +74,7 @@ def unknown_course(model: ReducedModel, n_loops: int) -> Course:
     values |= dict.fromkeys(("excitation_frequency", "excitation_frequency_error", "local"), math.nan)
     values |= vars(NOT_CERTIFIED) | {"harmonics_used": 0, "samples_used": 0}
     # before all counts
-    return Course(model.contact.area, False, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
+    return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
 
 
 def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rtol: float) -> Solutions:
@@ -112,25 +110,36 @@ def _counts(asked: SlowTime, fine: Ended) -> FloatArray:
     return np.zeros(asked.cycles.n_outputs) if fine.state is None else fine.course.even_counts(asked.cycles.n_outputs)
 
 
-def _compare(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
-    """A history beside what it is compared with at ascending counts, and its errors there.
+def compare(
+    counts: FloatArray,
+    fine: Course,
+    reference: Course | None,
+    area: FloatArray,
+    part: Callable[[dict[str, Any]], dict[str, Any]] = lambda values: values,
+    *,
+    follows: bool = False,
+) -> tuple[Both, HistoryError]:
+    """An adaptive history beside its reference solution at ascending counts (n,), and its errors there.
 
-    follows: whether the frequency of the excitation follows the structure.
+    part: what is compared of the values of both. follows: whether the frequency of the excitation is followed.
     """
+    known = reference if reference is not None and reference.nodes else None
+    both, steps = (
+        Both(at, part(fine.read(at)), {} if known is None else part(known.read(at)), follows)
+        for at in (counts, fine.counts)
+    )
+    return both, history_error(both, steps, area)
 
-    def at(fine: Ended, other: Ended | None, counts: FloatArray) -> Both:
-        there = other.course.read(counts) if other is not None and other.course.nodes else {}
-        return Both(counts, fine.course.read(counts), there, follows)
 
-    own = solutions.own
-    adaptive = own if solutions.adaptive.state is None else solutions.adaptive
-    area, course = own.course.area, adaptive.course
-    both, steps = (at(adaptive, solutions.reference, each) for each in (counts, course.counts))
-    error = history_error(both, steps, area)
+def _compare(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
+    """A history beside what it is compared with at ascending counts, and its errors there."""
+    own, reference = solutions.own.course, solutions.reference
+    adaptive = own if solutions.adaptive.state is None else solutions.adaptive.course
+    both, error = compare(counts, adaptive, None if reference is None else reference.course, own.area, follows=follows)
     if adaptive is own:
         return both, error
-    both = at(own, adaptive, counts)
-    return both, error_of_given_steps(both, error, area)
+    both = Both(counts, own.read(counts), adaptive.read(counts), follows)
+    return both, error_of_given_steps(both, error, own.area)
 
 
 def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, solutions: Solutions) -> WearHistory:

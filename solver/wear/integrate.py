@@ -1,9 +1,9 @@
 """A wear history and its reference solution as problems over the slow time.
 
 The reference solution is a second computation whose difference, pair by pair, is taken for the error. It starts from
-another sweep, with a third of the nodes (`solver.loading_history`), and is coarser in all: its steps have twice the
-tolerance, and it has the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch
-ends, errors grow. The difference to the reference solution grows as well, a sum of local errors does not.
+another sweep, with a third of the nodes (`solver.loading_history`), and is coarser in all: twice the tolerance of the
+steps, the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch ends, errors grow,
+and this difference with them; a sum of local errors does not.
 
 A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
 with the same steps errs as they do: where a pair only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit
@@ -49,7 +49,6 @@ class SlowTime:
     """What a wear history is asked for, Eqs. (20) to (26).
 
     wear_coefficient: k_w, 1/Pa. law: part of the slip work that wears.
-    steps: `Given`, `LargestDepth` or `Adaptive`.
     cycles (n_output,): ascending counts to report, the first 0; the last Euler step ends at the last one. Or
         `ToTheEnd`: until nothing wears any more; not with explicit steps, which cannot grow.
     until: target of the wear, with whose step the history ends. loops: pairs with reported fretting loops.
@@ -132,8 +131,8 @@ class WearProblem:
         """As in SlowProblem: the factorisation."""
         self.work.drop_factor()
 
-    def ended(self, state: WearState, course: Course) -> Failure | None:
-        """As in SlowProblem."""
+    def _ended(self, state: WearState, course: Course) -> Failure | None:
+        """Why the history ends at a state; None to go on."""
         found, cycles, most = None, self.asked.cycles, HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
         still = not state.wears and self.end == math.inf
         if still or not math.isnan(course.reached) or course.ends[-1] >= self.end * (1.0 - 1e-12):
@@ -151,6 +150,8 @@ class WearProblem:
         work, asked, error = self.work, self.asked, 0.0
         if state is None:
             found = work.at_followed(work.begin() if self.guide is None else begin_reference(work))
+        elif (ended := self._ended(state, course)) is not None:
+            return ended
         elif not state.wears:
             # the state holds for all later counts
             return state, course.after(replace(course.nodes[-1], count=self.end))
@@ -190,7 +191,7 @@ class Integrations:
         """Integrate a history. spent: CPU seconds of its time limit so far. stable_end: as in WearProblem."""
         outputs = np.zeros(0) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
         problem = WearProblem(self._joint(asked), asked, asked.end, stable_end=stable_end)
-        course = Course(problem.work.area, asked.adaptive, outputs, asked.until)
+        course = Course(problem.work.area, outputs, asked.until)
         return self._integrator.integrate(asked.name, problem, course, spent)
 
     def reference(self, asked: SlowTime, guide: Guide, compared: FloatArray, spent: float = 0.0) -> Ended:
@@ -202,7 +203,7 @@ class Integrations:
         work.run = work.run.to(self._case.settings.rough_tolerance)
         resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in guide.resolutions)
         problem = WearProblem(work, asked, float(compared[-1]), replace(guide, resolutions=resolutions))
-        course = Course(work.area, smooth=True, outputs=compared)
+        course = Course(work.area, compared)
         return self._integrator.integrate(f"{asked.name} reference", problem, course, spent)
 
     def _joint(self, asked: SlowTime) -> WearingJoint:

@@ -5,9 +5,8 @@ its mean position gets a soft hold in the direction without stiffness:
 
 Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
 the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the
-slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Strictly, the root creeps by about g / F of its slip
-path in a period, and motion and wear change by g / F at most. So a soft spring holds the mean position from there on.
-Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
+slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Motion and wear change by g / F at most where a soft
+spring holds the mean position. Where g / F is no longer negligible there is no periodic state: ADRIFT.
 """
 
 from __future__ import annotations
@@ -32,10 +31,7 @@ from solver.wear.wearing_joint import WearingJoint, WearState
 
 
 def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
-    """A stable state behind the last state of a branch: with a hold, or of another branch.
-
-    worn (n_contact,): depth of the new state, m. cycle: its count.
-    """
+    """A stable state of depths (n_contact,), m, behind the end of a branch: with a hold, or of another branch."""
     work.run.budget.limit = work.run.budget.iterations + SEARCH_ITERATIONS
     reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
     if isinstance(reached, Failure) and reached.outcome is Outcome.ADRIFT:
@@ -84,10 +80,8 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
 
 
 def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | None:
-    """Hold of the mean position of a state.
-
-    None unless every pair slips at some time, or it `drifts`, and the structure is free to slide in one direction;
-    masses on rigid ground have a hold of their own (`Penalty.mean`).
+    """Hold of the mean position of a state; None unless every pair slips at some time, or it `drifts`, and the
+    structure is free to slide in one direction. Masses on rigid ground have a hold of their own (`Penalty.mean`).
     """
     if ((at.status_t == STICK).all(axis=1).any() and not drifts) or joint.law.rate_dependent:
         return None

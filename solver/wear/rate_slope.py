@@ -55,9 +55,8 @@ def _rate_changes(work: WearingJoint, state: WearState, depths: FloatArray, *, f
 def explicit_step_limit(work: WearingJoint, state: WearState) -> float:
     """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
 
-    A step multiplies a disturbance of W by 1 + h dg/dW, which grows where h exceeds 2 / mu, with mu the largest
-    positive eigenvalue of -dg/dW, by Arnoldi's method. A complex one counts where its real part is larger than its
-    imaginary part. That the wearing work depends on the depth itself is neglected.
+    A step multiplies a disturbance of W by 1 + h dg/dW: 2 over the largest positive eigenvalue of -dg/dW, by Arnoldi's
+    method. A complex one counts where its real part is larger than its imaginary part.
     """
     wears = work.rate(state.at) > 0.0
 
@@ -78,8 +77,8 @@ def explicit_step_limit(work: WearingJoint, state: WearState) -> float:
 def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, free_tangents: bool = True) -> float:
     """Change of the mean normal forces by wear to depths (n_contact,), m, relative to these forces, both as norms.
 
-    Of the linear static structure; pairs that are open throughout the period carry no force. before: state at the start
-    of the step. free_tangents: whether the tangents of pairs that slip are free; if not, a bound, which is cheaper.
+    Of the linear static structure, from the state before the step. free_tangents: whether the tangents of pairs that
+    slip are free; if not, a bound, which is cheaper.
     """
     pair, component = joint.component_index // 3, joint.component_index % 3
     stuck = (before.status_t == STICK).all(axis=1)
@@ -97,10 +96,7 @@ def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, 
 
 
 def too_long(work: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> str | None:
-    """Why a step or a jump is rejected because of its wear, and which length would be accepted; None if it is not.
-
-    state: at the start. wear_depth (n_contact,): at the end, m. length: cycles.
-    """
+    """Why a step or a jump of some cycles to depths (n_contact,), m, is rejected, and how long it may be; else None."""
     for free_tangents in (False, True):
         fraction = moved_fraction(work.joint_of(state), state.at, wear_depth, free_tangents=free_tangents)
         if fraction <= LARGEST_MOVED_LOAD:

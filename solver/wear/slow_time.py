@@ -42,11 +42,8 @@ class SlowProblem(Protocol):
     def iterations_per_save(self) -> int:
         """Newton iterations after which the progress is saved."""
 
-    def ended(self, state: Any, course: Course, /) -> Failure | None:
-        """Why the history ends at a state; None to go on."""
-
     def advance(self, state: Any, course: Course, /) -> tuple[Any, Course] | Failure:
-        """State and course after the next step, or the first ones where the state is None; or why there are none."""
+        """State and course after the next step, or the first ones where the state is None; or why the history ends."""
 
     def forget(self) -> None:
         """Drop all that is kept from step to step beside the state."""
@@ -68,10 +65,9 @@ class Guide:
 @packable
 @dataclass(frozen=True)
 class Ended:
-    """A finished integration.
+    """A finished integration, with Newton iterations and CPU seconds.
 
     state: the last one; None where there is no first state. failure: reason of the end; CONVERGED for a regular end.
-    course: all steps. iterations, seconds: Newton iterations and CPU time.
     """
 
     state: Any
@@ -107,10 +103,7 @@ class Solutions:
 @packable
 @dataclass(frozen=True)
 class Progress:
-    """How far integrations that belong together are.
-
-    done: those that are complete, by name. name: of the present one; state, course, iterations, seconds: its progress.
-    """
+    """How far integrations are: the complete ones by name, and name, state, course and effort of the present one."""
 
     done: dict[str, Ended] = field(default_factory=dict)
     name: str = ""
@@ -123,7 +116,7 @@ class Progress:
 class Integrator:
     """Integrates histories that belong together, each once.
 
-    time_limit: CPU seconds. keep: called from time to time with the packed progress. resume: such progress.
+    time_limit: CPU seconds of each. keep: called from time to time with the packed progress. resume: such progress.
     """
 
     def __init__(
@@ -134,9 +127,9 @@ class Integrator:
         self._done: dict[str, Ended] = dict(self._resumed.done)
 
     def integrate(self, name: str, problem: SlowProblem, course: Course, spent: float = 0.0) -> Ended:
-        """Integrate from the first or the saved state to the end.
+        """Integrate from the first or the saved state to the end. name: tells the histories apart.
 
-        name: tells the histories apart. course: before the first step. spent: CPU seconds of the time limit so far.
+        course: before the first step. spent: CPU seconds of the time limit so far.
         """
         if name in self._done:
             return self._done[name]
@@ -146,7 +139,7 @@ class Integrator:
             began -= saved.seconds
         budget.deadline, saved_at = began + self._time_limit - spent, budget.iterations
         while True:
-            after = guarded(partial(_next, problem, state, course))
+            after = guarded(partial(problem.advance, state, course))
             if isinstance(after, Failure):
                 ended = Ended(state, after, course, budget.iterations, computing_time() - began)
                 self._done[name] = ended
@@ -160,11 +153,6 @@ class Integrator:
                     # what its time limit has ended is not complete
                     done = {key: each for key, each in self._done.items() if each.failure.outcome not in ENDS_ALL}
                     self._keep(pack(Progress(done, name, state, course, saved_at, computing_time() - began)))
-
-
-def _next(problem: SlowProblem, state: Any, course: Course) -> tuple[Any, Course] | Failure:
-    """State and course after the next step, or the end of the history."""
-    return (None if state is None else problem.ended(state, course)) or problem.advance(state, course)
 
 
 def guarded(compute: Callable[[], T]) -> T | Failure:

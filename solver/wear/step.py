@@ -46,17 +46,16 @@ from solver.wear.rate_slope import explicit_step_limit, too_long
 from solver.wear.wearing_joint import LastStep, WearingJoint, WearState
 
 PARTS_OF_STEP = 32
-"""Parts of a step in each of which the pairs slide at their friction limit. Dovetail, 16 pairs, 212.6 Hz, 1e5 cycles,
-nine harmonics, `rtol` 1e-2: 1.795, 1.813, 1.819, 1.819, 1.822 mm3 with 1, 8, 32, 128, 512 parts (`rtol` 2e-4: 1.823).
-32 parts take a tenth of the time of a history."""
+"""Parts of a step in each of which the pairs slide at their friction limit. Dovetail, 16 pairs, 212.6 Hz, 1e5 cycles:
+1.795, 1.813, 1.819, 1.819 mm3 with 1, 8, 32, 128 parts (`rtol` 2e-4: 1.823). A tenth of the time of a history."""
 
 FOLD_RESOLUTION = 0.005
 """Shortest adaptive step, as a fraction of the cycle count."""
 
 STEP_ERROR_FRACTION = 0.25
 """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
-Dovetail, 16 pairs, nine harmonics, 212.42 to 213 Hz, `rtol` 1e-2: errors of the worn volume up to 0.21 %. With 0.5 a
-quarter to a third less steps, up to 0.5 %, and 5.9 % at 212.5 Hz, where a pair that only just slips then sticks."""
+Dovetail, 16 pairs, 212.42 to 213 Hz, `rtol` 1e-2: errors of the worn volume up to 0.21 %. With 0.5 a quarter to a third
+less steps, up to 0.5 %, and 5.9 % at 212.5 Hz, where a pair that only just slips then sticks."""
 
 FIRST_STEP, FIRST_DEPTH = 0.05, 0.01
 """Length of the first adaptive step, whose error is not known, as a fraction of the explicit step limit, and its
@@ -67,8 +66,7 @@ SHORTEST_SLOW_STEP = 1e-4
 
 DOUBLINGS_ACROSS = 4
 """Most doublings of the shortest step to go across corners. Dovetail, mesh 2, nodal diameter 3, 213.5 Hz: four steps
-across, by 3, 2, 2 and 4 doublings; without them `march_failed` after 846 cycles. The local errors of these steps were
-0.1 to 2.7 times the allowed ones."""
+across, by 3, 2, 2 and 4 doublings, errors 0.1 to 2.7 times the allowed ones; else `march_failed` at 846 cycles."""
 
 
 @dataclass(frozen=True)

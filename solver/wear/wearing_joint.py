@@ -32,20 +32,6 @@ NO_WEAR = 1e-12
 
 @packable
 @dataclass(frozen=True)
-class Choice:
-    """The last choice of harmonics and samples.
-
-    left_out: fraction of the contact force in harmonics that are left out, of the state for which they were chosen.
-    estimate: errors of response and wear rate. accurate: whether they are below rtol; True for given harmonics.
-    """
-
-    left_out: float
-    estimate: Estimate
-    accurate: bool
-
-
-@packable
-@dataclass(frozen=True)
 class LastStep:
     """The last step, for BDF2 and for the extrapolation to the next state.
 
@@ -65,7 +51,9 @@ class WearState:
     """A wearing joint at one cycle count; the next step depends on this state only.
 
     cycle: count. omega: of the excitation, rad/s. point: periodic state with its depth and tangential history.
-    resolution, choice: harmonics and samples, and their last choice; resolutions: those from a cycle count on.
+    resolution: harmonics and samples; resolutions: those from a cycle count on.
+    left_out, estimate, accurate: of the state for which they were chosen: fraction of the contact force in harmonics
+        that are left out, errors, and whether these are below rtol (True for given harmonics).
     rates, largest_rates (n_contact + 1,): wear rates of the pairs and, last, of all together, and their largest values
         so far, m3 per cycle. most_rate: if every pair slipped as far as it moves.
     step_limit: largest stable explicit step at the first state, cycles; NaN where nothing wears.
@@ -82,7 +70,9 @@ class WearState:
     omega: float
     point: State
     resolution: Resolution
-    choice: Choice
+    left_out: float
+    estimate: Estimate
+    accurate: bool
     rates: FloatArray
     largest_rates: FloatArray
     resolutions: tuple[tuple[float, Resolution], ...] = ()
@@ -193,14 +183,15 @@ class WearingJoint:
         joint = self.case.at(start.resolution).joint(state.omega, self.excitation_amplitude)
         balance = Balance(joint, state.start_history, state.wear_depth)
         at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
-        estimate = Estimate(start.response_error, start.wear_rate_error)
         nothing = np.zeros(self.area.size + 1)
         begun = WearState(
             0.0,
             state.omega,
             State(at, final_history(balance, at)),
             start.resolution,
-            Choice(left_out(start.resolution.orders, at), estimate, start.outcome is Outcome.CONVERGED),
+            left_out(start.resolution.orders, at),
+            Estimate(start.response_error, start.wear_rate_error),
+            accurate=start.outcome is Outcome.CONVERGED,
             rates=nothing,
             largest_rates=nothing,
             # the stability of a start state has been checked
@@ -269,7 +260,7 @@ class WearingJoint:
         """
         if self.follow is None:
             return 0.0
-        lag = state.choice.estimate.response
+        lag = state.estimate.response
         if self.follow.of == "peak":
             lag = math.sqrt(2.0 * lag) + accepted_rise(self.case.settings.rtol)
         return state.half_width * lag / (2.0 * math.pi)

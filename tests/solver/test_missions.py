@@ -12,10 +12,9 @@ from scipy.linalg import expm
 from solver import Block, MissionHistory, Outcome, Passage, SolverSettings, integrate_mission, march_wear
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import Failure
-from solver.missions import integrate as integrating
+from solver.missions import history as integrating
 from solver.missions.block_run import Begun, BlockCase, BlockRun, run_block
-from solver.missions.history import integrate_missions
-from solver.missions.integrate import unworn_course
+from solver.missions.history import integrate_missions, unworn_course
 from solver.missions.mission import Mission
 from solver.missions.passage import (
     FIRST_FREQUENCIES,

@@ -14,7 +14,6 @@ from solver.settings import Scheme, SolverSettings
 from solver.wear import step as control
 from solver.wear.check import chosen_for_another
 from solver.wear.step import Adaptive, Given, LargestDepth, Step, WearLine
-from solver.wear.wearing_joint import Choice
 from tests.solver.worn_slider import AREA, END, begun
 
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit")
@@ -179,5 +178,5 @@ def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(harmonics, sha
     work.case = replace(work.case, settings=SolverSettings(harmonics, 64, rtol=1e-2))
     now = left_out(state.resolution.orders, state.point.evaluation)
     assert 1e-4 < now < 0.5
-    choice = Choice(share * now, Estimate(error, error), accurate=True)
-    assert chosen_for_another(work, replace(state, choice=choice)) is anew
+    state = replace(state, left_out=share * now, estimate=Estimate(error, error), accurate=True)
+    assert chosen_for_another(work, state) is anew
