@@ -12,9 +12,8 @@ from solver.settings import SolverSettings
 from tests.benchmarks.frame import Table, arguments
 from tests.cantilever import FRICTION, Cantilever
 from tests.event_driven import NoPeriodicMotionError
-from tests.solver.exact import errors_of, states
+from tests.solver.exact import SPRINGS, errors_of, exact_tip, reported_tip, states
 from tests.solver.models import branch_states
-from tests.solver.test_rigid import SPRINGS, exact, reported
 
 CANTILEVERS = [  # spring, force, N, frequency, rad/s
     *((name, *at) for name in ("rigid", "stiff spring") for at in ((3.0, 0.7), (3.0, 0.96), (6.0, 0.85))),
@@ -44,7 +43,7 @@ def cantilevers(rtol: float) -> None:
     for name, force, omega in CANTILEVERS:
         model, settings = Cantilever(spring=SPRINGS[name]).model(), SolverSettings(rtol=rtol)
         (start,) = branch_states(model, FRICTION, force, [omega], settings)
-        found = zip(reported(model, FRICTION, start, settings), exact(name, force, omega), strict=True)
+        found = zip(reported_tip(model, start, settings), exact_tip(name, force, omega), strict=True)
         errors = [float(abs(own / true - 1.0)) for own, true in found]
         good = 0.5 * max(errors) < start.response_error <= rtol and max(errors) < rtol
         table.row(name, force, omega, *errors, start.response_error, "yes" if good else "no")

@@ -9,8 +9,10 @@ import numpy as np
 from solver.accuracy.error_estimate import Estimate
 from solver.model import ReducedModel
 from solver.outcome import Outcome
+from solver.results.history import StartState
 from solver.settings import SolverSettings
 from tests import references
+from tests.cantilever import FRICTION, Cantilever
 from tests.solver.models import branch_states, march_wear, scene
 
 SLIDING = ("forward", "backward")
@@ -126,3 +128,23 @@ def states() -> dict[str, Callable[[], ExactState]]:
     return found | {
         f"vibro-impact {omega} {words[sweep]}": partial(vibro_impact, omega, sweep) for omega, sweep in IMPACTS
     }
+
+
+# --- a cantilever with rigid friction at its tip ---
+
+SPRINGS = {"rigid": np.inf, "soft spring": 20.0, "stiff spring": 200.0}  # N/m
+
+
+@lru_cache
+def exact_tip(name: str, force: float, omega: float) -> tuple[complex, float]:
+    """First harmonic and largest displacement of the tip, m."""
+    beam = Cantilever(spring=SPRINGS[name])
+    orbit, tip = beam.orbit(force, omega), beam.tip_of_orbit()
+    first = sum(share * orbit.harmonic(dof) for dof, share in enumerate(tip))
+    return complex(first), float(np.abs(tip @ orbit.sample(4096)[: tip.size]).max())
+
+
+def reported_tip(model: ReducedModel, start: StartState, settings: SolverSettings) -> tuple[complex, float]:
+    """The same as reported of an unworn state."""
+    history = march_wear(model, FRICTION, start, 0.0, 1.0, "explicit", np.zeros(1), settings)
+    return complex(history.response[0, 0]), float(history.response_peak[0, 0])

@@ -1,6 +1,8 @@
-"""How states choose their harmonics and samples, and their error estimates against much finer states."""
+"""Certificates: good states hold, broken ones are caught; how states choose harmonics and samples; their estimates."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -10,12 +12,118 @@ from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.refinement import refine
 from solver.contact.coulomb import SLIP, STICK
+from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, final_history, largest_responses, transfer
 from solver.newton.run import Run
+from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
-from tests.solver.models import OMEGA, first_point, random_model, scene
+from tests.solver.models import OMEGA, branch_states, first_point, random_model, scene
+
+# --- certificates ---
+
+
+TOLERANCE = SolverSettings().tolerance
+SLIDER = ("sdof_slider", 0.5, 10.0, 2 * np.pi * 160.0)
+ALL_KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent")
+
+
+@lru_cache
+def on_branch(name, friction, amplitude, omega, n_harmonics):
+    """The state of a sweep up, evaluated from what is stored of it: joint and evaluation."""
+    model, settings = scene(name, n_harmonics), SolverSettings(n_harmonics, 256)
+    (start,) = branch_states(model, friction, amplitude, [omega], settings)
+    joint = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
+    return joint, evaluated(joint, start.state)[1]
+
+
+@lru_cache
+def random_state():
+    """Elastic joint with pairs that stick, slip and open."""
+    case = build_case(random_model(1, ALL_KINDS), 0.4, OMEGA, SolverSettings(5, 128))
+    worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(ALL_KINDS))
+    return case.joint(OMEGA, 60.0), first_point(case, OMEGA, 60.0, worn).evaluation
+
+
+def failing(joint, evaluation):
+    return set(certify(joint, evaluation).failures(TOLERANCE))
+
+
+@pytest.mark.slow
+def test_states_of_the_textbook_scenes_hold_and_penetration_falls_as_harmonics_are_added():
+    assert not failing(*on_branch("two_masses", 0.5, 20.0, 0.4, 3))
+    wall = [on_branch("vibro_impact", 0.0, 0.02, 1.2, n) for n in (3, 11, 21)]
+    assert not any(failing(*state) for state in wall)
+    values = [certify(*state).penetration for state in wall]
+    assert (np.diff(values) < 0.0).all()
+    assert values[-1] < values[0] / 8.0
+
+
+def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_overshoots():
+    joint, evaluation = on_branch(*SLIDER, 21)
+    limit = 0.5 * evaluation.force_t[0, 0].max()
+    overshoot = np.abs(evaluation.force_h[0, 1] @ joint.basis.synthesis).max() / limit - 1.0
+    assert overshoot > 0.1, "Gibbs"
+    certificate = certify(joint, evaluation)
+    assert certificate.cone_violation < 1e-12
+    assert certificate.tension == 0.0
+
+
+@pytest.mark.parametrize("state", [on_branch(*SLIDER, 5), random_state()], ids=["slider", "joint"])
+def test_an_unconverged_force_and_friction_that_drives_are_caught(state):
+    joint, evaluation = state
+    balance = Balance(joint, evaluation.history, evaluation.wear_depth)
+    noise = (
+        1e-5 * np.abs(evaluation.predicted_h).max() * np.random.default_rng(0).normal(size=evaluation.predicted_h.shape)
+    )
+    assert "residual" in failing(joint, balance.evaluate(evaluation.predicted_h + noise))
+    # the motion is made to fit the force, so that equilibrium alone would not tell
+    turned = evaluation.force_h.copy()
+    turned[:, 1:] *= -1.0
+    moved = joint.to_relative(evaluation.displacement_h)
+    left = joint.structure.force_h() - joint.to_relative(turned) - joint.structure.apply(moved)
+    for i, stiffness in enumerate(joint.structure.dynamic_stiffness, 1):
+        step = np.linalg.solve(stiffness, left[:, 2 * i - 1] - 1j * left[:, 2 * i])
+        moved[:, 2 * i - 1] += step.real
+        moved[:, 2 * i] -= step.imag
+    moved[:, 0] += np.linalg.solve(joint.structure.static_stiffness, left[:, 0])
+    failures = certify(joint, replace(evaluation, force_h=turned, displacement_h=joint.to_pairs(moved))).failures(
+        TOLERANCE
+    )
+    assert "residual" not in failures
+    assert failures["energy_error"][0] > 0.5
+
+
+def test_a_slip_that_does_not_repeat_is_caught():
+    joint, evaluation = random_state()
+    slipping = int(np.argmax(evaluation.slip_work))
+    state_t = evaluation.state_t.copy()
+    limit = float(joint.friction_coefficient[0]) * evaluation.force_t[:, 0].max()
+    state_t[slipping, 0] += 0.02 * limit * np.linspace(0.0, 1.0, state_t.shape[2])
+    assert failing(joint, replace(evaluation, state_t=state_t)) == {"periodicity_error"}
+    assert failing(joint, replace(evaluation, periodicity_error=0.02 * limit)) == {"periodicity_error"}
+
+
+def test_a_pull_and_surfaces_in_each_other_are_caught():
+    joint, evaluation = random_state()
+    pulled = evaluation.force_t.copy()
+    pulled[0, 0, 3] = -0.05 * pulled[:, 0].max()
+    assert "tension" in failing(joint, replace(evaluation, force_t=pulled))
+    force_h = evaluation.force_h.copy()
+    force_h[0, 0] = 0.0
+    force_h[0, 0, 1] = evaluation.force_t[:, 0].max()
+    assert {"tension", "residual"} <= failing(joint, replace(evaluation, force_h=force_h))
+    moved = np.linalg.norm(evaluation.displacement_h[:, :, 1:] @ joint.basis.synthesis[1:], axis=1).max()
+    closer = evaluation.displacement_h.copy()
+    closer[0, 0, 0] += 0.2 * moved
+    assert "penetration" in failing(joint, replace(evaluation, displacement_h=closer))
+    # worn depth and gap open the pair
+    assert certify(joint, replace(evaluation, wear_depth=evaluation.wear_depth + moved)).penetration == 0.0
+
+
+# --- refinement ---
+
 
 SLIDER_OMEGA = 0.6 * float(np.sqrt(1.6e6))
 SLIPPING = 400.0  # N: excitation at which the pairs of the random models slip
@@ -70,10 +178,9 @@ def test_a_state_with_even_harmonics_keeps_them():
     assert 2 in orders
 
 
-@pytest.mark.parametrize("settings", [SolverSettings(), SolverSettings(samples=128)])
-def test_a_stuck_state_keeps_the_first_harmonic_alone(settings):
+def test_a_stuck_state_keeps_the_first_harmonic_alone():
     amplitude = 1e-2
-    case, point = started(random_model(1), FRICTION, OMEGA, amplitude, settings)
+    case, point = started(random_model(1), FRICTION, OMEGA, amplitude, SolverSettings())
     # the second solve starts from where the first one slipped to: everything sticks
     again = solved_at(case, OMEGA, amplitude, State(point.evaluation, point.history, 1.0), case.resolution)
     assert (again.evaluation.status_t == STICK).all()
@@ -131,9 +238,7 @@ def true_error(refined, amplitude, fine):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("amplitude", "rtol", "fine"), [(100.0, 1e-2, 25), (800.0, 1e-2, 25), (200.0, 1e-3, 115), (400.0, 1e-3, 115)]
-)
+@pytest.mark.parametrize(("amplitude", "rtol", "fine"), [(100.0, 1e-2, 25), (200.0, 1e-3, 115)])
 def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude, rtol, fine):
     case, point = started(random_model(4, KINDS), FRICTION, OMEGA, amplitude, SolverSettings(rtol=rtol))
     assert SLIP in point.evaluation.status_t

@@ -1,6 +1,6 @@
 """Fourier basis, condensed structure and penalty: definitions, full equations, a folded sector against its ring."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from solver import build_model
 from solver.model import needed_nodal_diameters
 from solver.settings import Resolution, SolverSettings
 from solver.structure import condensation
-from solver.structure.condensation import build_structure, frequency_slope, relative_indices
-from solver.structure.fourier import build_basis, change_orders, derivative, from_complex, to_complex
+from solver.structure.condensation import build_structure, condense, frequency_slope, relative_indices
+from solver.structure.fourier import build_basis, change_orders, from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.joint import build_case
 from solver.structure.penalty import build_penalty
@@ -32,17 +32,9 @@ KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
 HARMONICS = 3
 ORDERS = (1, 2, 3)
 AMPLITUDE = 60.0
-DOVETAIL_OMEGA = 2 * np.pi * 212.0
+
 
 # --- Fourier basis ---
-
-
-def test_synthesis_is_the_series_0_cos_1_sin_1_cos_2_sin_2():
-    time = np.arange(32) / 32 * 2 * np.pi / OMEGA
-    expected = 0.3 + 1.1 * np.cos(OMEGA * time) - 0.4 * np.sin(OMEGA * time) + 2.5 * np.sin(2 * OMEGA * time)
-    assert np.array([0.3, 1.1, -0.4, 0.0, 2.5]) @ build_basis((1, 2), 32).synthesis == pytest.approx(
-        expected, abs=1e-14
-    )
 
 
 def test_a_complex_amplitude_is_the_real_part_of_a_rotation_forwards():
@@ -56,14 +48,7 @@ def test_a_complex_amplitude_is_the_real_part_of_a_rotation_forwards():
     assert np.array_equal(values_h[:, 0], static)
 
 
-def test_derivative_multiplies_the_amplitude_of_harmonic_n_by_i_n_omega():
-    values_h = np.random.default_rng(1).normal(size=(2, 3, 9))
-    rate_h = derivative(values_h, OMEGA * np.arange(1, 5))
-    assert to_complex(rate_h) == pytest.approx(1j * OMEGA * np.arange(1, 5) * to_complex(values_h), abs=1e-12)
-    assert not rate_h[..., 0].any()
-
-
-@pytest.mark.parametrize(("orders", "samples"), [((1,), 2), ((1, 2, 3), 6), ((1, 3, 5), 10), ((7,), 4), ((), 0)])
+@pytest.mark.parametrize(("orders", "samples"), [((1, 2, 3), 6), ((1, 3, 5), 10), ((), 0)])
 def test_samples_that_alias_are_refused(orders, samples):
     with pytest.raises(ValueError, match="samples"):
         build_basis(orders, samples)
@@ -80,15 +65,7 @@ def test_analysis_undoes_synthesis_for_any_orders(orders, extra, seed):
 
 @pytest.mark.parametrize(
     ("orders", "wanted"),
-    [
-        ((1, 2), (1, 2, 3, 4)),
-        ((1, 2, 3, 4), (1,)),
-        ((1, 2, 3, 4, 5), (1, 3, 5)),
-        ((1, 3, 5), (1, 2, 3, 4, 5)),
-        ((1, 3, 5), (1, 2, 5, 8)),
-        ((), (1, 3)),
-        ((1, 3), ()),
-    ],
+    [((1, 2, 3, 4, 5), (1, 3, 5)), ((1, 3, 5), (1, 2, 5, 8)), ((), (1, 3)), ((1, 3), ())],
 )
 def test_changed_orders_keep_the_harmonics_that_both_have(orders, wanted):
     values_h = np.random.default_rng(3).normal(size=(2, 3, 2 * len(orders) + 1))
@@ -104,9 +81,7 @@ def test_changed_orders_keep_the_harmonics_that_both_have(orders, wanted):
 
 
 # --- condensation ---
-
-
-@pytest.mark.parametrize("n_inner", [0, 1, 6])
+@pytest.mark.parametrize("n_inner", [0, 6])
 def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_inner):
     model = random_model(1, KINDS, n_inner)
     linear = model.linear[0]
@@ -130,8 +105,9 @@ def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_i
     )
 
 
-@pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(6, 2), (5, 2), (5, 1), (6, 3), (7, 0)])
-@pytest.mark.parametrize("orders", [(1, 3), (1, 3, 5), (1, 2, 5), (1,)])
+@pytest.mark.parametrize(
+    ("n_sectors", "nodal_diameter", "orders"), [(6, 2, (1, 3)), (5, 2, (1, 3, 5)), (6, 3, (1, 2, 5)), (7, 0, (1,))]
+)
 def test_any_orders_are_harmonics_of_all_of_them(n_sectors, nodal_diameter, orders):
     # each order sees the nodal diameter of its own, not of its place
     model = cyclic_model(9, KINDS, n_sectors, nodal_diameter, 5)
@@ -231,14 +207,6 @@ def test_needed_nodal_diameters_are_folded():
     assert needed_nodal_diameters(4, 0, 9) == (0,)
 
 
-def test_a_structure_that_nothing_holds_is_singular():
-    model = random_model(8)
-    free = {name: 0.0 * getattr(model.linear[0], name) for name in ("mass", "damping", "stiffness")}
-    loose = replace(model, linear={0: replace(model.linear[0], **free)})
-    with pytest.raises(np.linalg.LinAlgError):
-        build_structure(loose, OMEGA, 1.0, (1,))
-
-
 def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch):
     model = scene("dovetail_sector", 5, mesh=1)
     orders = (1, 2, 3, 5)
@@ -258,56 +226,29 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     np.testing.assert_allclose(shared.apply(displacement_h), expected, rtol=0.0, atol=1e-13 * np.abs(expected).max())
     for roughly in (shared.apply_roughly(displacement_h), each.apply_roughly(displacement_h)):
         np.testing.assert_allclose(roughly, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
-    # nothing behind the joint
-    bare = replace(model, linear={0: only_pairs(model.linear[0], model.contact.n_contact)})
-    assert build_structure(bare, OMEGA, AMPLITUDE, orders).apply(displacement_h).shape == expected.shape
-
-
-def only_pairs(linear, n_contact):
-    """A structure without displacements other than those of the pairs."""
-    n = 3 * n_contact
-    square = {name: getattr(linear, name)[:n, :n] for name in ("mass", "damping", "stiffness")}
-    loads = {name: getattr(linear, name)[:n] for name in ("load_static", "load_harmonic")}
-    return replace(linear, **square, **loads, response=linear.response[:, :n])
 
 
 # --- penalty ---
-
-
-@pytest.mark.parametrize("n_harmonics", [1, 5, 21])
 @pytest.mark.parametrize(
-    ("name", "values", "omega", "inertial"),
-    [
-        ("sdof_slider", {}, 2 * np.pi * 160, True),
-        ("sdof_slider", {"normal_stiffness": 0.0}, 2 * np.pi * 160, True),
-        ("two_masses", {}, 0.5, True),
-        ("vibro_impact", {}, 1.2, False),
-    ],
+    ("name", "omega", "inertial"),
+    [("sdof_slider", 2 * np.pi * 160, True), ("two_masses", 0.5, True), ("vibro_impact", 1.2, False)],
 )
-def test_a_mass_directly_on_a_slider_is_marched_with_its_mass(name, values, omega, inertial, n_harmonics):
-    penalty = build_penalty(scene(name, n_harmonics, **values), omega, n_harmonics)
-    assert penalty.inertial.tolist() == [inertial]
+def test_a_mass_directly_on_a_slider_is_marched_with_its_mass(name, omega, inertial):
+    assert build_penalty(scene(name, 5), omega, 5).inertial.tolist() == [inertial]
 
 
-@pytest.mark.parametrize("n_harmonics", [1, 3, 7])
-def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness(n_harmonics):
+def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness():
     model = dovetail()
-    penalty = build_penalty(model, DOVETAIL_OMEGA, n_harmonics)
+    penalty = build_penalty(model, 2 * np.pi * 212.0, 3)
     assert not penalty.inertial.any()
-    relative = model.contact.dofs.ravel()
-    full = model.linear[0].stiffness
-    inner = np.setdiff1d(np.arange(full.shape[0]), relative)
-    condensed = full[np.ix_(relative, relative)] - full[np.ix_(relative, inner)] @ np.linalg.solve(
-        full[np.ix_(inner, inner)], full[np.ix_(inner, relative)]
-    )
-    largest = np.linalg.eigvalsh(condensed).max()
+    full, relative = model.linear[0].stiffness, model.contact.dofs.ravel()
+    largest = np.linalg.eigvalsh(condense(full, relative, np.zeros(len(full))).stiffness).max()
     assert (penalty.tangential < largest * 1.5).all()
     assert (penalty.tangential > largest * 1e-3).all()
     assert (penalty.normal > largest * 1e-3).all()
 
 
-@pytest.mark.parametrize("orders", [(1, 2, 3), (1, 3, 5), (1,)])
-@pytest.mark.parametrize("free", [[], [0, 2], [0, 1, 2]])
+@pytest.mark.parametrize(("free", "orders"), [([], (1, 2, 3)), ([0, 2], (1, 3, 5)), ([0, 1, 2], (1,))])
 def test_motion_and_surplus_of_a_joint_are_inverse(free, orders):
     model = with_free_masses(random_model(4), free)
     case = build_case(model, 0.4, OMEGA, SolverSettings(), Resolution(orders, 16))
@@ -317,11 +258,6 @@ def test_motion_and_surplus_of_a_joint_are_inverse(free, orders):
     correction = np.random.default_rng(5).normal(size=(3, 3, 2 * len(orders) + 1))
     motion = joint.law.motion(correction)
     assert joint.law.force(motion) == pytest.approx(correction, abs=1e-12)
-    several = np.random.default_rng(6).normal(size=(*correction.shape, 4))
-    together = joint.law.motion(several)
-    for column in range(4):
-        alone = joint.law.motion(several[..., column])
-        assert together[..., column] == pytest.approx(alone, rel=1e-13, abs=1e-13 * np.abs(alone).max())
     for pair in range(3):
         assert motion[pair, 0] == pytest.approx(correction[pair, 0] / penalty.normal[pair], rel=1e-12, abs=0.0)
         if pair not in free:
