@@ -13,7 +13,6 @@ from tests.references import (
     slider_wear_depth,
     vibro_impact_orbit,
 )
-from tests.solver.random_orbits import drawn, wall
 
 TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2)
 VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
@@ -124,23 +123,3 @@ def test_wear_with_den_hartog_has_its_closed_solution():
     )
     grown = np.arctanh(np.sqrt(1 - (10 * b) ** 2)) + 1.1e-11 / 1e-4 * 1e5 * 4 * full * cycles
     assert depth == pytest.approx((10 - np.sqrt(1 - np.tanh(grown) ** 2) / abs(b)) / 1e5, rel=1e-9, abs=1e-18)
-
-
-@pytest.mark.parametrize("kind", ["slider", "stopping slider", "two masses"])
-def test_a_contact_pair_moves_like_the_mass_on_a_slider(kind):
-    scene = drawn(kind, 2)
-    at, masses = scene.tangent, np.diag(scene.mass) > 0.0
-    parts = (part[np.ix_(masses, masses)] for part in (scene.mass, scene.damping, scene.stiffness))
-    normal = scene.normal_load or scene.load_static[scene.normal]
-    load, place = scene.load_harmonic[masses], int(masses[:at].sum())
-    twin = coulomb_orbit(*parts, load, place, scene.friction * normal, scene.omega)
-    orbit = scene.orbit_near(np.zeros(masses.size), np.zeros(masses.size))
-    expected = [twin.harmonic(index) for index in range(len(load))]
-    assert scene.response(orbit) == pytest.approx(np.array(expected), rel=1e-8)
-    assert scene.slip_work(orbit) == pytest.approx(normal * twin.path(place, ("forward", "backward")), rel=1e-8)
-
-
-def test_a_contact_pair_moves_like_the_mass_at_a_wall():
-    orbit = wall(0.9, 1.5, 0.05, 50.0).orbit_near(np.zeros(2), np.zeros(2))
-    twin = vibro_impact_orbit(1.0, 0.1, 1.0, 1.0, 50.0, 1.5, 0.9, sweep_start=0.85)
-    assert abs(orbit.harmonic(0)) == pytest.approx(abs(twin.harmonic(0)), rel=1e-8)

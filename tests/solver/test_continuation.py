@@ -9,14 +9,7 @@ from scipy.linalg import expm
 
 from solver.continuation import transient
 from solver.continuation.arc_length import Arc
-from solver.continuation.natural import (
-    LARGEST_STEP_RATIO,
-    NEAR_ITERATIONS,
-    STEP_SAFETY,
-    Lengths,
-    follow_naturally,
-    take_step,
-)
+from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
 from solver.continuation.phase_lag import (
     excitation_product,
     frequency_derivative,
@@ -26,14 +19,14 @@ from solver.continuation.phase_lag import (
 )
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State
+from solver.harmonic_balance.state import State
 from solver.newton.run import Bordered, Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import evaluated, periodic_state
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.references import coulomb_orbit
-from tests.solver.models import converged_state, crossings, dovetail, first_point, scene
+from tests.solver.models import branch_states, first_point, scene
 from tests.solver.reconstruction import full_motion
 
 # --- natural steps ---
@@ -84,50 +77,6 @@ def test_natural_steps_end_before_a_fold_and_say_so():
     assert size(point) == pytest.approx(0.1, rel=0.02, abs=0.0)
 
 
-class Line:
-    """Steps that are found up to a length, with an error of a given order; where none is found, a failure."""
-
-    def __init__(self, found_to=10.0, allowed=1.0, order=2):
-        self.found_to, self.allowed, self.order = found_to, allowed, order
-        self.tried: list[float] = []
-
-    def attempt(self, here, length):
-        self.tried.append(length)
-        return here + length if length <= self.found_to else None
-
-    def judge(self, _, __, length):
-        return (length / self.allowed) ** self.order
-
-    def rescue(self, _, length):
-        return Failure(Outcome.BRANCH_LOST, f"{length:g}")
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_step_and_the_next_one_are_as_long_as_allowed_but_for_a_safety(order):
-    for allowed, tried, expected in (
-        (0.8, [0.6], STEP_SAFETY * 0.8),
-        (100.0, [0.6], LARGEST_STEP_RATIO * 0.6),
-        (0.5, [0.6, 0.5 * STEP_SAFETY], None),
-    ):
-        line = Line(allowed=allowed, order=order)
-        end, ahead = take_step(line, 2.0, 0.6, Lengths(order))
-        assert line.tried == pytest.approx(tried)
-        assert end == 2.0 + line.tried[-1]
-        assert expected is None or ahead == pytest.approx(expected)
-
-
-def test_a_step_that_is_not_found_is_shortened_and_rescued_at_last():
-    line = Line(found_to=0.1)
-    assert take_step(line, 0.0, 1.0, Lengths(2, rescue=0.05))[0] == 0.0625
-    assert line.tried == [1.0, 0.25, 0.0625]
-    line = Line(found_to=0.0)
-    assert take_step(line, 0.0, 1.0, Lengths(2, rescue=0.2)) == Failure(Outcome.BRANCH_LOST, "0.2")
-    assert line.tried == [1.0, 0.25, 0.2]
-    line = Line(allowed=0.1)
-    assert isinstance(take_step(line, 0.0, 1e-3, Lengths(2, shortest=0.5)), Failure)
-    assert line.tried == [0.5]
-
-
 # --- relaxation in time ---
 
 
@@ -152,7 +101,7 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts():
     omega, settings, idle, budget = 1.56, SolverSettings(21, 256), np.zeros(1), Budget()
     case = build_case(scene("vibro_impact"), 0.0, omega, settings)
     before, joint = case.joint(1.55, FORCE), case.joint(omega, FORCE)
-    state = converged_state(case.model, 0.0, FORCE, 1.55, settings)
+    state = branch_states(case.model, 0.0, FORCE, [1.55], settings)[0].state
     assert np.abs(state.contact_force_h).max() > 1e-2
     start = State(evaluated(before, state)[1], state.start_history, 1.55)
     found = relax_to_periodic(case, joint, idle, start, before, Run(settings.tolerance, budget))
@@ -169,8 +118,9 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
         return not Run(1e-8).is_stable(balance_at(point.parameter, point.history), point.evaluation)
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
-    start = first(0.03)
-    middle = next(filter(grows, crossings(Arc(balance_at, start, 0.03, Run(1e-9)), 0.03, 1.0)))
+    arc = Arc(balance_at, first(0.03), 0.03, Run(1e-9))
+    passed = ((a, b) for a, b, _ in arc.steps(1.0) if (a.parameter - 0.03) * (b.parameter - 0.03) < 0.0)
+    middle = next(filter(grows, (arc.state_at(a, b, 0.03) for a, b in passed)))
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
     found = relax_to_periodic(case, joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
@@ -275,17 +225,8 @@ def test_the_change_of_the_lag_with_the_frequency_is_that_of_finite_differences(
     assert float(near.reduced[0, 0]) == pytest.approx(expected, rel=1e-4)
 
 
-@pytest.mark.parametrize("word", ["slider", "dovetail"])
-def test_derivatives_with_the_frequency_are_those_of_finite_differences(word):
-    if word == "slider":
-        case, state = slider_state()
-    else:
-        case = build_case(dovetail(3), 0.5, LAG_OMEGA, TIGHT)
-        joint = case.joint(LAG_OMEGA, 0.5)
-        predicted = np.random.default_rng(0).normal(size=(joint.component_index.size, 7)) * 10.0
-        predicted[joint.component_index % 3 == 0, 0] += 100.0
-        balance = Balance(joint, np.zeros((16, 2)), np.zeros(16))
-        state = Bordered(balance, balance.evaluate(predicted), np.array([LAG_OMEGA]), np.zeros(1))
+def test_derivatives_with_the_frequency_are_those_of_finite_differences():
+    case, state = slider_state()
     found, length = frequency_derivative(state.balance, state.at), 1e-5 * LAG_OMEGA
     ends = []
     for omega in (LAG_OMEGA - length, LAG_OMEGA + length):

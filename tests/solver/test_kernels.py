@@ -20,8 +20,9 @@ from solver.model import FloatArray, IntArray
 from solver.settings import Resolution, SolverSettings
 from solver.structure.fourier import FourierBasis, build_basis, to_complex
 from solver.structure.joint import build_case
-from tests.solver import contact_twins as twins
+from tests.contact_pair import ContactPair
 from tests.solver.models import OMEGA, PRELOAD, random_model, with_free_masses
+from tests.solver.reconstruction import mass_period, pair_period, status
 
 FRICTION = 0.4
 ORDERS = (1, 2, 3)
@@ -46,10 +47,10 @@ def run_pairs(predicted_t, start, periodicity, most_periods):
 
 
 def assert_that_of_the_twin(predicted_t, found, pair, start, periods, tolerance):
-    force, slip = twins.pair_period(predicted_t[pair], FRICTION, start, periods)
+    force, slip = pair_period(predicted_t[pair], FRICTION, start, periods)
     assert found.force_t[pair] == pytest.approx(force, abs=tolerance)
     assert found.state_t[pair] == pytest.approx(slip, abs=tolerance)
-    assert np.array_equal(found.status_t[pair], twins.status(predicted_t[pair], FRICTION, slip[:, :-1]))
+    assert np.array_equal(found.status_t[pair], status(predicted_t[pair], FRICTION, slip[:, :-1]))
     return slip
 
 
@@ -103,7 +104,7 @@ def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed):
     for pair in range(n_contact):
         start, plain, left = begin[pair], 1, 1.0
         while left >= 1e-12:
-            _, slip = twins.pair_period(predicted_t[pair], FRICTION, start, 1)
+            _, slip = pair_period(predicted_t[pair], FRICTION, start, 1)
             left, start, plain = np.linalg.norm(slip[:, -1] - start), slip[:, -1], plain + 1
         slowest = max(slowest, plain)
         assert_that_of_the_twin(predicted_t, found, pair, start, 1, 1e-6)
@@ -152,51 +153,56 @@ def several_masses(seed):
     return MassCase(predicted_h, random.uniform(0.5, 2.0, 6), line)
 
 
-def one_mass(seed, n_samples, line):
-    """One mass; on a line its normal force stays positive."""
-    random, swing, second = np.random.default_rng(seed), 1.0 if line < 0 else 0.6, 1.0 if line < 0 else 0.0
-    predicted_h = random.normal(size=(1, 3, 7)) * 4.0 * np.array([swing, 1.0, second])[:, None]
-    predicted_h[:, 0, 0] = 15.0
-    predicted_h[:, 1:, 0] *= 0.1
-    mass = np.array([0.7 + 0.1 * seed])
-    return MassCase(predicted_h, mass, np.array([line]), build_basis(ORDERS, n_samples))
+def one_mass(predicted_h, n_samples, line):
+    return MassCase(predicted_h[None], np.array([0.7]), np.array([line]), build_basis(ORDERS, n_samples))
 
 
-@pytest.mark.parametrize(("seed", "signs"), [(0, 3), (2, 2), (8, 3), (15, 3)])
-def test_a_line_is_that_of_the_exact_twin_to_second_order(seed, signs):
-    case = one_mass(seed, 64, 0)
-    normal, pull = (
-        twins.Series(np.concatenate([[row[0]], to_complex(row)]), case.omega) for row in case.predicted_h[0, :2]
-    )
+@pytest.mark.parametrize(("amplitude", "n_phases"), [(8.0, 3), (30.0, 2)])
+def test_a_line_is_that_of_the_exact_motion_to_second_order(amplitude, n_phases):
+    """A free mass on a slider under a constant normal load and a harmonic force: with stops and without."""
+    predicted_h = np.zeros((3, 7))
+    predicted_h[0, 0], predicted_h[1, 1] = 15.0, amplitude
+    case = one_mass(predicted_h, 64, 0)
     mass, drag = float(case.mass[0]), float(case.masses.drag[0])
-    slides = twins.slide_exactly(pull, normal.scaled(FRICTION), mass, drag, periods=20)
-    assert len({slide.sign for slide in slides}) == signs
-    exact = np.array([twins.harmonic(slides, n, case.omega) for n in range(4)])
-    work = twins.slip_work(slides, normal)
+    given = [[mass]], [[drag]], [[0.0]], [0.0], [amplitude]
+    pair = ContactPair(*given, None, 0, 15.0, 0.0, FRICTION, case.omega)
+    orbit = pair.orbit_from_rest(20)
+    assert len({segment.phase for segment in orbit.segments}) == n_phases
+    rates = 1j * case.omega * np.array(ORDERS)
+    moved = np.array([orbit.harmonic(0, order) for order in ORDERS])
+    exact, work = np.array([amplitude, 0.0, 0.0]) - (rates * mass + drag) * rates * moved, pair.slip_work(orbit)
     samples, errors = np.array([32, 64, 128, 256, 512, 1024, 2048]), []
     for n_samples in samples.tolist():
-        period, force_h = one_mass(seed, n_samples, 0).run()
-        force = np.concatenate([force_h[0, 0, :1], to_complex(force_h[0, 0])])
-        errors.append((np.abs(force - exact).max() / np.abs(exact).max(), abs(period.slip_work[0] / work - 1.0)))
+        period, force_h = one_mass(predicted_h, n_samples, 0).run()
+        error = np.abs(to_complex(force_h[0, 0]) - exact).max() / np.abs(exact).max()
+        errors.append((error, abs(period.slip_work[0] / work - 1.0)))
     for each in np.array(errors).T:
         # events fall anywhere in their steps, so the errors scatter about their order
         assert np.polyfit(np.log(samples), np.log(each), 1)[0] < -1.6
         assert (each < 80.0 / samples**2).all()
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_plane_is_that_of_a_plain_twin_with_tiny_steps(seed):
-    n_steps = 8192
-    fine = one_mass(seed, n_steps, -1)
-    predicted, step = fine.predicted_h[0] @ fine.basis.synthesis, fine.masses.step
-    limit, mass, drag = FRICTION * np.maximum(predicted[0], 0.0), float(fine.mass[0]), float(fine.masses.drag[0])
-    force, moved = twins.step_in_the_plane(predicted[1:], limit, mass, drag, n_steps * step)
+@pytest.mark.parametrize(("seed", "line"), [(1, -1), (2, -1), (2, 0)])
+def test_a_mass_moves_as_in_a_plain_twin_with_tiny_steps(seed, line):
+    n_steps, random = 8192, np.random.default_rng(seed)
+    predicted_h = random.normal(size=(3, 7)) * 4.0
+    predicted_h[0, 0], predicted_h[2, :] = 15.0, predicted_h[2] if line < 0 else 0.0
+    predicted_h[1:, 0] *= 0.1
+    fine = one_mass(predicted_h, n_steps, line)
+    predicted, step, mass, drag = (
+        predicted_h @ fine.basis.synthesis,
+        fine.masses.step,
+        fine.mass[0],
+        fine.masses.drag[0],
+    )
+    normal = np.maximum(predicted[0], 0.0)
+    force, moved = mass_period(predicted[1:], FRICTION * normal, mass, drag, step)
     expected, speed = force @ fine.basis.analysis, np.hypot(*moved)
     assert 0.0 < (speed == 0.0).mean() < 0.9, "sticks and slips"
-    period, force_h = one_mass(seed, n_steps // 8, -1).run()
+    period, force_h = one_mass(predicted_h, n_steps // 8, line).run()
     # the twin is of first order: 2 pi / N of the period, several times over
     assert force_h[0] == pytest.approx(expected, abs=3e-3 * np.abs(expected).max())
-    assert period.slip_work[0] == pytest.approx((predicted[0].clip(0.0) * speed).sum() * step, rel=3e-3)
+    assert period.slip_work[0] == pytest.approx((normal * speed).sum() * step, rel=3e-3)
 
 
 def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero():

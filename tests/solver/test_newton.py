@@ -9,8 +9,8 @@ import pytest
 from numba import njit
 
 from solver.clock import computing_time
-from solver.contact.coulomb import SEPARATED, SLIP
-from solver.harmonic_balance.dlft import Balance, Linearisation
+from solver.contact.coulomb import SLIP
+from solver.harmonic_balance.dlft import Balance
 from solver.newton import linear_solver
 from solver.newton.linear_solver import (
     DENSE_UNKNOWNS,
@@ -21,12 +21,11 @@ from solver.newton.linear_solver import (
     build_factor,
     solve_gmres,
 )
-from solver.newton.period_preconditioner import PeriodFactor, build_period_factor, stiffness_of_most
+from solver.newton.period_preconditioner import build_period_factor, stiffness_of_most
 from solver.newton.run import Bordered, bordered_step, solve_newton
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
-from solver.structure.joint import build_case
 from tests.solver.models import PRELOAD, branch_states, dovetail, march_wear, random_balance, random_model
 
 # --- Newton's method on small piecewise examples ---
@@ -271,25 +270,6 @@ def test_the_march_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see
     assert residual(tangent, step, step) > 0.1
 
 
-def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch):
-    model = dovetail()
-    omega = 2.0 * np.pi * 213.0
-    joint = build_case(model, 0.5, omega, SMALL, Resolution(all_orders(13), 128)).joint(omega, 5.0)
-    balance = Balance(joint, np.zeros((model.contact.n_contact, 2)), np.zeros(model.contact.n_contact))
-    predicted = joint.structure.force_h()
-    predicted[:, 1:3] = predicted[:, :1] * np.random.default_rng(1).normal(size=(joint.component_index.size, 2))
-    tangent = tangent_of(balance, predicted)
-    status = tangent.at.status_t
-    assert all((status == one).any(axis=1).sum() >= 10 for one in (SEPARATED, SLIP))
-    assert isinstance(build_factor(tangent), PeriodFactor)
-    # free to slide as a whole: a right-hand side that can be reached
-    right = tangent.apply(np.random.default_rng(2).normal(size=predicted.shape))
-    counted, plain = [], Linearisation.apply_roughly
-    monkeypatch.setattr(Linearisation, "apply_roughly", lambda self, step: counted.append(1) or plain(self, step))
-    assert residual(tangent, JacobianSolver().solve(tangent, [right])[0], right) < ACCURACY
-    assert len(counted) <= 30
-
-
 # --- further unknowns ---
 
 
@@ -334,9 +314,6 @@ def test_a_bordered_step_is_that_of_the_whole_jacobian(kinds):
     assert step == pytest.approx(wanted, rel=1e-6, abs=1e-6 * np.abs(wanted).max())
     reduced = problem.own - rows.reshape(2, -1) @ np.linalg.solve(jacobian, by_values)
     assert found == pytest.approx(reduced, rel=1e-6, abs=1e-6)
-
-
-# --- whole histories with dense solves ---
 
 
 # --- whole histories with dense solves ---

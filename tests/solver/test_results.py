@@ -18,9 +18,8 @@ from solver.structure.joint import build_case
 from studies import build_scene
 from studies.scenes.half_space import composite_modulus
 from studies.scenes.hertz import line_half_width, point_radius
-from tests.solver.contact_twins import pair_period
 from tests.solver.models import OMEGA, branch_states, dovetail, first_point, march_wear, random_model, scene
-from tests.solver.reconstruction import contact_work, full_motion, series
+from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
 from tests.studyrunner.histories import history
 
 # --- states ---
@@ -42,17 +41,6 @@ def periodic(kinds):
     point = first_point(case, OMEGA, AMPLITUDE, worn)
     joint = case.joint(OMEGA, AMPLITUDE)
     return joint, point, periodic_state(joint, point)
-
-
-@pytest.mark.parametrize("kinds", KINDS)
-def test_a_periodic_state_is_in_equilibrium_in_every_harmonic(kinds):
-    joint, point, state = periodic(kinds)
-    motion = full_motion(joint.model, state)
-    # the static harmonic is among them: mean forces balance
-    assert max(motion.imbalance) < 1e-8 * motion.force
-    assert state.omega == OMEGA
-    assert state.excitation_amplitude == AMPLITUDE
-    assert np.array_equal(state.start_history, point.evaluation.history)
 
 
 @pytest.mark.parametrize("kinds", KINDS)

@@ -1,4 +1,4 @@
-"""Fourier basis, condensed structure and penalty: definitions, full equations, a folded sector against its ring."""
+"""Fourier basis, condensed structure and penalty: definitions, full equations, finite differences."""
 
 from dataclasses import fields
 
@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver import build_model
 from solver.model import needed_nodal_diameters
 from solver.settings import Resolution, SolverSettings
 from solver.structure import condensation
@@ -16,20 +15,10 @@ from solver.structure.fourier import build_basis, change_orders, from_complex, t
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.joint import build_case
 from solver.structure.penalty import build_penalty
-from tests.solver.models import (
-    MASS,
-    OMEGA,
-    STIFFNESS,
-    cyclic_model,
-    definite,
-    dovetail,
-    random_model,
-    scene,
-    with_free_masses,
-)
+from tests.solver.models import OMEGA, cyclic_model, dovetail, random_model, scene, with_free_masses
+from tests.solver.reconstruction import harmonic_structure
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
-HARMONICS = 3
 ORDERS = (1, 2, 3)
 AMPLITUDE = 60.0
 
@@ -81,55 +70,42 @@ def test_changed_orders_keep_the_harmonics_that_both_have(orders, wanted):
 
 
 # --- condensation ---
-@pytest.mark.parametrize("n_inner", [0, 6])
-def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_inner):
-    model = random_model(1, KINDS, n_inner)
-    linear = model.linear[0]
-    structure = build_structure(model, OMEGA, AMPLITUDE, ORDERS)
-    relative, _ = relative_indices(model.contact)
-    force_h = np.random.default_rng(2).normal(size=(relative.size, 2 * HARMONICS + 1)) * 10.0
-    force = np.column_stack([force_h[:, 0], to_complex(force_h)])
-    moved = []
-    for n in range(HARMONICS + 1):
-        matrix = linear.stiffness + 1j * n * OMEGA * linear.damping - (n * OMEGA) ** 2 * linear.mass
-        load = {0: linear.load_static.astype(complex), 1: AMPLITUDE * linear.load_harmonic}.get(n, 0.0 * relative[0])
-        right = np.zeros(matrix.shape[0], complex) + load
-        right[relative] -= force[:, n]
-        moved.append(np.linalg.solve(matrix, right))
-    displacement_h = from_complex(moved[0].real, np.array(moved[1:]).T)
-    residual = structure.apply(displacement_h[relative]) + force_h - structure.force_h()
-    assert np.abs(residual).max() < 1e-11 * np.abs(force_h).max() * 10
-    full_response = linear.response @ displacement_h
-    assert structure.response_h(displacement_h[relative]) == pytest.approx(
-        full_response, abs=1e-12 * np.abs(full_response).max()
-    )
-
-
 @pytest.mark.parametrize(
-    ("n_sectors", "nodal_diameter", "orders"), [(6, 2, (1, 3)), (5, 2, (1, 3, 5)), (6, 3, (1, 2, 5)), (7, 0, (1,))]
+    ("model", "orders"),
+    [
+        (random_model(1, KINDS, 0), (1, 2, 3)),
+        (random_model(1, KINDS, 6), (1, 3)),
+        (cyclic_model(9, KINDS, 6, 2, 5), (1, 3)),
+        (cyclic_model(9, KINDS, 5, 2, 5), (1, 3, 5)),
+        (cyclic_model(9, KINDS, 6, 3, 5), (1, 2, 5)),
+    ],
+    ids=["joint alone", "joint", "folded", "odd", "half"],
 )
-def test_any_orders_are_harmonics_of_all_of_them(n_sectors, nodal_diameter, orders):
-    # each order sees the nodal diameter of its own, not of its place
-    model = cyclic_model(9, KINDS, n_sectors, nodal_diameter, 5)
-    every = build_structure(model, OMEGA, AMPLITUDE, (1, 2, 3, 4, 5))
-    some = build_structure(model, OMEGA, AMPLITUDE, orders)
-    places = np.array(orders) - 1
-    for name in ("dynamic_stiffness", "dynamic_response"):
-        expected = getattr(every, name)[places]
-        assert getattr(some, name) == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(expected).max()), name
-    for name in ("static_stiffness", "static_force", "harmonic_force", "static_response", "harmonic_offset", "drive"):
-        assert getattr(some, name) == pytest.approx(getattr(every, name), rel=1e-12), name
-    assert some.drive_offset == pytest.approx(every.drive_offset, rel=1e-12)
-    displacement_h = np.random.default_rng(10).normal(size=(some.static_force.size, 2 * len(orders) + 1))
-    full_h = change_orders(displacement_h, orders, (1, 2, 3, 4, 5))
-    for ours, theirs in (
-        (some.apply(displacement_h), every.apply(full_h)),
-        (some.response_h(displacement_h), every.response_h(full_h)),
-        (some.force_h(), every.force_h()),
-    ):
-        theirs_h = change_orders(theirs, (1, 2, 3, 4, 5), orders)
-        assert ours == pytest.approx(theirs_h, rel=1e-12, abs=1e-12 * np.abs(theirs_h).max())
-    assert some.input_work(displacement_h) == pytest.approx(every.input_work(full_h), rel=1e-12)
+def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(model, orders):
+    """Each order sees the nodal diameter of its own, not of its place."""
+    structure = build_structure(model, OMEGA, AMPLITUDE, orders)
+    relative, _ = relative_indices(model.contact)
+    force_h = np.random.default_rng(2).normal(size=(relative.size, 2 * len(orders) + 1)) * 10.0
+    forces, moved, responses = [force_h[:, 0], *to_complex(force_h).T], [], []
+    for n, force in zip((0, *orders), forces, strict=True):
+        linear = harmonic_structure(model, n)
+        stiffness = linear.stiffness.real if n == 0 else linear.stiffness
+        load = {0: linear.load_static, 1: AMPLITUDE * linear.load_harmonic}.get(n, 0.0 * linear.load_static)
+        right = load.astype(complex)
+        right[relative] -= force
+        moved.append(
+            np.linalg.solve(stiffness + 1j * n * OMEGA * linear.damping - (n * OMEGA) ** 2 * linear.mass, right)
+        )
+        responses.append(linear.response @ moved[-1])
+    displacement_h = from_complex(moved[0].real, np.array(moved[1:]).T)[relative]
+    residual = structure.apply(displacement_h) + force_h - structure.force_h()
+    assert np.abs(residual).max() < 1e-10 * np.abs(force_h).max()
+    found = structure.response_h(displacement_h)
+    np.testing.assert_allclose(to_complex(found).T, responses[1:], rtol=1e-9)
+    np.testing.assert_allclose(found[:, 0], np.real(responses[0]), rtol=1e-9)
+    # work of the excitation over a period
+    work = np.pi * np.imag(np.vdot(moved[1], AMPLITUDE * harmonic_structure(model, 1).load_harmonic))
+    assert structure.input_work(displacement_h) == pytest.approx(work, rel=1e-9)
 
 
 @pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(5, 2), (6, 3), (7, 0)])
@@ -146,57 +122,6 @@ def test_the_slope_with_the_frequency_is_that_of_differences(n_sectors, nodal_di
     for found, one, other in zip((slope.force, slope.product, slope.response), *values, strict=True):
         expected = (other - one) / (2.0 * length)
         assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
-
-
-def test_a_sector_moves_like_its_whole_ring_in_every_harmonic():
-    # Two masses a sector, tied to each other and, unevenly, to the next sector; the ring is assembled directly, and
-    # forces that travel with the wave act on the contact displacement 0 of every sector.
-    n_sectors, wave, n_harmonics = 5, 2, 4
-    random = np.random.default_rng(5)
-    own = {name: scale * definite(random, 2) for name, scale in (("k", STIFFNESS), ("c", 300.0), ("m", MASS))}
-    tie = {
-        "k": 0.1 * STIFFNESS * random.normal(size=(2, 2)),
-        "c": 30.0 * random.normal(size=(2, 2)),
-        "m": np.zeros((2, 2)),
-    }
-
-    def ring(name):
-        whole = np.zeros((2 * n_sectors, 2 * n_sectors))
-        for s in range(n_sectors):
-            here, there = slice(2 * s, 2 * s + 2), slice(2 * ((s + 1) % n_sectors), 2 * ((s + 1) % n_sectors) + 2)
-            whole[here, here] += own[name]
-            whole[here, there] += tie[name]
-            whole[there, here] += tie[name].T
-        return whole
-
-    def sector(name, k):
-        turn = np.exp(2j * np.pi * k / n_sectors)
-        matrix = own[name] + tie[name] * turn + tie[name].T / turn
-        return matrix.real if k == 0 else matrix
-
-    load = np.array([0.0, 1.0 - 0.5j])
-    waves = needed_nodal_diameters(wave, n_sectors, n_harmonics)
-    matrices = [{k: sector(name, k) for k in waves} for name in ("m", "c", "k")]
-    given = {"load_harmonic": load, "response": [1], "normal_load": 1.0, "n_sectors": n_sectors, "nodal_diameter": wave}
-    model = build_model(*matrices, [[-1, 0, -1]], 1.0, **given)
-    structure = build_structure(model, OMEGA, AMPLITUDE, tuple(range(1, n_harmonics + 1)))
-    for n in range(1, n_harmonics + 1):
-        rate = n * OMEGA
-        whole = ring("k") + 1j * rate * ring("c") - rate**2 * ring("m")
-        phase = np.exp(2j * np.pi * n * wave * np.arange(n_sectors) / n_sectors)
-        contact_force = 3.0 - 2.0j
-        right = np.zeros(2 * n_sectors, complex)
-        right[0::2] = -contact_force * phase
-        if n == 1:
-            right += np.kron(phase, AMPLITUDE * load)
-        moved = np.linalg.solve(whole, right)
-        assert moved[2:4] == pytest.approx(moved[:2] * phase[1], rel=1e-10, abs=0.0)
-        displacement_h = np.zeros((1, 2 * n_harmonics + 1))
-        displacement_h[0, 2 * n - 1], displacement_h[0, 2 * n] = moved[0].real, -moved[0].imag
-        taken = to_complex(structure.force_h() - structure.apply(displacement_h))[0, n - 1]
-        assert taken == pytest.approx(contact_force, rel=1e-9, abs=0.0), f"harmonic {n}"
-        response = to_complex(structure.response_h(displacement_h))[0, n - 1]
-        assert response == pytest.approx(moved[1], rel=1e-9, abs=0.0), f"harmonic {n}"
 
 
 def test_needed_nodal_diameters_are_folded():
