@@ -3,7 +3,6 @@
 Structures with one contact pair: the textbook scenes, and random ones of any size and unit. Then a cantilever.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,8 +19,6 @@ from tests.cantilever import FRICTION, Cantilever
 from tests.contact_pair import ContactPair
 from tests.event_driven import Orbit
 from tests.solver.models import march_wear
-
-Draw = Callable[[np.random.Generator], "Scene"]
 
 
 @dataclass(frozen=True)
@@ -220,9 +217,8 @@ def jenkins(random: np.random.Generator) -> Scene:
     """Elastic dry friction about its two resonances."""
     tangential = _spread(random, 0.1, 30.0)
     omega = random.uniform(0.8, 1.2) * random.choice([1.0, np.sqrt(1.0 + tangential)])
-    return behind_spring(
-        tangential, random.uniform(0.002, 0.1), _spread(random, 0.1, 5.0), omega, 1.0, _spread(random, 1e-3, 1e3)
-    )
+    damping, limit = random.uniform(0.002, 0.1), _spread(random, 0.1, 5.0)
+    return behind_spring(tangential, damping, limit, omega, 1.0, _spread(random, 1e-3, 1e3))
 
 
 def slipping_little(random: np.random.Generator) -> Scene:
@@ -255,17 +251,8 @@ def inclined(random: np.random.Generator) -> Scene:
     return Scene(mass, damping, stiffness, load, harmonic, 0, 1, 0.0, 0.0, random.uniform(0.2, 0.6), omega, force)
 
 
-KINDS: dict[str, Draw] = {
-    "slider": slider,
-    "stopping slider": stopping_slider,
-    "swinging slider": swinging_slider,
-    "two masses": two_masses,
-    "impact": impact,
-    "grazing": grazing,
-    "jenkins": jenkins,
-    "slipping little": slipping_little,
-    "inclined": inclined,
-}
+_DRAWS = (slider, stopping_slider, swinging_slider, two_masses, impact, grazing, jenkins, slipping_little, inclined)
+KINDS = {draw.__name__.replace("_", " "): draw for draw in _DRAWS}
 
 
 def drawn(kind: str, seed: int) -> Scene:

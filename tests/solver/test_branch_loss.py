@@ -23,7 +23,6 @@ from tests.solver.models import assert_same, branch_states, dovetail, march_wear
 
 # --- the branch with impacts ends, the mass falls on the other one ---
 
-
 OMEGA = 1.5
 FORCE = 0.02
 GAP = 0.1

@@ -31,7 +31,6 @@ from tests.solver.reconstruction import full_motion
 
 # --- natural steps ---
 
-
 TOLERANCE = 1e-9
 WALL_OMEGA = 1.2  # rad/s; without the wall the mass reaches it at 0.1 |1 - 1.2^2 + 0.06i| = 0.0444 N
 GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)
@@ -78,7 +77,6 @@ def test_natural_steps_end_before_a_fold_and_say_so():
 
 
 # --- relaxation in time ---
-
 
 FORCE = 0.02
 NATURAL = np.sqrt(1.6e6)
@@ -179,7 +177,6 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch)
 
 
 # --- states at a phase lag ---
-
 
 TIGHT = SolverSettings(harmonics=3, samples=64, tolerance=1e-11)
 LAG_OMEGA = 2.0 * math.pi * 190.0

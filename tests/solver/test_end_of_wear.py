@@ -111,7 +111,6 @@ def test_a_life_is_known_better_with_a_smaller_rtol():
 
 # --- until nothing wears any more ---
 
-
 COARSE = SolverSettings(harmonics=3, samples=64)
 
 

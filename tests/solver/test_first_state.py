@@ -173,7 +173,6 @@ def test_a_mass_that_slides_all_the_time_needs_no_reference_sweep():
 
 # --- ratcheting of marched masses ends in shakedown ---
 
-
 SHAKEN_DOWN, SLIDING_ON = 160, 178  # seeds: the mass slips until it sticks, or goes on slipping to and fro
 TOLERANCE = SolverSettings().tolerance
 

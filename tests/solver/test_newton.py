@@ -28,8 +28,6 @@ from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
 from tests.solver.models import PRELOAD, branch_states, dovetail, march_wear, random_balance, random_model
 
-# --- Newton's method on small piecewise examples ---
-
 
 @dataclass(frozen=True)
 class Example:
@@ -149,7 +147,6 @@ def residual(tangent, step, right):
     return np.linalg.norm(tangent.apply(step) - right) / np.linalg.norm(right)
 
 
-# --- the direction ---
 @pytest.mark.parametrize(("kinds", "seed", "wear"), [(LARGE, 6, False), (LARGE, 6, True), (SLIDING, 2, True)])
 def test_a_kept_factorisation_follows_jacobians_that_change(kinds, seed, wear):
     balance, predicted = case(seed, kinds, wear)
@@ -177,7 +174,6 @@ def test_pairs_that_stay_stuck_are_left_out_and_found_again():
         assert free or np.array_equal(step, right)
 
 
-# --- GMRES ---
 def gmres(matrix, right, rtol, restart, cycles, rounded=None):
     """Solution, whether it has converged, and number of products."""
     count = [0]
@@ -223,7 +219,6 @@ def test_products_that_are_rounded_are_refined_by_exact_ones():
         assert bool(np.linalg.norm(matrix @ found - wanted) < 1e-9 * np.linalg.norm(wanted)) is good
 
 
-# --- dense factors ---
 @pytest.mark.parametrize(("seed", "wear"), [(1, False), (2, True)])
 def test_dense_factors_give_the_solution_and_the_determinant(seed, wear):
     balance, predicted = case(seed, THREE_STUCK, wear, pressed=9)
@@ -250,7 +245,6 @@ def test_the_lowest_harmonics_steer_the_iteration(monkeypatch):
     assert JacobianSolver().determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0]
 
 
-# --- the march through the period ---
 def test_the_march_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_stiffness():
     # as many harmonics as samples; lines on which slip forgets all that was before it
     balance, predicted = case(5, ("constant_load_one_tangent",) * 9, wear=False, highest=12, samples=25)
@@ -268,9 +262,6 @@ def test_the_march_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see
     assert np.linalg.norm(factor.solve(tangent.apply(step)) - step) < 1e-5 * np.linalg.norm(step)
     # and is none of the identity
     assert residual(tangent, step, step) > 0.1
-
-
-# --- further unknowns ---
 
 
 @dataclass(frozen=True)
@@ -314,9 +305,6 @@ def test_a_bordered_step_is_that_of_the_whole_jacobian(kinds):
     assert step == pytest.approx(wanted, rel=1e-6, abs=1e-6 * np.abs(wanted).max())
     reduced = problem.own - rows.reshape(2, -1) @ np.linalg.solve(jacobian, by_values)
     assert found == pytest.approx(reduced, rel=1e-6, abs=1e-6)
-
-
-# --- whole histories with dense solves ---
 
 
 def dense_solve(self, tangent, rights, rtol=0.0):

@@ -21,7 +21,6 @@ from tests.solver.reconstruction import harmonic_structure
 
 # --- the resonance of a state ---
 
-
 WEAR = 1.1e-11  # 1/Pa
 
 
@@ -53,7 +52,6 @@ def test_it_is_that_of_the_equation_of_motion(nodal_diameter):
 
 
 # --- histories that follow it ---
-
 
 DAMPING = 20.0  # N s/m: 8 % of the critical damping of the slider
 CYCLES = np.linspace(0.0, 4e4, 6)

@@ -24,7 +24,6 @@ from tests.studyrunner.histories import history
 
 # --- states ---
 
-
 FRICTION = 0.4
 AMPLITUDE = 60.0
 SETTINGS = SolverSettings(harmonics=3, samples=64, tolerance=1e-10)
@@ -101,7 +100,6 @@ def test_the_report_is_that_of_the_time_signals(kinds):
 
 
 # --- fretting loops ---
-
 
 WEAR = 1.1e-11  # 1/Pa
 CYCLES = np.array([0.0, 2000.0, 8000.0, 14000.0, 16000.0])

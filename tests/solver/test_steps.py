@@ -167,7 +167,6 @@ def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(harmonics, sha
 
 # --- limits ---
 
-
 COARSE_BLADE = SolverSettings(harmonics=3, samples=64)
 STIFFNESS, SLIDE, WEAR = 1e6, 1e-4, 1e-10  # N/m, of each pair towards the block; m, amplitude of the sliding; 1/Pa
 LIMIT = 2.0 / (WEAR / 1e-4 * 4.0 * SLIDE * STIFFNESS)

@@ -70,6 +70,8 @@ def test_changed_orders_keep_the_harmonics_that_both_have(orders, wanted):
 
 
 # --- condensation ---
+
+
 @pytest.mark.parametrize(
     ("model", "orders"),
     [
@@ -154,6 +156,8 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
 
 
 # --- penalty ---
+
+
 @pytest.mark.parametrize(
     ("name", "omega", "inertial"),
     [("sdof_slider", 2 * np.pi * 160, True), ("two_masses", 0.5, True), ("vibro_impact", 1.2, False)],

@@ -117,7 +117,6 @@ def test_a_start_that_failed_is_a_history_of_nan_with_its_outcome():
 
 
 def test_only_the_product_of_wear_coefficient_and_cycles_matters():
-    """To adaptive steps; `test_properties` has it of steps of a given length."""
     slow = march(8000.0, "adaptive")
     fast = march(800.0, "adaptive", CYCLES / 10, wear=10 * WEAR)
     for name in ("wear_depth", "worn_volume", "mean_pressure", "slip_range", "response", "response_peak"):
@@ -154,6 +153,8 @@ def test_a_law_that_depends_on_the_depth_is_refused():
 
 
 # --- where pairs slide or stick again ---
+
+
 def steps_and_volume(scene_name: str, start: StartState, settings: SolverSettings, cycles: float) -> tuple[int, float]:
     """Number of steps and worn volume, m3, of an adaptive history without its reference solution."""
     model = scene(scene_name, 13, **({"mesh": 1} if scene_name == "dovetail_sector" else {}))
@@ -204,7 +205,6 @@ def test_the_error_of_a_history_covers_and_does_not_alarm(wear, cycles, outputs,
 
 
 # --- between the ends of steps ---
-
 
 AREAS = np.array([1.0, 3.0])
 RESOLUTIONS = (Resolution((1, 2, 3), 64), Resolution((1, 2, 3, 4, 5), 128))
