@@ -86,9 +86,8 @@ def test_the_jump_is_found_and_the_march_goes_on(scheme, step):
 
 
 def test_on_the_branch_without_impacts_nothing_jumps():
-    found = march_wear(
-        worn_wall(1.0), 1e-3, wall_start("down"), WALL_WEAR, 50.0, "implicit", np.array([0.0, 1000.0]), IMPACT
-    )
+    asked = WALL_WEAR, 50.0, "implicit", np.array([0.0, 1000.0]), IMPACT
+    found = march_wear(worn_wall(), 1e-3, wall_start("down"), *asked)
     assert found.outcome is Outcome.CONVERGED
     assert np.isnan(found.jump_cycle)
     assert not found.wear_depth[:, 0].any()
