@@ -4,16 +4,15 @@
 
 Slider: one response curve of a mass of 0.1 kg on a mount (1.6e5 N/m, 20 N s/m) under 10 N, held by friction of 5 N, at
 27 frequencies from 120 to 250 Hz: rigid friction, and elastic friction behind a spring of 1.6e6 N/m, against the exact
-motion. Dovetail: 16 pairs, 0.5 N, friction 0.5, unworn, 25 frequencies from 211 to 214 Hz. Its true motion is that of
-rigid contact: a start state of this project with 25 harmonics and `rtol` 1e-4, which `time_integration` confirms. Other
-programs get the model, the first state of the own curve as their first guess, and the springs or penalties that are
-asked for; no friction history: in each period they begin with sliders that are not displaced.
+motion. Dovetail: 16 pairs, 0.5 N, friction 0.5, unworn, 25 frequencies from 211 to 214 Hz, against a start state of
+this project with 25 harmonics and `rtol` 1e-4, which `time_integration` confirms. Other programs get the model, the
+first state of the own curve as their first guess, and springs or penalties; no friction history.
 
 Printed are the CPU time of the second of two equal runs (compiling is left out), the iterations really made, and the
 error of the first harmonic at the frequencies that the program has chosen; the same in `peers.csv` of the folder.
-Environments are built in the folder, pyHarm and JAX from the package index. tmdsimpy and NLvib are no packages:
-`--tmdsimpy` and `--nlvib` name copies of their repositories, without them git fetches them. NLvib runs under Octave
-(`octave-cli`); it has no friction whose normal force changes. What cannot be had is said in a sentence.
+Environments are built in the folder, pyHarm and JAX from the package index. `--tmdsimpy` and `--nlvib` name copies of
+the repositories, without them git fetches them. NLvib runs under Octave (`octave-cli`); it has no friction whose normal
+force changes. What cannot be had is said in a sentence.
 """
 
 from __future__ import annotations
@@ -48,20 +47,13 @@ HARMONICS, SAMPLES = (5, 13), 256
 NEWTON = {"tolerance": 1e-6, "most": 25}  # of the residual, N, and iterations; a curve that converges takes ten
 PYHARM, JAX = ("pyharm-os==1.2.2",), ("jax[cpu]", "scipy")
 TMDSIMPY, NLVIB = "https://github.com/tmd-lab/tmdsimpy", "https://github.com/maltekrack/NLvib"
-ELEMENTS = {
-    "pyHarm": [
-        ("Penalty3D", "springs", STRUCTURE, 5),
-        ("Penalty3D", "springs", 10.0 * STRUCTURE, 5),
-        ("DLFT3D", "rigid, as it is", STRUCTURE, 5),
-        *(("Rigid", "rigid, own element", STRUCTURE, harmonics) for harmonics in HARMONICS),
-    ],
-    "tmdsimpy": [
-        ("ElasticDryFriction3D", "springs, square limit", STRUCTURE, 5),
-        ("CircularFriction", "springs, own element", STRUCTURE, 5),
-        ("CircularFriction", "springs, own element", 10.0 * STRUCTURE, 5),
-    ],
-}
-"""Elements of other programs for the dovetail: name there, words for the table, springs or penalty, N/m, harmonics."""
+ELEMENTS = (
+    ("pyHarm", "Penalty3D", "springs", STRUCTURE, 5),
+    ("pyHarm", "Penalty3D", "springs", 10.0 * STRUCTURE, 5),
+    *(("pyHarm", "Rigid", "rigid, own element", STRUCTURE, harmonics) for harmonics in HARMONICS),
+    ("tmdsimpy", "ElasticDryFriction3D", "springs", STRUCTURE, 5),
+)
+"""Program and its element for the dovetail, words for the table, springs or penalty, N/m, harmonics."""
 # One core, as the own curves. With the 32 bits that JAX takes unless told otherwise Newton's method does not converge.
 _SURROUNDINGS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_ENABLE_X64": "1"}
 # frequency, Hz, and amplitude, m, of the points that converged; iterations, CPU seconds, attempts that failed
@@ -77,19 +69,6 @@ def exact(kind: str, frequency: float) -> float:
     limit, damping = FRICTION / FORCE, DAMPING / np.sqrt(MOUNT * MASS)
     pair = behind_spring(SPRING / MOUNT, damping, limit, 2.0 * np.pi * frequency / rate)
     return float(abs(pair.response(pair.orbit_near(np.zeros(2), np.zeros(2)))).item()) * FORCE / MOUNT
-
-
-def own_curve(model: ReducedModel, frequencies: FloatArray, force: float, settings: SolverSettings) -> Curve:
-    """The curve of this project."""
-    found = [measure(lambda: frequency_response(model, frequencies, force, MU, settings=settings)) for _ in range(2)][1]
-    there = np.isfinite(found.result.response[:, 0])
-    return {
-        "frequency": frequencies[there].tolist(),
-        "amplitude": np.abs(found.result.response[there, 0]).tolist(),
-        "iterations": found.iterations,
-        "seconds": found.seconds,
-        "failed": int((~there).sum()),
-    }
 
 
 def show(table: Table, name: str, harmonics: int | str, curve: Curve, truth: Truth) -> None:
@@ -109,7 +88,13 @@ def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArr
     """The rows of this project."""
     for harmonics in (*HARMONICS, "auto"):
         settings = SolverSettings(harmonics=harmonics, samples="auto" if harmonics == "auto" else SAMPLES)
-        show(table, f"fretwear, {kind}", harmonics, own_curve(model, frequencies, force, settings), truth)
+        asked = (model, frequencies, force, MU)
+        runs = [measure(lambda: frequency_response(*asked, settings=settings)) for _ in range(2)]  # noqa: B023
+        response = runs[1].result.response[:, 0]
+        there = np.isfinite(response)
+        curve = {"frequency": frequencies[there], "amplitude": np.abs(response[there]), "failed": int((~there).sum())}
+        effort = {"iterations": runs[1].iterations, "seconds": runs[1].seconds}
+        show(table, f"fretwear, {kind}", harmonics, {**curve, **effort}, truth)
 
 
 def slider(table: Table, programs: dict[str, Callable[[Curve], Curve]]) -> None:
@@ -147,13 +132,12 @@ def dovetail(table: Table, programs: dict[str, Callable[[Curve], Curve]], folder
     file = folder / "dovetail.npz"
     asked = {"file": str(file), "pairs": model.contact.n_contact, "friction": MU, "samples": SAMPLES, **NEWTON}
     asked["frequency"] = FREQUENCIES.tolist()
-    for name, elements in ELEMENTS.items():
-        for element, words, stiffness, harmonics in elements:
-            write_model(file, model, 0.0 if "rigid" in words else 1.0 / stiffness, harmonics)
-            wanted = {**asked, "element": element, "stiffness": stiffness, "harmonics": harmonics}
-            curve = attempt(name, programs[name], wanted)
-            if curve is not None:
-                show(table, f"{name}, dovetail, {words}, {stiffness:.0e}", harmonics, curve, truth)
+    for name, element, words, stiffness, harmonics in ELEMENTS:
+        write_model(file, model, 0.0 if "rigid" in words else 1.0 / stiffness, harmonics)
+        wanted = {**asked, "element": element, "stiffness": stiffness, "harmonics": harmonics}
+        curve = attempt(name, programs[name], wanted)
+        if curve is not None:
+            show(table, f"{name}, dovetail, {words}, {stiffness:.0e}", harmonics, curve, truth)
 
 
 def write_model(file: Path, model: ReducedModel, compliance: float, harmonics: int) -> None:
@@ -182,21 +166,21 @@ def write_model(file: Path, model: ReducedModel, compliance: float, harmonics: i
     np.savez(file, **arrays, row=np.real(linear.response[0]), start=guess.ravel())
 
 
-def environment(folder: Path, name: str, packages: tuple[str, ...]) -> str:
+def environment(folder: Path, packages: tuple[str, ...]) -> str:
     """Interpreter of an environment with the packages. Raises CalledProcessError."""
-    python = folder / name / "bin" / "python"
+    python = folder / "bin" / "python"
     if not python.exists():
-        venv.create(folder / name, with_pip=True)
+        venv.create(folder, with_pip=True)
         subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True, capture_output=True, text=True)
     return str(python)
 
 
-def repository(place: Path, address: str) -> str:
-    """A copy of a repository, fetched by git if there is none. Raises CalledProcessError."""
+def repository(place: Path, address: str) -> dict[str, str]:
+    """Where a copy of a repository is, fetched by git if there is none. Raises CalledProcessError."""
     if not place.exists():
         fetch = ["git", "clone", "-q", "--depth", "1", address, place]
         subprocess.run(fetch, check=True, capture_output=True, text=True)
-    return str(place)
+    return {"source": str(place.resolve())}
 
 
 def curve_of(command: list[str], script: str, asked: Curve) -> Curve:
@@ -226,18 +210,16 @@ def main() -> None:
     given = arguments(__doc__, ("slider", "dovetail"), folder=cache, tmdsimpy=None, nlvib=None)
     folder = Path(given.folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    copies = [(given.tmdsimpy or folder / "tmdsimpy_copy"), (given.nlvib or folder / "nlvib_copy")]
-    tmdsimpy, nlvib = (copy.resolve() for copy in copies)
+    tmdsimpy, nlvib = given.tmdsimpy or folder / "tmdsimpy_copy", given.nlvib or folder / "nlvib_copy"
+
+    def by_tmdsimpy(asked: Curve) -> Curve:
+        python = environment(folder / "tmdsimpy", JAX)
+        return curve_of([python], "peer_tmdsimpy.py", {**asked, **repository(tmdsimpy, TMDSIMPY)})
+
     programs: dict[str, Callable[[Curve], Curve]] = {
-        "pyHarm": lambda asked: curve_of([environment(folder, "pyharm", PYHARM)], "peer_pyharm.py", asked),
-        "tmdsimpy": lambda asked: curve_of(
-            [environment(folder, "tmdsimpy", JAX)],
-            "peer_tmdsimpy.py",
-            {**asked, "source": repository(tmdsimpy, TMDSIMPY)},
-        ),
-        "NLvib": lambda asked: curve_of(
-            ["octave-cli", "-q"], "peer_nlvib.m", {**asked, "source": repository(nlvib, NLVIB)}
-        ),
+        "pyHarm": lambda asked: curve_of([environment(folder / "pyharm", PYHARM)], "peer_pyharm.py", asked),
+        "tmdsimpy": by_tmdsimpy,
+        "NLvib": lambda asked: curve_of(["octave-cli", "-q"], "peer_nlvib.m", {**asked, **repository(nlvib, NLVIB)}),
     }
     columns = ("program", "harmonics", "points", "failed", "iterations", "CPU s", "largest, mm", "at Hz")
     table = Table(*columns, "error, %", "median, %", file=folder / "peers.csv")

@@ -97,7 +97,7 @@ def run_tied(folder, text, step):
     """Runs CalculiX on a deck whose contact pairs are glued, as "job"."""
     contact = r"\*SURFACE INTERACTION.*?\n\*CONTACT PAIR[^\n]*\n([^\n]*)\n"
     tied = re.sub(contact, r"*TIE, NAME=GLUE, POSITION TOLERANCE=0.1\n\1\n", text, flags=re.DOTALL)
-    run_ccx(folder, (tied + step).split("\n"), "job")
+    run_ccx(folder, (tied + step).splitlines())
 
 
 def of_calculix(folder, text, step="*STEP\n*FREQUENCY\n4\n*END STEP\n", every=1):

@@ -9,13 +9,12 @@ from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nod
 from studies.finite_element.pairing import local_frames
 from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
 from studies.scenes import shrouded_sector
+from tests.studies.shrouded_ring import stubby
 
 N = 6
 D = 2
 DAMPING = 2e-6
-PARAMETERS = shrouded_sector.Parameters(
-    n_sectors=N, shroud_angle=20, blade_thickness=0.01, rim_radius=0.15, blade_length=0.08, rotation_speed=0.0
-)
+PARAMETERS = stubby(N)
 
 
 class Sector:

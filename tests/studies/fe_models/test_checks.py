@@ -23,7 +23,7 @@ from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.model_files import find_units
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import CUBES, SECTOR, write
-from tests.studies.fe_models.matrix_files import needs_ccx, run_ccx
+from tests.studies.fe_models.solid_meshes import needs_ccx, run_ccx
 
 SI, MM = find_units("SI"), find_units("mm-t-s")
 AXIS = np.array([0.0, 0.0, 1.0])
@@ -36,7 +36,7 @@ def changed(old, new, text=None):
 
 
 def exported(folder, text):
-    job = run_ccx(folder, text)
+    job = run_ccx(folder, text.splitlines(), "sector")
     return read_deck(folder / "sector.inp"), read_matrices(job)
 
 

@@ -159,38 +159,6 @@ def test_removed_elements_and_pairs(tmp_path):
     assert len(read_deck(write(tmp_path, BLOCKS + written)).contact_pairs) == 1
 
 
-@pytest.mark.parametrize(
-    ("friction", "law"),
-    [
-        ("*FRICTION, TAUMAX=100.\n0.4", "with TAUMAX"),
-        ("*FRICTION\n0.4, 0.\n0.3, 1.", "of several coefficients"),
-    ],
-)
-def test_friction_that_is_not_one_coefficient(friction, law, tmp_path):
-    """The study may give one in its place."""
-    text = BLOCKS.replace("*FRICTION\n0.4", friction)
-    with pytest.raises(SceneError, match=rf"line \d+: \*FRICTION {law} is not read; give one coefficient, there or by"):
-        prepared_deck(tmp_path, text)
-    assert prepared_deck(tmp_path, text, friction_coefficient=0.3)[0].pairs.n_contact == 15
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("*CONTACT\n", r"\*CONTACT is not read, and may change the model; give \*CONTACT PAIR for"),
-        (
-            "*NONSENSE\n",
-            r"\*NONSENSE is not read, and may change the model; remove it if the model is right without it",
-        ),
-        ("*MATERIAL, NAME=STEEL\n*ELASTIC\n7e4, 0.3\n", r"\*ELASTIC of one material again \(before: deck.inp"),
-        ("*INITIAL CONDITIONS, TYPE=STRESS\n", r"\*INITIAL CONDITIONS: TYPE=STRESS is not read"),
-    ],
-)
-def test_what_may_change_the_model_is_refused(text, sentence, tmp_path):
-    with pytest.raises(SceneError, match=r"deck.inp, line \d+: " + sentence):
-        read_deck(write(tmp_path, BLOCKS + text))
-
-
 def lists_of_keywords():
     """What the page says of keywords: which are read with which parameters, and which are skipped."""
     rows = ["| read | parameters that are acted upon | parameters that are skipped |", "|---|---|---|"]

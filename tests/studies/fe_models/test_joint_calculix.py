@@ -1,7 +1,6 @@
 """Glued frequencies of whole models against CalculiX, which reads the same meshes. Needs its command `ccx`."""
 
 import re
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -20,9 +19,10 @@ from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
 from studies.scenes import shrouded_sector
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
-from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, node_set, run_ccx
+from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, needs_ccx, node_set, run_ccx
+from tests.studies.shrouded_ring import stubby
 
-pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+pytestmark = needs_ccx
 
 N_MODES = 4
 
@@ -117,11 +117,6 @@ def test_matrices_of_calculix(kind, tmp_path):
             assert np.abs(ours - theirs).max() <= 1e-7 * np.abs(theirs).max()
 
 
-SHROUDED = shrouded_sector.Parameters(
-    n_sectors=12, shroud_angle=20, blade_thickness=0.01, rim_radius=0.15, blade_length=0.08, rotation_speed=0.0
-)
-
-
 def shrouded_lines(model, joint):
     """The sector with BORE, LEAD and TRAIL, and the nodes of its cut faces."""
     numbers, (contact,) = model.mesh.numbers, joint.contacts
@@ -134,7 +129,7 @@ def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
     """The same matrices as the bundled scene; its shrouds, one sector apart, are no cut faces. The order of the names
     does not matter.
     """
-    model, joint = shrouded_sector.define_sector(SHROUDED)
+    model, joint = shrouded_sector.define_sector(stubby(N_SECTORS))
     (tmp_path / "s.inp").write_text("\n".join(shrouded_lines(model, joint)) + "\n", encoding="ascii")
     given = {"units": "SI", "friction_coefficient": 0.3, "n_sectors": 12, "axis": {"direction": [0, 0, 1]}}
     given |= {"clamp": ["BORE"], "load": {"set": "LEAD", "direction": [0, 1, 0]}}
@@ -157,7 +152,7 @@ def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
 
 def test_stuck_shrouds_are_those_of_calculix(tmp_path):
     """With elements that are the same in both programs: incompatible modes of twisted elements are not."""
-    model, joint = shrouded_sector.define_sector(SHROUDED)
+    model, joint = shrouded_sector.define_sector(stubby(N_SECTORS))
     groups = tuple(replace(each, kind="C3D8") for each in model.mesh.groups)
     model = replace(model, mesh=replace(model.mesh, groups=groups))
     (contact,), numbers = joint.contacts, model.mesh.numbers
