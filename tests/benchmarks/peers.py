@@ -11,8 +11,8 @@ first state of the own curve as their first guess, and springs or penalties; no 
 Printed are the CPU time of the second of two equal runs (compiling is left out), the iterations really made, and the
 error of the first harmonic at the frequencies that the program has chosen; the same in `peers.csv` of the folder.
 Environments are built in the folder, pyHarm and JAX from the package index. `--tmdsimpy` and `--nlvib` name copies of
-the repositories, without them git fetches them. NLvib runs under Octave (`octave-cli`); it has no friction whose normal
-force changes. What cannot be had is said in a sentence.
+the repositories tmd-lab/tmdsimpy and maltekrack/NLvib. NLvib runs under Octave (`octave-cli`); it has no friction whose
+normal force changes. What cannot be had is said in a sentence.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import subprocess
 import tempfile
 import venv
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,6 @@ STRUCTURE = 2e8  # N/m: what the bodies resist a displacement of one pair with, 
 HARMONICS, SAMPLES = (5, 13), 256
 NEWTON = {"tolerance": 1e-6, "most": 25}  # of the residual, N, and iterations; a curve that converges takes ten
 PYHARM, JAX = ("pyharm-os==1.2.2",), ("jax[cpu]", "scipy")
-TMDSIMPY, NLVIB = "https://github.com/tmd-lab/tmdsimpy", "https://github.com/maltekrack/NLvib"
 ELEMENTS = (
     ("pyHarm", "Penalty3D", "springs", STRUCTURE, 5),
     ("pyHarm", "Penalty3D", "springs", 10.0 * STRUCTURE, 5),
@@ -56,9 +56,11 @@ ELEMENTS = (
 """Program and its element for the dovetail, words for the table, springs or penalty, N/m, harmonics."""
 # One core, as the own curves. With the 32 bits that JAX takes unless told otherwise Newton's method does not converge.
 _SURROUNDINGS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_ENABLE_X64": "1"}
-# frequency, Hz, and amplitude, m, of the points that converged; iterations, CPU seconds, attempts that failed
 Curve = dict[str, Any]
+"""Frequency, Hz, and amplitude, m, of the points that converged; iterations, CPU seconds, attempts that failed."""
 Truth = Callable[[FloatArray], FloatArray]
+Program = Callable[[], tuple[list[str], str, dict[str, str]]]
+"""Gives command, script and further input of a program."""
 
 
 def exact(kind: str, frequency: float) -> float:
@@ -97,7 +99,7 @@ def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArr
         show(table, f"fretwear, {kind}", harmonics, {**curve, **effort}, truth)
 
 
-def slider(table: Table, programs: dict[str, Callable[[Curve], Curve]]) -> None:
+def slider(table: Table, programs: dict[str, Program]) -> None:
     """The rows of the slider."""
     asked = {**SLIDER, "first": 120.0, "last": 250.0, "n_frequencies": 27, "samples": SAMPLES}
     asked["frequency"] = SLIDER_FREQUENCIES.tolist()
@@ -111,22 +113,21 @@ def slider(table: Table, programs: dict[str, Callable[[Curve], Curve]]) -> None:
         own_rows(table, f"slider, {kind}", model, SLIDER_FREQUENCIES, FORCE, truth)
         for name in programs if kind == "elastic" else ("pyHarm",):
             for harmonics in HARMONICS:
-                curve = attempt(name, programs[name], {**asked, "kind": kind, "harmonics": harmonics})
-                if curve is not None:
-                    show(table, f"{name}, slider, {kind}", harmonics, curve, truth)
+                label = f"{name}, slider, {kind}"
+                peer_row(table, label, programs[name], harmonics, {**asked, "kind": kind}, truth)
 
 
-def dovetail(table: Table, programs: dict[str, Callable[[Curve], Curve]], folder: Path) -> None:
+def dovetail(table: Table, programs: dict[str, Program], folder: Path) -> None:
     """The rows of the dovetail."""
-    model, known = build_scene("dovetail_sector", mesh=1), dict[float, float]()
+    model = build_scene("dovetail_sector", mesh=1)
+
+    @cache
+    def fine(frequencies: tuple[float, ...]) -> FloatArray:
+        settings = SolverSettings(rtol=1e-4, harmonics=25, samples=512)
+        return np.abs(frequency_response(model, frequencies, LOAD, MU, settings=settings).response[:, 0])
 
     def truth(frequencies: FloatArray) -> FloatArray:
-        places = np.round(frequencies, 6).tolist()
-        if new := [place for place in places if place not in known]:
-            fine = SolverSettings(rtol=1e-4, harmonics=25, samples=512)
-            found = frequency_response(model, new, LOAD, MU, settings=fine)
-            known.update(zip(new, np.abs(found.response[:, 0]).tolist(), strict=True))
-        return np.array([known[place] for place in places])
+        return fine(tuple(np.round(frequencies, 6).tolist()))
 
     own_rows(table, "dovetail, rigid", model, FREQUENCIES, LOAD, truth)
     file = folder / "dovetail.npz"
@@ -134,10 +135,8 @@ def dovetail(table: Table, programs: dict[str, Callable[[Curve], Curve]], folder
     asked["frequency"] = FREQUENCIES.tolist()
     for name, element, words, stiffness, harmonics in ELEMENTS:
         write_model(file, model, 0.0 if "rigid" in words else 1.0 / stiffness, harmonics)
-        wanted = {**asked, "element": element, "stiffness": stiffness, "harmonics": harmonics}
-        curve = attempt(name, programs[name], wanted)
-        if curve is not None:
-            show(table, f"{name}, dovetail, {words}, {stiffness:.0e}", harmonics, curve, truth)
+        label, wanted = f"{name}, dovetail, {words}, {stiffness:.0e}", {"element": element, "stiffness": stiffness}
+        peer_row(table, label, programs[name], harmonics, {**asked, **wanted}, truth)
 
 
 def write_model(file: Path, model: ReducedModel, compliance: float, harmonics: int) -> None:
@@ -175,51 +174,41 @@ def environment(folder: Path, packages: tuple[str, ...]) -> str:
     return str(python)
 
 
-def repository(place: Path, address: str) -> dict[str, str]:
-    """Where a copy of a repository is, fetched by git if there is none. Raises CalledProcessError."""
-    if not place.exists():
-        fetch = ["git", "clone", "-q", "--depth", "1", address, place]
-        subprocess.run(fetch, check=True, capture_output=True, text=True)
-    return {"source": str(place.resolve())}
-
-
-def curve_of(command: list[str], script: str, asked: Curve) -> Curve:
-    """What a script of this folder prints last. Raises CalledProcessError, FileNotFoundError without the program."""
-    command = [*command, str(Path(__file__).with_name(script)), json.dumps(asked)]
-    with tempfile.TemporaryDirectory() as folder:  # pyHarm writes where it runs
-        surroundings = {**os.environ, **_SURROUNDINGS}
-        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=surroundings)
-    curve: Curve = json.loads(done.stdout.splitlines()[-1])
-    return curve
-
-
-def attempt(name: str, program: Callable[[Curve], Curve], asked: Curve) -> Curve | None:
-    """The curve of another program; None, and a sentence, where it is not to be had."""
+def peer_row(table: Table, label: str, program: Program, harmonics: int, asked: dict[str, Any], truth: Truth) -> None:
+    """A row of another program, from what its script prints last; a sentence where it is not to be had."""
     try:
-        return program(asked)
+        command, script, more = program()
+        command = [
+            *command,
+            str(Path(__file__).with_name(script)),
+            json.dumps({**asked, "harmonics": harmonics, **more}),
+        ]
+        with tempfile.TemporaryDirectory() as folder:  # pyHarm writes where it runs
+            surroundings = {**os.environ, **_SURROUNDINGS}
+            done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=surroundings)
     except (subprocess.CalledProcessError, FileNotFoundError) as error:
         said = (getattr(error, "stderr", None) or str(error)).strip().splitlines() or ["no message"]
         # Octave says first what is wrong, Python last
-        print(f"{name} is not run here: {next((line for line in said if line.startswith('error: ')), said[-1])}")
-    return None
+        line = next((line for line in said if line.startswith("error: ")), said[-1])
+        print(f"{label} is not run here: {line}")
+    else:
+        show(table, label, harmonics, json.loads(done.stdout.splitlines()[-1]), truth)
 
 
 def main() -> None:
     """Builds the environments and prints the table."""
-    cache = str(Path.home() / ".cache" / "fretwear_peers")
-    given = arguments(__doc__, ("slider", "dovetail"), folder=cache, tmdsimpy=None, nlvib=None)
+    home = str(Path.home() / ".cache" / "fretwear_peers")
+    given = arguments(__doc__, ("slider", "dovetail"), folder=home, tmdsimpy=None, nlvib=None)
     folder = Path(given.folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    tmdsimpy, nlvib = given.tmdsimpy or folder / "tmdsimpy_copy", given.nlvib or folder / "nlvib_copy"
-
-    def by_tmdsimpy(asked: Curve) -> Curve:
-        python = environment(folder / "tmdsimpy", JAX)
-        return curve_of([python], "peer_tmdsimpy.py", {**asked, **repository(tmdsimpy, TMDSIMPY)})
-
-    programs: dict[str, Callable[[Curve], Curve]] = {
-        "pyHarm": lambda asked: curve_of([environment(folder / "pyharm", PYHARM)], "peer_pyharm.py", asked),
-        "tmdsimpy": by_tmdsimpy,
-        "NLvib": lambda asked: curve_of(["octave-cli", "-q"], "peer_nlvib.m", {**asked, **repository(nlvib, NLVIB)}),
+    programs: dict[str, Program] = {
+        "pyHarm": lambda: ([environment(folder / "pyharm", PYHARM)], "peer_pyharm.py", {}),
+        "tmdsimpy": lambda: (
+            [environment(folder / "tmdsimpy", JAX)],
+            "peer_tmdsimpy.py",
+            {"source": str(given.tmdsimpy)},
+        ),
+        "NLvib": lambda: (["octave-cli", "-q"], "peer_nlvib.m", {"source": str(given.nlvib)}),
     }
     columns = ("program", "harmonics", "points", "failed", "iterations", "CPU s", "largest, mm", "at Hz")
     table = Table(*columns, "error, %", "median, %", file=folder / "peers.csv")

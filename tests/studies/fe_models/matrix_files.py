@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 from scipy import io, sparse
 
+
 def chain(nodes: tuple[int, ...] = (1, 2, 10)):
     """Matrices (dense, definite) of some nodes, and their rows."""
     n = 3 * len(nodes)

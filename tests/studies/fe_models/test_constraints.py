@@ -7,14 +7,7 @@ import pytest
 
 from studies.finite_element.reduced_joint import glued_frequencies
 from studies.scene_error import SceneError
-from tests.studies.fe_models.constrained_decks import (
-    BLOCKS,
-    SECTORS,
-    frequencies,
-    of_calculix,
-    prepared_deck,
-    run_tied,
-)
+from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 from tests.studies.fe_models.solid_meshes import needs_ccx
 
 REFERENCE = "*NODE\n900, 45., 5., 0.\n"

@@ -87,26 +87,6 @@ def test_patch_test(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_mass_and_centrifugal_load_of_a_skewed_box(kind):
-    mesh, _ = block(kind, (2, 1, 2), lambda points: skewed(points) + np.array([0.3, -0.1, 0.2]))
-    expected = STEEL.density * np.linalg.det(skewed(np.eye(3)))
-    mass = assemble_mass(mesh)
-    assert mass.sum() / 3.0 == pytest.approx(expected, rel=1e-12)
-    axis = np.array([0.0, 0.6, 0.8])
-    rotation = Rotation(2.5e5, np.array([0.1, 0.0, 0.0]), axis)
-    centre = skewed(np.full((1, 3), 0.5))[0] + np.array([0.3, -0.1, 0.2])
-    arm = centre - rotation.point
-    arm = arm - axis * (axis @ arm)
-    total = centrifugal_load(mass, mesh.coordinates, rotation).reshape(-1, 3).sum(axis=0)
-    assert np.allclose(total, 2.5e5 * expected * arm, rtol=1e-11, atol=1e-9 * expected)
-    # As a derivative: the load of a body moved by t differs by what spin softening makes of t.
-    moved = np.tile([0.3, -0.2, 0.1], mesh.n_nodes)
-    change = centrifugal_load(mass, mesh.coordinates + moved.reshape(-1, 3), rotation)
-    change = change - centrifugal_load(mass, mesh.coordinates, rotation)
-    assert np.abs(spin_softening(mass, rotation) @ moved + change).max() < 1e-10 * np.abs(change).max()
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_stress_stiffening_of_a_stretched_bar(kind):
     size, strain = np.array([0.8, 0.03, 0.05]), 1e-3
     mesh, _ = block(kind, (2, 1, 1), lambda points: points * size)

@@ -14,10 +14,9 @@ needs_ansys = pytest.mark.skipif(importlib.util.find_spec("ansys") is None, reas
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
 
 
-def write(folder, text):
-    path = folder / "mesh.msh"
-    path.write_text(text)
-    return path
+def write(folder, text, name="mesh.msh"):
+    (folder / name).write_text(text)
+    return folder / name
 
 
 GMSH_41 = """\
@@ -80,9 +79,7 @@ def write_cdb(folder, commands, types):
         *("EBLOCK,19,SOLID,        1,        1", "(19i9)", element, "       -1", *component),
         *("TREF,  0.00000000    ", "ACEL,  0.0,0.0,0.0", "BFUNIF,TEMP,_TINY", "PSTRES,OFF", commands, "FINISH"),
     ]
-    path = folder / "mesh.cdb"
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    return write(folder, "\n".join(lines) + "\n", "mesh.cdb")
 
 
 ETBLOCK = (
@@ -102,9 +99,7 @@ def test_cdb(tmp_path, types):
 
 
 def test_meshes_by_their_ending(tmp_path):
-    path = tmp_path / "mesh.inp"
-    path.write_text("*NODE\n1,0,0,0\n")
-    assert read_mesh_file(path).node_numbers.tolist() == [1]
+    assert read_mesh_file(write(tmp_path, "*NODE\n1,0,0,0\n", "mesh.inp")).node_numbers.tolist() == [1]
     with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):
         read_mesh_file(tmp_path / "mesh.med")
     with pytest.raises(SceneError, match=r"none.cdb: there is no such file"):
@@ -115,9 +110,7 @@ def test_meshes_by_their_ending(tmp_path):
 def test_missing_library(tmp_path, monkeypatch, library):
     monkeypatch.setitem(sys.modules, library, None)
     if library == "meshio":
-        with pytest.raises(
-            SceneError, match=r"msh needs the library meshio, .* install the library: pip install meshio"
-        ):
+        with pytest.raises(SceneError, match=r"msh needs the library meshio, .*: pip install meshio"):
             read_mesh_file(write(tmp_path, GMSH_41))
         return
     monkeypatch.setitem(sys.modules, "ansys.mapdl", None)
@@ -156,15 +149,10 @@ def test_order_of_mid_side_nodes(tmp_path, kind):
     points = np.array([*corners, *(np.mean([corners[a], corners[b]], axis=0) for a, b in edges)])
     nodes = "\n".join(f"{n} {x} {y} {z}" for n, (x, y, z) in enumerate(points, 1))
     element = " ".join(map(str, range(1, len(points) + 1)))
-    text = (
-        f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(points)}\n{nodes}\n$EndNodes\n"
-        f"$Elements\n1\n1 {number} 2 1 1 {element}\n$EndElements\n"
-    )
-    deck = read_mesh_file(write(tmp_path, text))
+    head = f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(points)}\n{nodes}\n$EndNodes\n"
+    deck = read_mesh_file(write(tmp_path, f"{head}$Elements\n1\n1 {number} 2 1 1 {element}\n$EndElements\n"))
     (block,) = deck.blocks
     found = deck.coordinates[deck.rows_of_nodes(block.nodes[0])]
     assert block.kind == kind
-    n = len(corners)
-    np.testing.assert_array_equal(found[:n], corners)
-    for place, (a, b) in enumerate(expected):
-        np.testing.assert_array_equal(found[n + place], (found[a] + found[b]) / 2)
+    np.testing.assert_array_equal(found[: len(corners)], corners)
+    np.testing.assert_array_equal(found[len(corners) :], [(found[a] + found[b]) / 2 for a, b in expected])
