@@ -39,7 +39,6 @@ class MissionState:
 
     nodes: ends of the last three steps. inaccurate, sweep_rate (n_block,): largest values of the blocks so far.
     length: missions of the next step. runs, first: blocks of the last and of the first mission.
-    guides: for each step those of the blocks of its mission.
     held_from, cut_off_from: missions before the first step with such a block, inf if never.
     """
 
@@ -49,7 +48,6 @@ class MissionState:
     length: float = 1.0
     runs: tuple[BlockRun, ...] = ()
     first: tuple[BlockRun, ...] = ()
-    guides: tuple[tuple[Guide | None, ...], ...] = ()
     held_from: float = math.inf
     cut_off_from: float = math.inf
 
@@ -70,8 +68,9 @@ class MissionProblem:
         self._begun: list[Begun | None] = []
         self._failure = Failure(Outcome.MARCH_FAILED)
 
-    def forget(self) -> None:
-        """As in SlowProblem: nothing."""
+    def saved(self, state: MissionState) -> MissionState:
+        """As in SlowProblem: blocks are as read from a file."""
+        return state
 
     def advance(self, state: MissionState | None, course: Course) -> tuple[MissionState, Course] | Failure:
         """As in SlowProblem."""
@@ -96,7 +95,6 @@ class MissionProblem:
             length=length,
             runs=runs,
             first=state.first or tuple(replace(run, last=None) for run in runs),
-            guides=(*state.guides, tuple(run.guide for run in runs)),
             inaccurate=np.maximum([run.inaccurate for run in runs], state.inaccurate),
             sweep_rate=np.maximum([run.sweep_rate for run in runs], state.sweep_rate),
             held_from=min(state.held_from, done if any(run.held for run in runs) else math.inf),
@@ -132,7 +130,7 @@ class MissionProblem:
         mission, carried = self.mission, state.runs[-1].last if state.runs else None
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.fine is not None:
-            guides = self.fine.state.guides[int(np.searchsorted(self.fine.course.ends, number)) - 1]
+            guides = self.fine.course.nodes[int(np.searchsorted(self.fine.course.counts, number))].guides
         # as in a wear history: stability is tested at the begin and the end
         every = self.fine is None and number in (1, mission.missions[-1])
         runs: list[BlockRun] = []

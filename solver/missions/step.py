@@ -170,4 +170,5 @@ def _end_of(
     # the error of a block that wears nothing may be unknown
     of_blocks = np.where(rates > 0.0, values["growth_error"][:, None] * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
     local = now.values["local"] + error + length * of_blocks
-    return Node(now.count + length, growth.ravel(), rates.ravel(), values | {"local": local})
+    guides = tuple(run.guide for run in runs)
+    return Node(now.count + length, growth.ravel(), rates.ravel(), values | {"local": local}, guides)

@@ -184,8 +184,6 @@ def is_steady(work: WearingJoint, state: WearState, course: Course) -> bool:
     if volumes[first] > 0.1 * volumes[-1] or varies.any():
         return False
     joint = work.joint_of(state)
-    rows = np.flatnonzero(joint.component_index % 3 == 0)
-    rows = rows[pressed[joint.component_index[rows] // 3]]
-    pair = joint.component_index[rows] // 3
-    moved = joint.structure.static_stiffness[rows, rows] * state.depth[pair]
-    return bool((moved >= ACTED_BACK * normal[pair]).all())
+    pair, component = joint.component_index // 3, joint.component_index % 3
+    acted = np.diag(joint.structure.static_stiffness) * state.depth[pair] >= ACTED_BACK * normal[pair]
+    return bool(acted[(component == 0) & pressed[pair]].all())

@@ -31,13 +31,14 @@ class Node:
     """The end of a step.
 
     count: of cycles or missions. depth, rate (k,): worn depths, m, and their rates, m per count, of the pairs; of
-    missions those of all blocks in one row. values: other numbers and arrays, by name.
+    missions those of all blocks in one row. values: other numbers and arrays, by name. guides: of the blocks.
     """
 
     count: float
     depth: FloatArray
     rate: FloatArray
     values: dict[str, Any]
+    guides: tuple[Any, ...] = ()
 
 
 @packable
@@ -76,7 +77,7 @@ class Course:
         """Wear rates (n_node, k) at the nodes, m per count."""
         return np.array([node.rate for node in self.nodes])
 
-    @property
+    @cached_property
     def volumes(self) -> FloatArray:
         """Worn volumes (n_node,) at the nodes, m3."""
         return self._volumes(self.depths)
@@ -96,12 +97,10 @@ class Course:
         at, volumes = self.counts, self.volumes
         read = np.append(self.outputs, self.reached)
         ends = np.searchsorted(at, read[read <= at[-1]])
-        needed = {0, at.size - 1, *ends, *(ends - 1)}
         way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
-        least, kept = 2.0 * way[-1] / KEPT_STEPS, [0]
-        for place in range(1, at.size):
-            if place in needed or way[place + 1] - way[kept[-1]] > least:
-                kept.append(place)
+        # the first one in each of so many equal parts
+        firsts = np.unique(np.floor(0.5 * KEPT_STEPS * way / way[-1]), return_index=True)[1]
+        kept = np.unique([at.size - 1, *ends, *np.maximum(ends - 1, 0), *firsts])
         return replace(self, nodes=tuple(self.nodes[place] for place in kept))
 
     def depth_at(self, counts: FloatArray) -> FloatArray:

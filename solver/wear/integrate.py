@@ -26,6 +26,7 @@ from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget
 from solver.outcome import Outcome
+from solver.packing import in_rows
 from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, FollowedFrequency, Resolution, SolverSettings, ToTheEnd, WearTarget
 from solver.structure.joint import Case
@@ -127,9 +128,10 @@ class WearProblem:
         """As in SlowProblem."""
         return ITERATIONS_PER_SAVE
 
-    def forget(self) -> None:
-        """As in SlowProblem: the factorisation."""
+    def saved(self, state: WearState) -> WearState:
+        """As in SlowProblem: without the factorisation."""
         self.work.drop_factor()
+        return in_rows(state)
 
     def _ended(self, state: WearState, course: Course) -> Failure | None:
         """Why the history ends at a state; None to go on."""

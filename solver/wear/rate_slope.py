@@ -14,7 +14,7 @@ import numpy as np
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.harmonic_balance.dlft import Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
-from solver.newton.linear_solver import SIGN_PRODUCTS, ritz_values
+from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
 from solver.outcome import in_digits
 from solver.structure.joint import Joint
 from solver.wear.wearing_joint import WearingJoint, WearState

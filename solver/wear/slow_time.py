@@ -13,7 +13,7 @@ from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
 from solver.newton.run import Budget, OutOfTimeError
 from solver.outcome import Outcome, describe_error
-from solver.packing import Packed, in_rows, pack, packable, unpack
+from solver.packing import Packed, pack, packable, unpack
 from solver.settings import Resolution
 from solver.wear.course import Course
 
@@ -45,8 +45,8 @@ class SlowProblem(Protocol):
     def advance(self, state: Any, course: Course, /) -> tuple[Any, Course] | Failure:
         """State and course after the next step, or the first ones where the state is None; or why the history ends."""
 
-    def forget(self) -> None:
-        """Drop all that is kept from step to step beside the state."""
+    def saved(self, state: Any, /) -> Any:
+        """The state as it is read from a saved progress; what is kept from step to step beside the state is dropped."""
 
 
 @packable
@@ -147,8 +147,7 @@ class Integrator:
             state, course = after
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
-                state, saved_at = in_rows(state), budget.iterations
-                problem.forget()
+                state, saved_at = problem.saved(state), budget.iterations
                 if self._keep is not None:
                     # what its time limit has ended is not complete
                     done = {key: each for key, each in self._done.items() if each.failure.outcome not in ENDS_ALL}
