@@ -1,13 +1,11 @@
 """Keywords that make a mesh, place it, glue or part surfaces, and what of a deck is skipped or refused."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import studies
-from studies.fe_models.deck.read import HARMLESS, KEYWORDS, read_deck
+from studies.fe_models.deck.read import read_deck
 from studies.scene_error import SceneError
 from tests.studies.fe_models.constrained_decks import BLOCKS, prepared_deck
 from tests.studies.fe_models.decks import write
@@ -189,19 +187,3 @@ def test_friction_that_is_not_one_coefficient(friction, law, tmp_path):
 def test_what_may_change_the_model_is_refused(text, sentence, tmp_path):
     with pytest.raises(SceneError, match=r"deck.inp, line \d+: " + sentence):
         read_deck(write(tmp_path, BLOCKS + text))
-
-
-def lists_of_keywords():
-    """What the page says of keywords: which are read with which parameters, and which are skipped."""
-    rows = ["| read | parameters that are acted upon | parameters that are skipped |", "|---|---|---|"]
-    procedures = [name for name, each in KEYWORDS.items() if "*" in each.parameters]
-    for name, each in sorted(KEYWORDS.items()):
-        if name not in procedures:
-            own = [" ".join(sorted(names)) for names in (each.parameters, each.harmless)]
-            rows.append(f"| `{name}` | {own[0]} | {own[1]} |")
-    rows += ["", "Procedures, with any parameters: " + ", ".join(f"`{name}`" for name in procedures) + ".", ""]
-    return "\n".join([*rows, "Skipped: " + ", ".join(f"`{name}`" for name in sorted(HARMLESS)) + "."])
-
-
-def test_the_page_has_the_lists():
-    assert lists_of_keywords() in (Path(studies.__path__[0]) / "fe_models/README.md").read_text()

@@ -12,7 +12,6 @@ from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from studyrunner.report import contents
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, fit_into_column, style
 from studyrunner.report.figures.flanks import find_flanks
@@ -366,9 +365,3 @@ def test_samples_are_those_of_the_file():
     bars = draw_figure(result, "deciding_inputs").figure.axes[0]
     names = [text.get_text().replace("\n", " ") for text in bars.get_xticklabels()]
     assert names[int(np.argmax([patch.get_height() for patch in bars.patches]))] == "wear coefficient"
-
-
-def test_the_page_on_the_report_lists_all_figures():
-    page = (Path(contents.__file__).parents[1] / "REPORT.md").read_text(encoding="utf-8")
-    assert f"list_figures -->\n{contents.list_figures()}\n<!--" in page
-    assert len({entry.name for entry in contents.FIGURES}) == len(contents.FIGURES)
