@@ -12,15 +12,8 @@ from solver.clock import computing_time
 from solver.contact.coulomb import SLIP
 from solver.harmonic_balance.dlft import Balance
 from solver.newton import linear_solver
-from solver.newton.linear_solver import (
-    DENSE_UNKNOWNS,
-    STAGNATION_PRODUCTS,
-    DenseFactor,
-    JacobianSolver,
-    build_dense_factor,
-    build_factor,
-    solve_gmres,
-)
+from solver.newton.krylov import STAGNATION_PRODUCTS, build_correction, solve_gmres
+from solver.newton.linear_solver import DENSE_UNKNOWNS, DenseFactor, JacobianSolver, build_dense_factor, build_factor
 from solver.newton.period_preconditioner import build_period_factor, stiffness_of_most
 from solver.newton.run import Bordered, bordered_step, solve_newton
 from solver.outcome import Outcome
@@ -182,7 +175,22 @@ def gmres(matrix, right, rtol, restart, cycles, rounded=None):
         count[0] += 1
         return (matrix if rounded is None else rounded) @ vector
 
-    return *solve_gmres(product, lambda vector: matrix @ vector, right, rtol, restart, cycles), count[0]
+    return *solve_gmres(product, lambda vector: matrix @ vector, right, rtol, restart, cycles)[:2], count[0]
+
+
+def test_a_correction_is_exact_where_gmres_has_been_and_saves_the_next_solve():
+    random = np.random.default_rng(3)
+    matrix = np.eye(60) + 0.05 * random.normal(size=(60, 60)) - 0.9 * np.outer(*np.eye(60)[:2])
+    first, second = random.normal(size=(2, 60))
+    space = solve_gmres(lambda x: matrix @ x, lambda x: matrix @ x, first, 1e-6, 30, 1)[2:]
+    correction = build_correction(*space)
+    images = correction.images
+    np.testing.assert_allclose([matrix @ correction.apply(each) for each in images], images, atol=1e-12)
+    across = second - (images @ second) @ images
+    np.testing.assert_allclose(correction.apply(across), across, atol=1e-12)
+    count = gmres(matrix, first + 1e-3 * second, 1e-3, 30, 1)[2]
+    corrected = np.array([matrix @ correction.apply(each) for each in np.eye(60)]).T
+    assert gmres(corrected, first + 1e-3 * second, 1e-3, 30, 1)[2] < 0.5 * count
 
 
 def test_a_singular_operator_gives_what_can_be_had_and_ends():
