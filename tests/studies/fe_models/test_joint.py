@@ -54,7 +54,7 @@ def test_areas_and_normals_of_a_cylinder(kind):
     assert np.allclose(again.areas_and_normals(mesh.coordinates)[0], area, rtol=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["C3D4", "C3D8", "C3D10", "C3D20R"])
 def test_closest_points_against_a_search(kind):
     mesh, reference = block(kind, (1, 3, 2), tube)
     surface = surface_of_faces(mesh, "OUTSIDE", *faces_where(mesh, reference[:, 0] == 1.0))
