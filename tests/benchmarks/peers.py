@@ -74,7 +74,6 @@ def exact(kind: str, frequency: float) -> float:
 
 
 def show(table: Table, name: str, harmonics: int | str, curve: Curve, truth: Truth) -> None:
-    """A row of the table."""
     frequencies, amplitudes = np.array(curve["frequency"]), np.array(curve["amplitude"])
     if not frequencies.size:
         table.row(name, harmonics, 0, curve.get("failed", 0), *6 * [None])
@@ -87,7 +86,6 @@ def show(table: Table, name: str, harmonics: int | str, curve: Curve, truth: Tru
 
 
 def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArray, force: float, truth: Truth) -> None:
-    """The rows of this project."""
     for harmonics in (*HARMONICS, "auto"):
         settings = SolverSettings(harmonics=harmonics, samples="auto" if harmonics == "auto" else SAMPLES)
         asked = (model, frequencies, force, MU)
@@ -100,7 +98,6 @@ def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArr
 
 
 def slider(table: Table, programs: dict[str, Program]) -> None:
-    """The rows of the slider."""
     asked = {**SLIDER, "first": 120.0, "last": 250.0, "n_frequencies": 27, "samples": SAMPLES}
     asked["frequency"] = SLIDER_FREQUENCIES.tolist()
     for kind in ("elastic", "rigid"):
@@ -118,7 +115,6 @@ def slider(table: Table, programs: dict[str, Program]) -> None:
 
 
 def dovetail(table: Table, programs: dict[str, Program], folder: Path) -> None:
-    """The rows of the dovetail."""
     model = build_scene("dovetail_sector", mesh=1)
 
     @cache
@@ -196,7 +192,6 @@ def peer_row(table: Table, label: str, program: Program, harmonics: int, asked: 
 
 
 def main() -> None:
-    """Builds the environments and prints the table."""
     home = str(Path.home() / ".cache" / "fretwear_peers")
     given = arguments(__doc__, ("slider", "dovetail"), folder=home, tmdsimpy=None, nlvib=None)
     folder = Path(given.folder).resolve()

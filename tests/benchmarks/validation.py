@@ -109,7 +109,6 @@ def gross_slip(strips: int = 60) -> None:
 
 
 def main() -> None:
-    """Prints the chosen tables."""
     chosen = arguments(__doc__, ("A", "B", "C")).chosen
     if "A" in chosen:
         limits("A", cylinder, (50, 100, 200))
