@@ -63,7 +63,7 @@ class PeriodFactor:
     joint: Joint
     basis: FourierBasis
     pairs: IntArray
-    coupling: SingleArray
+    coupling: FloatArray
     matrices: PeriodMatrices
 
     exact = False
@@ -83,7 +83,7 @@ class PeriodFactor:
         spread = self.joint.to_pairs(right)
         right_t = (spread[self.pairs].reshape(-1, right.shape[1]) @ self.basis.synthesis).T
         state_t = march_samples(np.ascontiguousarray(right_t), self.matrices, MARCH_PERIODS)
-        return right - self.coupling @ (state_t.T @ self.basis.analysis).astype(np.float32)
+        return right - self.coupling @ (state_t.T @ self.basis.analysis)
 
 
 def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
@@ -121,7 +121,7 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
         swept.append(product[:, tangential].astype(np.float32).ravel())
         rows.append(row)
     first = np.cumsum([0, *(row.size for row in rows)])
-    coupling = np.ascontiguousarray(square[np.ix_(joint.component_index, components)], np.float32)
+    coupling = np.ascontiguousarray(square[np.ix_(joint.component_index, components)])
     all_rows, all_swept, all_inverse = np.concatenate(rows), np.concatenate(swept), np.concatenate(inverse)
     matrices = PeriodMatrices(own, carried, all_rows, first, all_swept, all_inverse)
     return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), pairs, coupling, matrices)

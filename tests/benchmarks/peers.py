@@ -36,8 +36,8 @@ from solver.settings import SolverSettings
 from studies import build_scene
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.references import slider_orbit
+from tests.solver.exact_scenes import behind_spring
 from tests.solver.models import branch_states
-from tests.solver.random_orbits import behind_spring
 
 MASS, DAMPING, MOUNT, FORCE, FRICTION, SPRING = 0.1, 20.0, 1.6e5, 10.0, 5.0, 1.6e6
 SLIDER = {"mass": MASS, "damping": DAMPING, "mount": MOUNT, "force": FORCE, "friction": FRICTION, "spring": SPRING}
