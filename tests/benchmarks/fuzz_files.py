@@ -19,7 +19,6 @@ PART = 100  # inputs of a process
 
 
 def main() -> None:
-    """Prints what is wrong, and the endings of all inputs."""
     given = arguments(__doc__, tuple(FILES), count=10_000, seed=1, first=0)
     last = given.first + given.count
     parts = [range(first, min(first + PART, last)) for first in range(given.first, last, PART)]
