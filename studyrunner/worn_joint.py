@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.api import run_study
-from studyrunner.result.scene_pairs import depths, pairs_of_scene, tells_depth
+from studyrunner.result.pairs import depths, has_depths, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result, open_for_report
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.sections import AxesSection, WearSection
@@ -134,7 +134,7 @@ def _drawn_inputs(result: Result, shown: Mapping[str, int]) -> dict[str, Any]:
 
 def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: bool = False) -> dict[str, Any]:
     """The table `scene.worn` with the depths at the first count, where they are known, and at the last one."""
-    if not tells_depth(result):
+    if not has_depths(result):
         raise UserError(str(result.path), "wear_depth", None, result.lacks("wear_depth").removesuffix("."))
     depth = depths(result, shown)[:, pairs_of_scene(result, shown)]
     if result.has("worn_depth"):

@@ -130,13 +130,14 @@ def _report(options: argparse.Namespace) -> int:
         from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
         from studyrunner.report.root.vtu import SERIES, find_writer
-        from studyrunner.result.opening import check_numbers, reading_errors
+        from studyrunner.result.opening import reading_errors
+        from studyrunner.result.pairs import read_profile
         from studyrunner.result.view import open_for_report
         from studyrunner.system.progress import count, format_seconds
 
-        result = open_for_report(options.result, options.point, options.measured)
+        measured = read_profile(options.measured) if options.measured else None
+        result = replace(open_for_report(options.result, options.point), measured=measured)
         with result.dataset, reading_errors(str(options.result)):
-            check_numbers(result.dataset, str(options.result))
             write_series = find_writer(result) if options.vtu else None
             folder = options.folder or Path(f"{options.result.stem}-report")
             _make_folder(folder)

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, cast
 
-from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, style
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, as_sentences, style
 from studyrunner.report.figures import loops, missions, pairs, points, precision, response, scatter, wear
 from studyrunner.report.panels import add_legend
 from studyrunner.report.root import figures as root
-from studyrunner.result.scene_pairs import OF_PAIRS, of_shown_scene
-from studyrunner.result.view import Result, as_sentences
+from studyrunner.result.pairs import OF_PAIRS, of_shown_scene
+from studyrunner.result.view import Result
 
 WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
 """Kinds of results."""

@@ -117,6 +117,11 @@ sentence in their place; None for nothing to see.
 """
 
 
+def as_sentences(*parts: str) -> str:
+    """Text of those parts that are not empty, each ended with a full stop."""
+    return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
+
+
 @contextmanager
 def style(width: float = WIDTH) -> Iterator[None]:
     """Inside, figures are built, this wide, and saved in the one style of the report, whatever matplotlibrc says."""

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
-from studyrunner.result.units import show_power
+from studyrunner.units import show_power
 
 FloatArray = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.panels import FloatArray, line_style, set_log
-from studyrunner.result.units import Scale, scale_for, units_of
 from studyrunner.result.view import Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.system.progress import count
+from studyrunner.units import Scale, scale_for, units_of
 
 _DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
 _MANY = 60  # points from which markers are small
@@ -85,7 +85,7 @@ class Course:
     def read(self, result: Result, name: str, point: Mapping[str, int]) -> FloatArray:
         """A variable along the course, at a point whose index along it does not matter: (n, what follows the axes)."""
         where = {axis: place for axis, place in point.items() if axis != self.axis}
-        values = result.read(name).isel(where).transpose(self.axis, ...).values
+        values = result.dataset[name].isel(where).transpose(self.axis, ...).values
         return np.asarray(values, dtype=float)[self.index]
 
     def along(self, result: Result, flags: NDArray[np.bool_], point: Mapping[str, int]) -> NDArray[np.bool_]:

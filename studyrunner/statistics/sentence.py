@@ -7,8 +7,8 @@ import math
 import numpy as np
 import xarray as xr
 
-from studyrunner.percent import show_percent
 from studyrunner.statistics.samples import FEWEST, Array
+from studyrunner.units import show_percent
 
 _MM3 = 1e9
 _MEASURES = ("first_index", "rank_correlation")

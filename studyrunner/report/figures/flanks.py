@@ -15,11 +15,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from studyrunner.report.panels import FloatArray, add_colour_bar, add_map, is_narrow, label_outer, new_panels
-from studyrunner.result.grid import Grid, find_grid
-from studyrunner.result.scene_pairs import contact_pairs
-from studyrunner.result.units import Scale
+from studyrunner.result.pairs import Grid, contact_pairs, find_grid
 from studyrunner.result.view import Result
 from studyrunner.system.progress import count
+from studyrunner.units import Scale
 
 JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
 """The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""

@@ -14,9 +14,9 @@ import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
 from studyrunner.report.drawing import Drawn
 from studyrunner.report.figures.flanks import JOINT_WORDS
 from studyrunner.report.panels import FloatArray, label_outer, line_style, new_panels
-from studyrunner.result.scene_pairs import last_depth, tells_depth
-from studyrunner.result.units import scale_for
+from studyrunner.result.pairs import has_depths, last_depth
 from studyrunner.result.view import Result
+from studyrunner.units import scale_for
 
 _MOST_PAIRS, _LABEL_WIDTH = 3, 25
 _NO_MOTION = 1e-15  # m; a range below this is round-off
@@ -30,7 +30,7 @@ def draw_fretting(result: Result) -> Drawn:
     """Tangential force over tangential displacement, one row a direction."""
     loops = _read_loops(result)
     if not loops:
-        depth = last_depth(result, result.shown_point()) if tells_depth(result) else np.zeros(1)
+        depth = last_depth(result, result.shown_point()) if has_depths(result) else np.zeros(1)
         deepest = int(result.dataset["contact"].values[np.argmax(np.nan_to_num(depth))])
         return f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
     rows: dict[str, _Curves] = {}
@@ -99,7 +99,7 @@ def _read_loops(result: Result) -> dict[int, xr.Dataset]:
     if source is None:
         return {}
     pairs = [int(pair) for pair in source["contact"].values if source["loop_force"].sel(contact=pair).notnull().any()]
-    if tells_depth(result):
+    if has_depths(result):
         worn = dict(zip(result.dataset["contact"].values.tolist(), last_depth(result, point).tolist(), strict=True))
         pairs.sort(key=lambda pair: -np.nan_to_num(worn.get(pair, 0.0)))
     ends = source.isel(cycle=[0, -1] if source.sizes["cycle"] > 1 else [0])

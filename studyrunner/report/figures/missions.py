@@ -6,11 +6,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from studyrunner.percent import show_percent
 from studyrunner.report.drawing import Drawn, Table
 from studyrunner.report.panels import COLOURS, FloatArray, add_legend, add_line, line_style, new_panels, set_from_zero
-from studyrunner.result.units import Scale, scale_for, show_number
 from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.units import Scale, scale_for, show_number, show_percent
 
 _MOST_BLOCKS = 12
 _ENDS = {"response_amplitude_begin": "begin", "response_amplitude": "end"}

@@ -22,10 +22,9 @@ from studyrunner.report.figures.flanks import (
 )
 from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.selection import choose, labelled
-from studyrunner.result.scars import Scar, find_scar
-from studyrunner.result.scene_pairs import NO_DEPTH, depths, last_depth, tells_depth
-from studyrunner.result.units import Scale, scale_for
+from studyrunner.result.pairs import NO_DEPTH, Scar, depths, find_scar, has_depths, last_depth
 from studyrunner.result.view import Result
+from studyrunner.units import Scale, scale_for
 
 _MOST_SERIES, _MOST_PROFILES = 4, 5
 _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _SLENDER, _LONGEST_NAME = 150, 4, 120, 0.12, 20
@@ -33,7 +32,7 @@ _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _SLENDER, _LONGEST_NAME = 150, 4, 12
 
 def _worn_depth(result: Result) -> FloatArray | None:
     """Wear depths (n_contact,), m, of the shown point at its last count; None where nothing is worn."""
-    depth = last_depth(result, result.shown_point()) if tells_depth(result) else np.zeros(1)
+    depth = last_depth(result, result.shown_point()) if has_depths(result) else np.zeros(1)
     return depth if len(result.cycles) > 1 and float(depth.max()) > NO_DEPTH else None
 
 
@@ -43,7 +42,7 @@ def _largest(result: Result, values: FloatArray, scale: Scale) -> str:
 
 def draw_depths(result: Result) -> Drawn:
     """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
-    if not tells_depth(result):
+    if not has_depths(result):
         return result.lacks("wear_depth")
     if _worn_depth(result) is None or result.dataset.sizes["contact"] == 1:
         return None
@@ -53,7 +52,7 @@ def draw_depths(result: Result) -> Drawn:
     series = {label: depth for label, depth in series.items() if not np.isnan(depth).all()}
     scale = scale_for("m", *series.values())
     figure, panel = _draw_stems(result, {label: scale(depth) for label, depth in series.items()})
-    panel.set_ylabel(scale.label(f"wear depth {result.when(result.last_kept(shown))}"))
+    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(result.last_kept(shown))}"))
     if "contact_surface" in result.dataset.coords:
         _name_surfaces(panel, result)
     deepest = [labelled(_largest(result, depth, scale), label) for label, depth in series.items()]
@@ -126,7 +125,7 @@ def draw_profile(result: Result) -> Drawn:
         figure = _draw_profiles(flanks, depth, scale)
     else:
         figure = draw_fields(flanks, {result.cycle_label(last): depth}, scale, "wear depth")
-    return figure, f"{result.when(last, 'after').capitalize()}. Deepest: {_largest(result, depth, scale)}", said
+    return figure, f"After {result.cycle_label(last)}. Deepest: {_largest(result, depth, scale)}", said
 
 
 def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -> Figure:
@@ -195,7 +194,7 @@ def _draw_scar_depth(result: Result, scar: Scar, after: FloatArray) -> Drawn:
         # a measured profile may have piled-up edges above the surface
         panel.plot(along(measured.x), scale(measured.depth), color=COLOURS[2], linewidth=1.2, label="measured")
     panel.invert_yaxis()
-    deepest = f"{result.when(last, 'after').capitalize()}. Deepest: {scale.show(float(np.nanmax(after)))}"
+    deepest = f"After {result.cycle_label(last)}. Deepest: {scale.show(float(np.nanmax(after)))}"
     return figure, deepest, said, f"Measured: {measured.name}" if measured else ""
 
 

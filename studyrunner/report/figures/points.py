@@ -11,13 +11,12 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
 from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn, Table
+from studyrunner.report.drawing import Drawn, Table, as_sentences
 from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.selection import choose, find_course, spans_decades
-from studyrunner.result.points import CONVERGED
-from studyrunner.result.units import scale_for, show_cycles, show_number, units_of
-from studyrunner.result.view import Result, as_sentences
+from studyrunner.result.view import CONVERGED, Result
 from studyrunner.statistics.samples import SAMPLE
+from studyrunner.units import scale_for, show_cycles, show_number, units_of
 from studyrunner.variables import CERTIFICATE
 
 _PLAIN = ("frequency", "scheme", SAMPLE)
@@ -68,7 +67,7 @@ def find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArr
         worn = np.where(result.computed, result.worn, np.nan)
         found.append(("worn volume\nin the end", "m3", worn, result.errors * worn))
     if result.has("response_amplitude"):
-        amplitude = result.read("response_amplitude").isel(response=0, cycle=-1).transpose(*result.axes)
+        amplitude = result.dataset["response_amplitude"].isel(response=0, cycle=-1).transpose(*result.axes)
         units, of = str(amplitude.attrs.get("units", "m")), f"response\nof {result.responses[0]}"
         values = np.where(result.computed, amplitude.values, np.nan)
         if "frequency" in result.varying:
@@ -144,7 +143,7 @@ def list_certificates(result: Result) -> Drawn:
     rows = []
     for name, words in CERTIFICATE.items():
         if result.has(name) and "cycle" in result.dataset[name].dims:
-            values = result.read(name).transpose(*result.axes, "cycle").values
+            values = result.dataset[name].transpose(*result.axes, "cycle").values
             values = np.where(result.computed[..., None] & np.isfinite(values), values, 0.0)
             *place, cycle = map(int, np.unravel_index(int(np.argmax(values)), values.shape))
             point = result.point_at(place)

@@ -14,12 +14,11 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from studyrunner.percent import show_percent
-from studyrunner.report.drawing import Drawn
+from studyrunner.report.drawing import Drawn, as_sentences
 from studyrunner.report.panels import FloatArray, add_legend, line_style, new_panels, set_log
-from studyrunner.result.units import show_number
-from studyrunner.result.view import NO_VOLUME, Result, as_sentences
+from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.system.progress import count
+from studyrunner.units import show_number, show_percent
 
 KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
 """Axes along which only the numbers change and not what is computed."""
@@ -111,7 +110,7 @@ def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
     def read(name: str) -> FloatArray:
         """Values (n_points, n_setting, ...) at the last count; NaN where the file has none."""
         values = unknown.copy(data=result.computed) if name == "computed" else unknown
-        values = result.read(name).isel(cycle=-1, missing_dims="ignore") if result.has(name) else values
+        values = result.dataset[name].isel(cycle=-1, missing_dims="ignore") if result.has(name) else values
         table = values.stack(point=others, setting=keys, create_index=False).isel(setting=rows)
         return np.asarray(table.transpose("point", "setting", ...).values, dtype=float)
 

@@ -12,8 +12,8 @@ from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
 from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.selection import Course, choose, find_course, labelled
-from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.units import Scale, scale_for
 
 _MOST_LINES, _MOST_RESPONSES, _MOST_FOLDS, _MOST_MODES = 3, 3, 12, 6
 _OF_WEAR = ("wear_coefficient", "step", "scheme")
@@ -64,7 +64,7 @@ def _draw_new(
     # how a joint wears makes no difference to the new one: NaN where a scheme has found no state
     alike = [axis for axis in _OF_WEAR if axis in result.axes]
     choice = choose(result, ["frequency", *alike], _MOST_LINES, first=(_BEFORE, "sweep", "excitation_amplitude"))
-    own = result.read("response_amplitude").isel(cycle=0, response=number).max(alike)
+    own = result.dataset["response_amplitude"].isel(cycle=0, response=number).max(alike)
     lines = [own.isel(point, missing_dims="ignore").values[course.index] for point in choice.points]
     peaks = []
     for place, (line, (point, label)) in enumerate(zip(lines, choice, strict=True)):
@@ -83,7 +83,7 @@ def _draw_new(
         if np.isfinite(exact).any():
             panel.plot(course.values, scale(exact), color="0.5", linewidth=5, alpha=0.45, zorder=1, label="exact")
     if result.has("fold_frequency"):
-        fold = result.read("fold_frequency")
+        fold = result.dataset["fold_frequency"]
         sweeps = fold["sweep"].values.tolist() if "sweep" in fold.dims else []
         for style, sweep in zip(("--", ":", "--"), sweeps, strict=False):
             values = fold.sel(sweep=sweep).values

@@ -11,14 +11,14 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn
+from studyrunner.report.drawing import Drawn, as_sentences
 from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.selection import Course, choose, find_course, slow_time
-from studyrunner.result.units import Scale, scale_for
-from studyrunner.result.view import NO_VOLUME, Point, Result, as_sentences
+from studyrunner.result.view import NO_VOLUME, Point, Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.sentence import describe_ranking, measure_of
 from studyrunner.system.progress import count
+from studyrunner.units import Scale, scale_for
 
 _Shown = list[tuple[Point, str, xr.Dataset]]
 """Combinations of the axes beside the samples with their labels and statistics."""
@@ -43,7 +43,7 @@ def _of_samples(draw: _Draw) -> Callable[[Result], Drawn]:
     def drawn(result: Result) -> Drawn:
         if SAMPLE not in result.varying or not result.has("worn_volume"):
             return None
-        worn = float(result.read("worn_volume").max()) > NO_VOLUME
+        worn = float(result.dataset["worn_volume"].max()) > NO_VOLUME
         return draw(result, result.statistics) if worn and result.statistics is not None else None
 
     return drawn

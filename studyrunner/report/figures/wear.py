@@ -9,14 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from studyrunner.percent import show_percent
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
 from studyrunner.report.panels import FloatArray
 from studyrunner.report.selection import Choice, Course, cell_edges, choose, find_course, labelled, slow_time
 from studyrunner.result.certainty import show_error
-from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import NO_VOLUME, Point, Result
+from studyrunner.units import Scale, scale_for, show_percent
 
 _MOST_LINES, _MOST_MAPS = 6, 4
 _LARGE: dict[str, Any] = {"linestyle": "none", "markersize": 9, "markerfacecolor": "none", "color": "black"}
@@ -26,7 +25,7 @@ def draw_history(result: Result) -> Drawn:
     """Worn volume over cycles at the shown point, one line a scheme; a sentence where there is no history."""
     if len(result.cycles) == 1:
         return f"The file holds {result.cycle_label(0)} only: set [slow_time]."
-    largest = float(np.nanmax(result.read("worn_volume").values, initial=0.0))
+    largest = float(np.nanmax(result.dataset["worn_volume"].values, initial=0.0))
     wears = largest > NO_VOLUME
     free = [result.course_axis] if result.course_axis else []
     scale, choice = scale_for("m3", largest if wears else 0.0), _choose_lines(result, *free)
@@ -40,7 +39,7 @@ def draw_history(result: Result) -> Drawn:
     panel.set_xlim(0.0, panel.dataLim.xmax)
     panel.set_ylabel(scale.label("worn volume"))
     plot.set_from_zero(panel, highest if wears else 0.0)
-    when = "at the end" if result.has("cycle_count") else result.when(-1)
+    when = "at the end" if result.has("cycle_count") else f"at {result.cycle_label(-1)}"
     return (
         figure,
         f"Worn {when}: {', '.join(ends)}" if wears else "Nothing is worn at the counts kept",
@@ -103,7 +102,7 @@ def _show_error(result: Result, point: Point) -> str:
     if not result.computed[place] or not np.isfinite(error) or error <= 0.0:
         return ""
     remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
-    return f" ± {show_error(result, place)}{remark}"
+    return f" ± {show_error(result, point)}{remark}"
 
 
 def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[Choice, list[FloatArray]]:
@@ -145,7 +144,8 @@ def draw_final(result: Result) -> Drawn:
     plot.set_from_zero(panel, highest)
     crosses = plot.mark_failed(panel, course.values, failed)
     course.set_axis(panel)
-    panel.set_ylabel(scale.label(f"worn volume {'at the end' if result.has('cycle_count') else result.when(-1)}"))
+    when = "at the end" if result.has("cycle_count") else f"at {result.cycle_label(-1)}"
+    panel.set_ylabel(scale.label(f"worn volume {when}"))
     number = int(np.argmax(largest))
     place = int(np.nanargmax(reached[number]))
     known = f" ± {show_percent(errors[number][place])}" if errors[number][place] > 0.0 else ""

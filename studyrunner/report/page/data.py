@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from studyrunner.report.figures.loops import find_loops
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.views import body_colours, find_views
-from studyrunner.result.scene_pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
-from studyrunner.result.units import Scale, scale_for, units_of
+from studyrunner.result.pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import DRAWN
+from studyrunner.units import Scale, scale_for, units_of
 from studyrunner.variables import CERTIFICATE
 
 _CHARACTERS_A_FLOAT = 16.0 / 3.0

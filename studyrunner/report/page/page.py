@@ -22,13 +22,12 @@ from xml.etree import ElementTree
 from studyrunner.coordinates import COORDINATES
 from studyrunner.report.drawing import Drawing, Item, Missing, Table
 from studyrunner.report.page.data import build_page_data, build_root_numbers
-from studyrunner.result.certainty import advise_ended, describe_ended, tell_ends
-from studyrunner.result.points import CONVERGED
-from studyrunner.result.units import show_number, units_of
-from studyrunner.result.view import Result
+from studyrunner.result.certainty import advise_ended, describe_ended, describe_ends
+from studyrunner.result.view import CONVERGED, Result
 from studyrunner.summary.answer import summarise
 from studyrunner.summary.lines import summary_rows
 from studyrunner.system.progress import count
+from studyrunner.units import show_number, units_of
 from studyrunner.user_error import show_text
 
 DATA_LIMIT = 5e6
@@ -137,7 +136,7 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
         file=show_text(result.path.name),
         css=_own_file("page.css"),
         answer=summary_rows(summarise(result)),
-        ends=tell_ends(result),
+        ends=describe_ends(result),
         endings=_endings(result),
         facts=_facts(result),
         study=result.dataset.attrs.get("study"),

@@ -17,7 +17,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from studyrunner.result.scene_pairs import contact_pairs
+from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import Result
 
 MESH = ("mesh_x", "mesh_y", "mesh_z", "mesh_quad")
@@ -119,9 +119,9 @@ def read_root(result: Result) -> RootSurface | None:
 
 def read_mesh(result: Result) -> tuple[Floats, Places, NDArray[np.str_]]:
     """Nodes (n, 3), m, faces (n_faces, 4) and their parts (n_faces,), "" where the file names none."""
-    nodes = np.stack([result.read(f"mesh_{axis}").values for axis in "xyz"], axis=1).astype(float)
-    faces = result.read("mesh_quad").values.astype(np.int64)
-    parts = result.read("mesh_part").values.astype(np.str_) if result.has("mesh_part") else np.full(len(faces), "")
+    nodes = np.stack([result.dataset[f"mesh_{axis}"].values for axis in "xyz"], axis=1).astype(float)
+    faces = result.dataset["mesh_quad"].values.astype(np.int64)
+    parts = result.dataset["mesh_part"].values.astype(np.str_) if result.has("mesh_part") else np.full(len(faces), "")
     return nodes, faces, parts
 
 

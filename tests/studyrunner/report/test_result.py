@@ -6,8 +6,8 @@ import xarray as xr
 
 from studyrunner.api import open_result
 from studyrunner.report.selection import choose
-from studyrunner.result.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.result.view import open_for_report
+from studyrunner.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.user_error import UserError
 from tests.studyrunner.results import make_result
 

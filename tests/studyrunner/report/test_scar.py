@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.result.scars import find_scar, read_profile
+from studyrunner.result.pairs import find_scar, read_profile
 from studyrunner.result.view import Result, open_for_report
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_numbers import draw_figure

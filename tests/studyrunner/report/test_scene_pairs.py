@@ -14,7 +14,7 @@ from studyrunner.report.page.data import build_page_data, build_root_numbers
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.vtu import find_writer
 from studyrunner.result.opening import check_dataset
-from studyrunner.result.scene_pairs import last_depth, of_scene, of_shown_scene
+from studyrunner.result.pairs import last_depth, of_scene, of_shown_scene
 from studyrunner.result.view import Result
 from tests.studyrunner.report.root_cases import with_mesh
 from tests.studyrunner.report.test_page import decode
