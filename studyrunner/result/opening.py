@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
+from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.study.toml_text import NoTomlError, read_toml
@@ -51,7 +51,8 @@ _LONGEST = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanin
 _ATTRIBUTES = (*_LONGEST, "sentences", "flag_values")  # of variables, for the report
 _REMEDY = "give a result file of run-study that is whole"
 
-_OF_SCENE = SCENE["mesh"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
+_OF_SCENE = SCENE["mesh"] | SCENE["natural_frequency"]
+_OF_SCENE |= {"stuck_frequency": STUCK_FREQUENCY, "worn_depth": WORN_DEPTH}
 _OF_SCENE |= {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
 _WORDS = ("scheme", "sweep")
 _TEXTS = (*_WORDS, "response", "component", "block")

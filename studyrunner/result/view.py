@@ -14,7 +14,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.result.opening import as_history, find_value, open_known, study_tables
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
 from studyrunner.user_error import UserError, show_text
@@ -33,9 +32,6 @@ WELL_ENOUGH = 0.5
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
-
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Probabilities of the bands that figures show."""
 
 _AT_ONCE = 2**21  # numbers that are read at once
 
@@ -107,7 +103,7 @@ class Result:
 
     @property
     def counted(self) -> str:
-        """What slow time counts: "cycles", or "missions"."""
+        """What slow time counts: "cycles" or "missions"."""
         return "cycles" if self.blocks is None else "missions"
 
     @property
@@ -129,7 +125,7 @@ class Result:
     @cached_property
     def statistics(self) -> xr.Dataset | None:
         """What the samples of the file say, see `statistics_of_file`; None where it has none."""
-        return statistics_of_file(self.dataset, QUANTILES)
+        return statistics_of_file(self.dataset)
 
     def has(self, *names: str) -> bool:
         """Whether the file holds all of these variables."""
@@ -137,16 +133,15 @@ class Result:
 
     def lacks(self, *names: str) -> str:
         """Sentence that says which of these variables to ask for; empty where the file has all."""
-        missing = [name for name in names if not self.has(name)]
+        missing = [
+            name for name in names if not self.has(name) and name not in (() if self.blocks is None else self.blocks)
+        ]
         return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
 
     def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
         """A variable of one point, read for this point only. cycle: index, or indices, along `cycle` if it has that."""
-        values = self.dataset[name]
-        where: dict[str, Any] = {axis: index for axis, index in point.items() if axis in values.dims}
-        if "cycle" in values.dims and not self.has_modes:
-            where["cycle"] = cycle
-        return values.isel(where)
+        values = self.dataset[name].isel(point, missing_dims="ignore")
+        return values.isel(cycle=cycle) if "cycle" in values.dims and not self.has_modes else values
 
     def over_points(
         self, name: str, reduce: Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -299,16 +294,14 @@ class Result:
             measures.insert(0, amplitude.max("response", skipna=False).transpose(*self.axes).values)
         if not self.has_modes and self.has("worn_volume"):
             measures.insert(0, self.worn)
-        has_slow_time = np.ones(self.computed.shape, np.bool_)
+        all_points = has_slow_time = np.ones(self.computed.shape, np.bool_)
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
         wanted = xr.ones_like(self.dataset["outcome"], dtype=bool)
-        for name, value in self.chosen.items():
-            if name in self.varying:
-                wanted = wanted & (self.dataset[name] == value)
-        allowed = np.asarray(wanted.transpose(*self.axes).values)
-        usable, best, all_points = self.usable, self.best_known, np.ones_like(allowed)
-        sets = (best & has_slow_time, usable & has_slow_time, best, self.computed, self.held, all_points)
+        for name in set(self.chosen) & set(self.varying):
+            wanted = wanted & (self.dataset[name] == self.chosen[name])
+        allowed, best = np.asarray(wanted.transpose(*self.axes).values), self.best_known
+        sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.held, all_points)
         points = next(each & allowed for each in sets if (each & allowed).any())
         for measure in measures:
             known = np.where(points & np.isfinite(measure), measure, 0.0)
@@ -333,15 +326,6 @@ class Result:
             for name in self.axes
             if name in kept and name in point
         )
-
-    @cached_property
-    def course_axis(self) -> str | None:
-        """The axis that figures are drawn over: the frequency, or where it does not vary the first other axis of
-        several numbers; None where nothing but words and samples varies.
-        """
-        numbers = [name for name in self.varying if self.dataset[name].dtype.kind in "iuf" and name != SAMPLE]
-        of_first_rank = [name for name in ("frequency", "modal_amplitude") if name in numbers]
-        return next(iter(of_first_rank + numbers), None)
 
 
 def _in_slabs(values: xr.DataArray, axes: Sequence[str]) -> Iterator[xr.DataArray]:

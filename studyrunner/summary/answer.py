@@ -19,7 +19,7 @@ from studyrunner.result.opening import as_history
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import COMPLETE_WORDS, Result
 from studyrunner.statistics.samples import SAMPLE
-from studyrunner.statistics.sentence import describe_ranking, describe_volumes
+from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
 from studyrunner.summary.wear import (
     Life,
     MeshChange,

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from studyrunner import compute_worn_joint
 from studyrunner.api import run_study
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
@@ -45,6 +46,11 @@ def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended(w
         assert vibrates > 1.002 * states.response_amplitude.isel(worn_cycle=0, cycle=0)
         more = before.worn_volume.sel(cycle=2000.0) - before.worn_volume.sel(cycle=1000.0)
         np.testing.assert_allclose(states.worn_volume.isel(worn_cycle=1, cycle=-1), more, rtol=1e-2)
+        most = states.isel(worn_cycle=int(states.worn_volume.isel(cycle=-1).argmax()))
+        compute_worn_joint(tmp_path / "w.nc", tmp_path, loops=[0], progress=False)
+        with xr.open_dataset(tmp_path / "worn_joint_loops.nc") as again:
+            total = float(most.worn_depth + most.wear_depth.isel(cycle=-1))
+            assert again.worn_depth.values.ravel()[-1] == pytest.approx(total, rel=1e-12)
 
 
 def test_the_effective_study_holds_the_depths(whole, tmp_path):

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 
-from studyrunner.report.root.surface import face_normals, read_root
-from studyrunner.report.root.views import find_views
+from studyrunner.report.root import face_normals, find_views, read_root
 from tests.studyrunner.report.figure_numbers import draw_figure
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs, volume
 from tests.studyrunner.results import as_result

@@ -6,8 +6,8 @@ import meshio
 import numpy as np
 import pytest
 
+from studyrunner.report import vtu
 from studyrunner.report.cli import BAD_INPUT, main
-from studyrunner.report.root import vtu
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs
 from tests.studyrunner.results import as_result, build_file
 

@@ -13,9 +13,21 @@ from matplotlib.ticker import MaxNLocator
 
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
+from studyrunner.report.figures.flanks import largest_pair
 from studyrunner.report.panels import COLOURS, MAP, FloatArray
-from studyrunner.report.root.surface import MESH, RootSurface, face_normals, read_mesh, read_root
-from studyrunner.report.root.views import View, draw_scale_bar, find_views, from_aslant, paint_faces, rgb
+from studyrunner.report.root import (
+    MESH,
+    RootSurface,
+    View,
+    draw_scale_bar,
+    face_normals,
+    find_views,
+    from_aslant,
+    paint_faces,
+    read_mesh,
+    read_root,
+    rgb,
+)
 from studyrunner.result.pairs import NO_DEPTH, has_depths, last_depth
 from studyrunner.result.view import Result
 from studyrunner.units import Scale, scale_for, show_number
@@ -49,7 +61,8 @@ def draw_root(result: Result) -> Drawn:
     factor, scale = surface.exaggeration(float(depth.max())), scale_for(units, values)
     return (
         _paint(surface, surface.worn(depth, factor), values, scale, name),
-        f"{name.capitalize()} after {result.cycle_label(last)}{_largest(result, values, scale)}",
+        f"{name.capitalize()} after {result.cycle_label(last)}",
+        f"Largest: {largest_pair(result, values, scale)}" if values.max() > 0.0 else "",
         f"The wear depth is taken off each surface, {show_number(factor)} times exaggerated" if factor > 1.0 else "",
     )
 
@@ -62,12 +75,8 @@ def draw_fraction(result: Result, name: str) -> Drawn:
     if not np.isfinite(values).all():
         return "No point has a state."
     label, scale = f"fraction of the period {'in slip' if name == 'slip_fraction' else 'open'}", scale_for("1", values)
-    return _paint(surface, surface.nodes, values, scale, label), label.capitalize() + _largest(result, values, scale)
-
-
-def _largest(result: Result, values: FloatArray, scale: Scale) -> str:
-    pair = result.dataset["contact"].values[int(np.argmax(values))]
-    return f". Largest: {scale.show(float(values.max()), 3)} at pair {pair}" if float(values.max()) > 0.0 else ""
+    largest = f"Largest: {largest_pair(result, values, scale)}" if values.max() > 0.0 else ""
+    return _paint(surface, surface.nodes, values, scale, label), label.capitalize(), largest
 
 
 def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale: Scale, label: str) -> Figure:

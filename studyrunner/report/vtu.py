@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from studyrunner.report.root.surface import RootSurface, read_root
+from studyrunner.report.root import RootSurface, read_root
 from studyrunner.result.pairs import depths, has_depths, of_shown_scene
 from studyrunner.result.view import Result
 from studyrunner.user_error import UserError, Verbatim
