@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from studyrunner.result.opening import as_history, find_value, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
-from studyrunner.user_error import UserError, show_text
+from studyrunner.user_error import show_text
 
 if TYPE_CHECKING:
     from studyrunner.result.pairs import Profile
@@ -76,10 +76,7 @@ class Result:
     @cached_property
     def study(self) -> dict[str, dict[str, object]]:
         """The effective study in the file, by table; empty where there is none that can be read."""
-        try:
-            return study_tables(self.dataset.attrs)
-        except UserError:
-            return {}
+        return study_tables(self.dataset.attrs)
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
