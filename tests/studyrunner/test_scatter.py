@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, sobol_indices
 
-from studyrunner.scatter.draws import ScatteredPairs, drawn, unit_design
-from studyrunner.scatter.section import ScatterSection, flat_table
+from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn, flat_table, unit_design
 from studyrunner.user_error import WrongValueError
 
 FRICTION = {"normal": {"mean": 0.5, "std": 0.03}}
