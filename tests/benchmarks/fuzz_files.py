@@ -1,12 +1,12 @@
 """Mutated scene, result and deck files, and what the commands make of them: no traceback and no hang is wanted.
 
-    python -m tests.benchmarks.fuzz_files [COUNT [SEED [FIRST]]]
+    python -m tests.benchmarks.fuzz_files [--count 10000] [--seed 1] [--first 0]
 
-An input is known by its seed and its number: COUNT 1 with its number for FIRST has it again. Prints what is wrong;
-status 1 where anything is. Random bytes in an HDF5 file may crash the library, which nothing here prevents: these are
-counted apart.
+An input is known by its seed and its number: `--count 1` with its number for `--first` has it again. Random bytes in an
+HDF5 file may crash the library, which nothing here prevents: these are counted apart.
 """
 
+import contextlib
 import os
 import random
 import signal
@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from studyrunner import cli
 from studyrunner.report import cli as report
+from tests.benchmarks.frame import arguments
 from tests.studies.fe_models.decks import CUBES
 from tests.studies.fe_models.mutations import mutate
 from tests.studyrunner.small_studies import LAP_JOINT, SLIDER, words
@@ -117,18 +118,18 @@ def mutate_bytes(content: bytes, chance: random.Random) -> bytes:
     return bytes(changed)
 
 
-def main() -> int:
-    count, seed, first = (int(text) for text in (sys.argv[1:4] + ["10000", "1", "0"][len(sys.argv[1:4]) :]))
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
+def main() -> None:
+    """Prints what is wrong, and the endings of all inputs."""
+    given = arguments(__doc__, count=10_000, seed=1, first=0)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         write_whole_files()
-        found = [answer(seed, number) for number in range(first, first + count)]
-    crashed = [each.wrong for each in found if each.ended.endswith((f"{-signal.SIGSEGV}", f"{-signal.SIGABRT}"))]
-    wrong = [each.wrong for each in found if each.wrong and each.wrong not in crashed]
-    print(*wrong, *crashed, *sorted(Counter(each.ended for each in found).items()), sep="\n")
-    print(f"{len(wrong)} of {count} inputs are not answered as they should be, and {len(crashed)} crash a library")
-    return int(bool(wrong))
+        found = [answer(given.seed, number) for number in range(given.first, given.first + given.count)]
+    print(*(each.wrong for each in found if each.wrong), sep="\n")
+    print(*sorted(Counter(each.ended for each in found).items()), sep="\n")
+    crashed = sum(each.ended.endswith((f"{-signal.SIGSEGV}", f"{-signal.SIGABRT}")) for each in found)
+    wrong = sum(bool(each.wrong) for each in found) - crashed
+    print(f"{wrong} of {given.count} inputs are not answered as they should be, and {crashed} crash a library")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

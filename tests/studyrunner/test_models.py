@@ -21,10 +21,10 @@ from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
 from tests.mpi.launching import results
 from tests.studies.fe_models.decks import SECTOR
-from tests.studies.fe_models.matrix_files import needs_ccx, run_ccx, write_matrix_input, write_punch
+from tests.studies.fe_models.matrix_files import write_matrix_input, write_punch
 from tests.studies.fe_models.plates import Plates
 from tests.studies.fe_models.sectors import faces_where
-from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, node_set
+from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, needs_ccx, node_set, run_ccx
 from tests.studyrunner.small_studies import LAP_JOINT, ROOT_OF_A_DECK, UNWORN, compute, same_values
 
 STIFFNESSES = (1e11, 1e13)
@@ -85,7 +85,7 @@ def test_from_deck_to_worn_volume():
 @pytest.mark.slow
 @needs_ccx
 def test_matrices_of_calculix_give_the_scene_of_the_mesh(folder, capsys):
-    run_ccx(folder, SECTOR.read_text(), "sector")
+    run_ccx(folder, SECTOR.read_text().splitlines(), "sector")
     check_same(scene_of("wear.toml", "scene.matrices=sector"), scene_of("wear.toml"), 1e-6)
     assert main(["wear.toml", "--check", "--set", "scene.matrices=sector"]) == 0
     shown = capsys.readouterr().out

@@ -12,7 +12,7 @@ import pytest
 
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study_file import read_study
-from tests.studies.fe_models.matrix_files import needs_ccx
+from tests.studies.fe_models.solid_meshes import needs_ccx
 from tests.studies.static_contact import solve_static_contact
 from tests.studyrunner.small_studies import UNWORN, compute
 

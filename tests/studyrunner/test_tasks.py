@@ -12,13 +12,11 @@ from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import StartResult
-from studyrunner.kinds.wear import History
 from studyrunner.kinds.wear_result import build_result
-from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.variables import ASKED, USUAL
 from tests.mpi.launching import results
-from tests.studyrunner.fakes import changed, fake_evaluate, points_of, totals_of, without_values
+from tests.studyrunner.fakes import changed, points_of, totals_of, without_values
 from tests.studyrunner.histories import history
 from tests.studyrunner.small_studies import words
 
@@ -145,22 +143,13 @@ def test_estimates_hold_to_a_factor_of_two(study, n_displacements, used):
 RUN = ["sdof_slider", *words("axes.frequency=[100, 110, 120]", "axes.scheme=implicit"), "-o", "out.nc"]
 
 
-@pytest.fixture
-def use_fake(folder, monkeypatch):
-    """Puts a stand-in in place of the solver, whose result at the second frequency is changed."""
-
-    def use(change):
-        def compute(task, models, keep):
-            for result in fake_evaluate(task, keep, describe_scene(models[0])):
-                yield change(result) if isinstance(task, History) and task.position == 1 else result
-
-        monkeypatch.setattr(task_runs, "compute_task", compute)
-
-    return use
+def at_the_second_frequency(change):
+    """Of the stand-in for the solver: another result there."""
+    return lambda task, result: change(result) if task.position == 1 else result
 
 
-def test_points_that_failed(use_fake, capsys):
-    use_fake(lambda result: without_values(result, int(Outcome.MARCH_FAILED)))
+def test_points_that_failed(folder, solver, capsys):
+    solver.change = at_the_second_frequency(lambda result: without_values(result, int(Outcome.MARCH_FAILED)))
     assert main(RUN) == 3
     first, *_, failed, certainty = capsys.readouterr().out.splitlines()
     assert "2 computed, 1 failed" in first
@@ -173,10 +162,11 @@ def test_points_that_failed(use_fake, capsys):
 
 
 @pytest.mark.parametrize("outcome", [Outcome.INACCURATE, Outcome.SENSITIVE])
-def test_points_above_rtol_are_computed_points(outcome, use_fake, capsys):
+def test_points_above_rtol_are_computed_points(outcome, folder, solver, capsys):
     """Exit status 0; their values are kept, and they are named with what there is to say of them."""
     message = "from cycle 31 000 on the wear rate is known to 2.6 % only"
-    use_fake(lambda result: changed(result, outcome=int(outcome), error_estimate=0.15, message=message))
+    values = {"outcome": int(outcome), "error_estimate": 0.15, "message": message}
+    solver.change = at_the_second_frequency(lambda result: changed(result, **values))
     assert main(RUN) == 0
     first, *_, uncertain, certainty = capsys.readouterr().out.splitlines()
     assert "3 points, 3 computed, 0 failed" in first
@@ -188,11 +178,10 @@ def test_points_above_rtol_are_computed_points(outcome, use_fake, capsys):
 
 
 @pytest.mark.slow
-def test_unexpected_failure_keeps_the_old_file(folder, use_fake, monkeypatch, capsys):
+def test_unexpected_failure_keeps_the_old_file(folder, solver, monkeypatch, capsys):
     def fail(*_):
         raise ZeroDivisionError("a bug")
 
-    use_fake(lambda result: result)
     assert main(RUN) == 0
     earlier = (folder / "out.nc").read_bytes()
     (folder / "out.nc.progress").unlink()
