@@ -3,21 +3,10 @@
 `python -m tests.studyrunner.test_result_page` writes them again.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from studyrunner.coordinates import SCENE, STUCK_FREQUENCY
-from studyrunner.variables import (
-    ASKED,
-    COUNTS,
-    KEPT,
-    LOOPS,
-    OF_A_MISSION,
-    OF_A_MODE_POINT,
-    OF_MISSIONS,
-    OF_MODES,
-    Variable,
-)
+from studyrunner.variables import ASKED, COUNTS, KEPT, LOOPS, OF_A_MISSION, OF_A_MODE_POINT, OF_MISSIONS, OF_MODES
 
 PAGE = Path(__file__).parents[2] / "studyrunner/RESULT_FILE.md"
 OF_SCENE = SCENE["exact"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
@@ -25,10 +14,10 @@ WEAR = ASKED | COUNTS | LOOPS | KEPT | OF_SCENE
 LISTS = {"wear": WEAR, "missions": OF_MISSIONS | OF_A_MISSION, "modes": OF_MODES | OF_A_MODE_POINT}
 
 
-def listed(variables: Mapping[str, Variable], known: Mapping[str, Variable]) -> str:
+def listed(variables, known):
     """A line for each set of dimensions, and one for what is as in `known`; errors of variables are not named."""
     errors = {f"{name}_error" for name in variables}
-    lines: dict[str, list[str]] = {}
+    lines = {}
     for name, entry in variables.items():
         like = known.get(name.removesuffix("_begin"))
         if name in errors:
@@ -42,7 +31,7 @@ def listed(variables: Mapping[str, Variable], known: Mapping[str, Variable]) -> 
     return "\n".join(f"- **{of}**: {'; '.join(entries)}." for of, entries in lines.items())
 
 
-def page_with_lists(text: str) -> str:
+def page_with_lists(text):
     """The page, with the lists between their marks made from the tables."""
     for name, variables in LISTS.items():
         before, rest = text.split(f"<!-- variables: {name} -->\n")
