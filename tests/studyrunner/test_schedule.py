@@ -1,5 +1,6 @@
 """The schedule on one rank, the ranks without MPI, and what a user sees while a study runs."""
 
+import io
 import itertools
 import sys
 import threading
@@ -166,6 +167,19 @@ def test_a_line_every_half_minute_at_least(monkeypatch, capsys):
     assert 2.0 - 1e-6 <= min(gaps) <= max(gaps) <= 30.2
     # not more often than that either
     assert len(lines) < 3600 / 30 + 12
+
+
+def test_a_bar_on_a_terminal(monkeypatch):
+    screen = io.StringIO()
+    screen.isatty = lambda: True
+    monkeypatch.setattr(sys, "stderr", screen)
+    for name, value in (("TERM", "xterm"), ("COLUMNS", "160")):
+        monkeypatch.setenv(name, value)
+    with ProgressDisplay() as shown:
+        shown.say("computing")
+        shown.tick(lambda: Standing(5, 20, 0.25, 30.0, ("210 Hz implicit",)))
+        shown._bar.refresh()
+    assert "5 of 20 points, 25 %, about 30 s left, running: 210 Hz implicit" in screen.getvalue()
 
 
 @pytest.mark.parametrize("compiles", [True, False])
