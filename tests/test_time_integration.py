@@ -80,7 +80,7 @@ def test_wear_of_a_slider_follows_its_differential_equation():
 
 def decaying(model, place, pull, frequency, periods):
     """Free decay of a displacement that is let go at `pull`, m: amplitude, frequency, Hz, damping ratio by cycle."""
-    structure = build(model, 0.5, frequency, 0.0, 400)
+    structure = build(model, 0.5, frequency, 0.0, 200)
     rest = at_rest(model, structure, model.contact.gap)
     begun = rest.x.copy()
     begun[:, place] += pull
