@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studyrunner.coordinates import SCENE
-from studyrunner.scatter.section import ScatterSection
+from studyrunner.scatter import ScatterSection
 from studyrunner.study.mistakes import nearest_name
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import (

@@ -116,12 +116,6 @@ def test_the_effective_study_is_the_same_study(text, overrides):
     assert [each.scene for each in again.variants] == [each.scene for each in study.variants]
 
 
-def test_a_title_does_not_reach_the_terminal_raw(capsys):
-    Path("s.toml").write_text(SLIDER.replace('name = "s"', 'name = "s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
-    assert main(["s.toml", "--plan"]) == 0
-    assert "\x1b" not in capsys.readouterr().out
-
-
 VALUES = (
     *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
     *("{}", "[[1]]", '""', '"auto"', '"\\u001b[2J"', "'../../x'", "[1, 'a']", "{start = 1, stop = 2, num = 1e9}", "="),

@@ -71,7 +71,7 @@ CASES = {
     "samples": (samples, "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs", ""),
     "settings": (lambda: finest_file(1e-4), "precision", ""),
 }
-ON_PAPER = ("scattered pairs", "many", "two responses", "samples", "settings")
+ON_PAPER = ("many", "two responses", "samples", "settings")
 
 
 @pytest.mark.slow
