@@ -41,7 +41,8 @@ def test_points_that_failed(monkeypatch, capsys):
     assert main(SMALL) == 3
     first, *_, failed, certainty = capsys.readouterr().out.splitlines()
     assert "2 computed, 1 failed" in first
-    assert all(word in failed for word in ("failed ", "110 Hz"))
+    assert failed.startswith("failed ")
+    assert "110 Hz" in failed
     assert "2 of 3 worn volumes" in certainty
     with xr.open_dataset("out.nc") as result:
         assert result.outcome.squeeze().values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
@@ -62,8 +63,11 @@ def test_points_above_rtol_are_computed_points(outcome, monkeypatch, capsys):
     assert main(SMALL) == 0
     first, *_, uncertain, certainty = capsys.readouterr().out.splitlines()
     assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
-    assert all(word in certainty for word in ("certainty ", "15 %", "110 Hz"))
-    assert all(word in uncertain for word in ("uncertain ", "110 Hz"))
+    assert certainty.startswith("certainty ")
+    assert "15 %" in certainty
+    assert "110 Hz" in certainty
+    assert uncertain.startswith("uncertain ")
+    assert "110 Hz" in uncertain
     with xr.open_dataset("out.nc") as result:
         there = result.sel(frequency=110.0).squeeze()
         assert there.worn_volume.notnull().all()
@@ -95,12 +99,15 @@ def history_task(*overrides):
 
 
 def ended_at(last, at, outcome=Outcome.CERTIFICATE_FAILED):
-    """The history as it is where the integration has ended there."""
-    arrays = {name: values.copy() for name, values in vars(at).items() if isinstance(values, np.ndarray)}
-    del arrays["cycles"]
-    for values in arrays.values():
-        values[at.cycles > last] = np.nan if values.dtype.kind in "fc" else 0
-    return replace(at, outcome=outcome, last_cycle=last, error_estimate=0.03, **arrays)
+    """The history as it is where the march has ended there."""
+    behind = at.cycles > last
+    changed = {}
+    for name, values in vars(at).items():
+        if isinstance(values, np.ndarray) and name != "cycles":
+            cut = values.copy()
+            cut[behind] = np.nan if values.dtype.kind in "fc" else 0
+            changed[name] = cut
+    return replace(at, outcome=outcome, last_cycle=last, error_estimate=0.03, **changed)
 
 
 def test_what_was_computed_of_a_point_that_failed_is_kept():
