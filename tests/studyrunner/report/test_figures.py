@@ -13,7 +13,6 @@ import xarray as xr
 from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 
 from studies.scene_answers import SurfaceMesh
-from studyrunner.report import contents
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing
 from studyrunner.report.figures.flanks import find_flanks
@@ -334,9 +333,3 @@ def test_variables_are_read_no_more_than_needed(tmp_path):
         # values of the pairs are read for the points shown; what is small is kept
         assert not dataset["wear_depth"].variable._in_memory
         assert not dataset["mean_pressure"].variable._in_memory
-
-
-def test_the_page_on_the_report_lists_all_figures():
-    page = (Path(contents.__file__).parents[1] / "REPORT.md").read_text(encoding="utf-8")
-    assert f"list_figures -->\n{contents.list_figures()}\n<!--" in page
-    assert len({entry.name for entry in contents.FIGURES}) == len(contents.FIGURES)

@@ -7,9 +7,9 @@ import meshio
 import numpy as np
 import pytest
 
+from studyrunner.report import vtu
 from studyrunner.report.cli import BAD_INPUT, main
-from studyrunner.report.root import vtu
-from studyrunner.report.root.surface import face_normals, read_root
+from studyrunner.report.root import face_normals, read_root
 from tests.studyrunner.report.cases import dovetail, dovetail_file, draw_figure
 from tests.studyrunner.results import as_result, build_file
 
