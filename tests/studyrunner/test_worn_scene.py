@@ -45,7 +45,7 @@ def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended(w
         more = before.worn_volume.sel(cycle=2000.0) - before.worn_volume.sel(cycle=1000.0)
         np.testing.assert_allclose(states.worn_volume.isel(worn_cycle=1, cycle=-1), more, rtol=1e-2)
         # what is computed again of the joint adds the depth at the start
-        most = states.isel(worn_cycle=int(states.worn_volume.isel(cycle=-1).argmax()))
+        most = states.isel(worn_cycle=int(np.argmax(states.worn_volume.isel(cycle=-1).values)))
         compute_worn_joint(tmp_path / "w.nc", tmp_path, loops=[0], progress=False)
         with xr.open_dataset(tmp_path / "worn_joint_loops.nc") as again:
             total = float(most.worn_depth + most.wear_depth.isel(cycle=-1))
