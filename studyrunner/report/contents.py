@@ -178,11 +178,3 @@ def draw_report(result: Result) -> Iterator[Item]:
                 yield item
     if not has_results:
         yield Missing("results", "Results", "No point was computed: the file holds no results to draw.")
-
-
-def list_figures() -> str:
-    """The table of figures for the page REPORT."""
-    only: dict[tuple[str, ...], str] = {(MISSIONS,): f" ({MISSIONS})", (MODES,): f" ({MODES})"}
-    named = ((entry, entry.title.format(slow="cycles", over="frequency")) for entry in FIGURES)
-    rows = [f"| `{entry.name}` | {title}{only.get(entry.kinds, '')} |" for entry, title in named]
-    return "\n".join(("| file | shows |", "|---|---|", *rows))

@@ -239,7 +239,7 @@ class OutputsSection(Section):
     """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
     variables: Annotated[Listed[str], BeforeValidator(_check_variables), AfterValidator(once)] = Field(
-        (DEFAULT,), description="list of names; default: the usual ones, see RESULT_FILE.md"
+        (DEFAULT,), description="list of names; default: those that cost little"
     )
     loops: Annotated[
         Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]],
