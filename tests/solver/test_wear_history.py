@@ -29,7 +29,6 @@ from tests.solver.worn_slider import (
     exact_depths,
     exact_depths_of_motion,
     march,
-    slider_start,
 )
 
 # --- the slider ---
@@ -39,12 +38,6 @@ GIVEN: tuple[Scheme, ...] = ("explicit", "implicit")
 SCHEMES: tuple[Scheme, ...] = (*GIVEN, "adaptive")
 FEW = SolverSettings(harmonics=3, samples=128)
 FINE_OUTPUT = np.linspace(0.0, END, 101)
-
-
-def adaptive(rtol, wear=WEAR, cycles=FINE_OUTPUT):
-    model, start = slider_start(COARSE)
-    settings = SolverSettings(COARSE.harmonics, COARSE.samples, COARSE.tolerance, rtol)
-    return march_wear(model, FRICTION, start, wear, 1.0, "adaptive", cycles, settings)
 
 
 @lru_cache
@@ -70,7 +63,7 @@ def test_the_error_of_the_depth_is_of_first_order_and_its_sign_that_of_the_schem
 @pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4])
 def test_the_worn_volume_is_as_exact_as_asked_for(rtol):
-    history = adaptive(rtol)
+    history = march(1.0, "adaptive", FINE_OUTPUT, rtol=rtol)
     assert history.outcome is Outcome.CONVERGED
     exact = exact_depths(FINE_OUTPUT)
     error = abs(history.wear_depth[-1, 0] - exact[-1]) / exact[-1]
