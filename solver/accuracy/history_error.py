@@ -114,15 +114,13 @@ def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray
 
 
 def _known(outputs: Both, found: HistoryError, unknown: BoolArray, area: FloatArray) -> HistoryError:
-    """Errors whose worn volume, m3, becomes relative: inf where unknown (n,), NaN beyond the end of the history.
-
-    An unworn state has errors of its own, from states with more harmonics.
-    """
+    """Errors whose worn volume, m3, becomes relative: inf where unknown (n,), NaN beyond the end of the history."""
     fine, depth = outputs.fine, outputs.fine["wear_depth"]
     volume = depth @ area
     reached, unworn = np.isfinite(volume), (outputs.counts == 0.0) | (volume <= 0.0)
 
     def of_state(name: str, error: FloatArray) -> FloatArray:
+        # an unworn state has errors of its own, from states with more harmonics
         larger = np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], error)))
         return np.where(reached, larger, np.nan)
 

@@ -163,8 +163,7 @@ def integrate_missions(
 ) -> MissionHistory:
     """Mission history of one point of a study, as far as computed, with its outcome.
 
-    keep: called after each step with the progress. resume: such progress of an equal mission, which goes on from there
-    with a result that is equal to the last bit, except `run_time`.
+    keep: called after each step with the progress. resume: as for `wear.history.integrate_together`.
     """
     unworn, integrator = unworn_course(mission), Integrator(mission.settings.time_limit, keep, resume)
     fine = integrator.integrate("history", MissionProblem(mission), unworn)

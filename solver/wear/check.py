@@ -91,10 +91,7 @@ def _certified(
 def report_only(
     setup: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
 ) -> Checked:
-    """A state of a reference solution with its report, with the harmonics wanted at its count where it is found there.
-
-    resolutions: as in `Guide`, of the reference solution.
-    """
+    """A state of a reference solution with its report, where it is found with the harmonics wanted at its count."""
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
         case, _ = setup.of(state)
@@ -152,10 +149,7 @@ def unstable_at_end(setup: WearingJoint, state: WearState) -> Failure | None:
 
 
 def why_endless(setup: WearingJoint, state: WearState, course: Course, final_share: float) -> Failure | None:
-    """Why a history to the end of wear ends: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on.
-
-    final_share: as in `ToTheEnd`.
-    """
+    """Why a history to the end of wear ends: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
     largest = state.largest_rates[:-1]
     if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():
         return AS_ASKED

@@ -203,10 +203,8 @@ class Integrations:
 
 
 def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
-    """Harmonics and samples of the reference solution: those of the next lower level.
-
-    With one harmonic alone a joint that slips is another joint: three harmonics or one become more, where the model has
-    matrices for them.
+    """Harmonics and samples of the reference solution: those of the next lower level. With one harmonic alone a joint
+    that slips is another joint: three harmonics or one become more, where the model has matrices for them.
     """
     richer = shifted(resolution, 1)
     if resolution.highest <= FIRST_HARMONICS and model.holds(richer.highest):

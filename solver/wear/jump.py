@@ -42,10 +42,7 @@ def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) 
 
 
 def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
-    """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends.
-
-    drifts: whether the joint is known to slide as a whole, although some pairs still stick.
-    """
+    """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends."""
     case, joint = setup.of(state)
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
@@ -80,8 +77,8 @@ def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) 
 
 
 def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | None:
-    """Hold of the mean position of a state; None unless every pair slips at some time, or it `drifts`, and the
-    structure is free to slide in one direction. Masses on rigid ground have a hold of their own (`Penalty.mean`).
+    """Hold of the mean position of a state; None unless every pair slips at some time, or is known to drift although it
+    sticks, and the structure can slide in one direction. Masses on rigid ground have their own hold (`Penalty.mean`).
     """
     if ((at.status_t == STICK).all(axis=1).any() and not drifts) or joint.law.rate_dependent:
         return None
