@@ -32,7 +32,6 @@ from studyrunner.kinds.task import (
     settings_at,
 )
 from studyrunner.mpi.cost_model import CostKeys
-from studyrunner.percent import show_count
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.mission import MissionBlock
@@ -40,6 +39,7 @@ from studyrunner.study.realisation import Realisation
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count
+from studyrunner.units import show_count
 
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory

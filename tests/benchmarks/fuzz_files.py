@@ -119,7 +119,6 @@ def mutate_bytes(content: bytes, chance: random.Random) -> bytes:
 
 
 def main() -> None:
-    """Prints what is wrong, and the endings of all inputs."""
     given = arguments(__doc__, count=10_000, seed=1, first=0)
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         write_whole_files()

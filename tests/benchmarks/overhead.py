@@ -48,7 +48,6 @@ def run(n_ranks: int, n_points: int, folder: Path, name: str = "out.nc", outputs
 
 
 def main() -> None:
-    """Prints a row for one process and one for 4 ranks."""
     n_points = arguments(__doc__, points=10_000).points
     table = Table("per point", "ms", "ms of rank 0", "MiB in all")
     with tempfile.TemporaryDirectory() as name:

@@ -22,7 +22,6 @@ STUDIES = (*6 * (FAKED_STUDY,), REAL_STUDY, LONG_STUDY)
 
 
 def main() -> None:
-    """Prints the trials whose result is another one, and what was lost."""
     given, expected, ages, ended = arguments(__doc__, count=1000, seed=0), {}, [], []
     with tempfile.TemporaryDirectory() as name, ThreadPoolExecutor(AT_ONCE) as pool:
         folder = Path(name)

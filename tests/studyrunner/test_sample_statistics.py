@@ -6,16 +6,18 @@ from scipy.special import ndtri
 from scipy.stats import norm, spearmanr
 from scipy.stats import t as student
 
-from studyrunner.scatter.draws import unit_design
+from studyrunner.scatter import unit_design
 from studyrunner.statistics.samples import (
     FEWEST,
     SampleValues,
+    deciding_pair,
+    density,
     exceedance,
     quantiles,
     rank_correlations,
     saltelli_indices,
+    two_groups,
 )
-from studyrunner.statistics.two_groups import deciding_pair, density, two_groups
 
 # Archard: V = k_w P s N, with lognormal k_w, P, s
 LOGARITHMS = np.log([1.5, 1.2, 1.1])

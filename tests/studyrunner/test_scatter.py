@@ -7,8 +7,7 @@ from scipy.stats import kstest, sobol_indices
 
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.arrays import sample_coordinates
-from studyrunner.scatter.draws import ScatteredPairs, drawn, unit_design
-from studyrunner.scatter.section import ScatterSection, flat_table
+from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn, flat_table, unit_design
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.realisation import draw_inputs, realise

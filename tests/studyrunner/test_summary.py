@@ -9,13 +9,14 @@ import pytest
 
 from solver.outcome import Outcome
 from studyrunner.advice import Used, advise, advise_error
-from studyrunner.percent import show_percent, show_rtol
 from studyrunner.result.certainty import settings_of
-from studyrunner.result.view import Result, as_history
+from studyrunner.result.opening import as_history
+from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import SMALL, ModeRange, Samples, summary
 from studyrunner.summary.lines import MOST_LINES, summary_lines
 from studyrunner.summary.wear import MeshChange, MostWear, NothingWore, compare_meshes
+from studyrunner.units import show_percent, show_rtol
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.results import made_result
 
@@ -244,7 +245,7 @@ def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
     made = wearing(*GRID, volume=lambda p: 1e-9 * (3 * p[0] + p[4]), slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
     whole = summary(made)
     for n_values in (1, 7, 50, 100):
-        monkeypatch.setattr("studyrunner.result.points._AT_ONCE", n_values)
+        monkeypatch.setattr("studyrunner.result.view._AT_ONCE", n_values)
         assert str(summary(made)) == str(whole)
         largest = []
         result_of(made).over_points(

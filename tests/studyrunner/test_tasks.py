@@ -11,7 +11,6 @@ from solver.outcome import Outcome
 from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
-from studyrunner.kinds.task import StartResult
 from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study_file import read_study
 from studyrunner.variables import ASKED, USUAL
@@ -85,21 +84,6 @@ def test_points_know_their_task():
             if not integrated.unworn:
                 assert values["scheme"] == integrated.scheme
                 assert values["step"] == scaled.step or integrated.scheme == "adaptive"
-
-
-def test_histories_cost_little_and_go_last_where_nothing_moves():
-    alone = "solver.shortcuts=false"
-    _, plan = plan_of("axes.frequency=[1, 2]", "axes.step=[100, 1000]", "axes.scheme=implicit", alone)
-    planned = plan.waiting[0, 0]
-    n_unknowns = planned[0].n_unknowns
-    moving = [task.from_start(StartResult(0, "state", moves=True, n_unknowns=n_unknowns)) for task in planned]
-    short, long = sorted(moving, key=lambda task: task.cost)
-    resting = [task.from_start(StartResult(0, "state", moves=False, n_unknowns=n_unknowns)) for task in planned]
-    assert long.start == "state"
-    assert [task.integrated[0].step for task in (long, short)] == [100.0, 1000.0]
-    assert all(0.0 < task.cost < short.cost for task in resting)
-    assert [task.cost for task in planned] == [long.cost, short.cost]
-    assert {task.cost_keys[0] for task in moving} != {task.cost_keys[0] for task in resting}
 
 
 def printed_plan(overrides, capsys, study="sdof_slider"):

@@ -10,8 +10,8 @@ from studyrunner.report.cli import main
 from studyrunner.report.page.page import write_page
 from studyrunner.report.selection import choose
 from studyrunner.result.certainty import certainty_of, describe_ended
-from studyrunner.result.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.result.view import open_for_report
+from studyrunner.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure
 from tests.studyrunner.results import build_file, fail, make_result

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 
+from studyrunner.report import vtu
 from studyrunner.report.cli import BAD_INPUT, main
-from studyrunner.report.root import vtu
-from studyrunner.report.root.surface import face_normals, read_root
-from studyrunner.report.root.views import find_views
+from studyrunner.report.root import face_normals, find_views, read_root
 from tests.studyrunner.report.cases import dovetail, dovetail_file, draw_figure
 from tests.studyrunner.results import as_result, build_file
 
