@@ -15,10 +15,10 @@ from studyrunner.mpi import schedule
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
-from tests.mpi.launching import results
+from tests.mpi.launching import options, results
 from tests.studyrunner.faked_blocks import FakedBlocks, load_of
 from tests.studyrunner.fakes import points_of
-from tests.studyrunner.small_studies import MISSIONS, compute, words
+from tests.studyrunner.small_studies import MISSIONS, compute
 
 LINE = ("axes.frequency=160", "axes.sweep=up")
 ONE = (*LINE, "axes.wear_coefficient=1e-11")
@@ -118,7 +118,7 @@ def test_an_interrupted_study_goes_on_to_the_last_bit(blocks, monkeypatch):
 
     blocks.computed.clear()
     blocks.disturb = interrupt
-    assert main(["missions.toml", "-o", "out.nc", *words(*ONE)]) == 130
+    assert main(["missions.toml", "-o", "out.nc", *options(*ONE)]) == 130
     blocks.disturb = lambda _: None
     found = run(*ONE)
     # the step of the interruption is computed again
@@ -129,7 +129,7 @@ def test_an_interrupted_study_goes_on_to_the_last_bit(blocks, monkeypatch):
 @pytest.mark.slow
 def test_a_block_that_fails_spoils_its_point_only(blocks):
     blocks.fails["cruise"] = Outcome.START_FAILED
-    assert main(["missions.toml", "-o", "out.nc", *words(*LINE, "slow_time.until.worn_volume=1e-9")]) == 3
+    assert main(["missions.toml", "-o", "out.nc", *options(*LINE, "slow_time.until.worn_volume=1e-9")]) == 3
     assert (results().outcome == Outcome.START_FAILED).all()
     assert np.isnan(results().worn_volume[..., 1:]).all()
     assert np.isnan(results().last_mission).all()
@@ -168,7 +168,7 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
     begins = [[block.begin for block in task.blocks] for task in plan.results[:2]]
     assert begins == [["up", "up", "ramp"], ["up", "down", "ramp"]]
     # all blocks have the same pairs
-    assert main(["missions.toml", *words("mission.heavy.area=2e-4")]) == 2
+    assert main(["missions.toml", *options("mission.heavy.area=2e-4")]) == 2
     assert "missions.toml: mission.heavy: " in capsys.readouterr().err
 
 

@@ -16,9 +16,9 @@ from studyrunner.report.page.page import write_page
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
-from tests.mpi.launching import results
+from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import points_of
-from tests.studyrunner.small_studies import compute, words
+from tests.studyrunner.small_studies import compute
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("folder")]
 
@@ -103,7 +103,7 @@ def test_points_are_the_same_in_another_list(study, result):
     first = compute(study, "out.nc", *one, "axes.modal_amplitude=[1e-4]", "outputs.variables=['slip_fraction']")
     assert "natural_frequency" not in first
     assert summary(first).modes[0].n_found == 1
-    more = words(*one, "axes.modal_amplitude={start=1e-5, stop=1e-3, num=3, spacing='log'}")
+    more = options(*one, "axes.modal_amplitude={start=1e-5, stop=1e-3, num=3, spacing='log'}")
     # the smallest amplitude has no mode
     assert main([study, "-o", "out.nc", *more]) == 3
     found = results()

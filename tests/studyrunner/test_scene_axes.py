@@ -17,8 +17,8 @@ from studyrunner.scene import computed
 from studyrunner.scene.answers import exact_answers
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
-from tests.mpi.launching import results
-from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values, words
+from tests.mpi.launching import options, results
+from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
 THREE = ("slow_time.outputs=3", "axes.scheme=adaptive")
@@ -187,6 +187,6 @@ def test_a_sector_that_spins_too_fast_is_bad_input(folder, monkeypatch, capsys):
     # on a busy machine the scene may take so long that it would be kept for another run
     monkeypatch.setattr(computed, "LEAST_SECONDS", math.inf)
     coarse = ("scene.mesh=1", "axes.frequency=212", "slow_time.cycles=0", "axes.scheme=implicit")
-    assert main(["dovetail", "-o", "out.nc", *words(*coarse, "outputs.variables=['natural_frequency']")]) == 2
+    assert main(["dovetail", "-o", "out.nc", *options(*coarse, "outputs.variables=['natural_frequency']")]) == 2
     assert "scene.rotation_speed = 3000: reduce it" in capsys.readouterr().err.splitlines()[-1]
     assert list(folder.iterdir()) == []

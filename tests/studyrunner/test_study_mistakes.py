@@ -13,6 +13,7 @@ import pytest
 
 from studies.scene_file import write_scene
 from studyrunner.cli import main
+from tests.mpi.launching import options
 from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import write_matrix_input
 from tests.studies.fe_models.plates import Plates
@@ -26,7 +27,6 @@ from tests.studyrunner.small_studies import (
     SAMPLES,
     SLIDER,
     TO_THE_END,
-    words,
     write_depths,
 )
 
@@ -283,7 +283,7 @@ def test_each_mistake_is_a_line_and_nothing_is_computed(study, overrides, keys, 
     if name != study:
         (files / name).write_text(study, encoding="utf-8")
     begins = [key if ": " in key else f"{name}: {key}" for key in keys]
-    refuses([name, "--plan", *words(*overrides)], *begins)
+    refuses([name, "--plan", *options(*overrides)], *begins)
 
 
 @pytest.mark.parametrize(("command", "begin"), COMMANDS)

@@ -14,10 +14,9 @@ from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study_file import read_study
 from studyrunner.variables import ASKED, USUAL
-from tests.mpi.launching import results
+from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import changed, points_of, totals_of, without_values
 from tests.studyrunner.histories import history
-from tests.studyrunner.small_studies import words
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")
 GRID = (
@@ -87,7 +86,7 @@ def test_points_know_their_task():
 
 
 def printed_plan(overrides, capsys, study="sdof_slider"):
-    assert main([study, "--plan", *words(*overrides)]) == 0
+    assert main([study, "--plan", *options(*overrides)]) == 0
     captured = capsys.readouterr()
     assert captured.err == ""
     return {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
@@ -124,7 +123,7 @@ def test_estimates_hold_to_a_factor_of_two(study, n_displacements, used):
 
 # --- from results of tasks to the exit status ---
 
-RUN = ["sdof_slider", *words("axes.frequency=[100, 110, 120]", "axes.scheme=implicit"), "-o", "out.nc"]
+RUN = ["sdof_slider", *options("axes.frequency=[100, 110, 120]", "axes.scheme=implicit"), "-o", "out.nc"]
 
 
 def at_the_second_frequency(change):

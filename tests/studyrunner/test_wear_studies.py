@@ -13,9 +13,9 @@ from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from studyrunner.variables import CERTIFICATE, KEPT, LOOPS, USUAL
-from tests.mpi.launching import results
+from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import FACTS
-from tests.studyrunner.small_studies import UNWORN, compute, words
+from tests.studyrunner.small_studies import UNWORN, compute
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
 
@@ -161,7 +161,7 @@ def test_every_point_without_a_resonance_says_why(capsys):
     # so little excitation that the slider sticks: its resonance is far above the range
     small = ("axes.excitation_amplitude=1.0", "slow_time.cycles=10.0", "scatter.samples=2")
     scatter = "scatter.excitation_amplitude={uniform={half_width=0.1}}"
-    assert main(["sdof_slider", "-o", "out.nc", *words(*FOLLOWED, *small, scatter)]) == 3
+    assert main(["sdof_slider", "-o", "out.nc", *options(*FOLLOWED, *small, scatter)]) == 3
     said = capsys.readouterr().out
     messages = {str(message) for message in results().message.values.ravel()}
     assert messages == {"the sweep up meets no resonance between 180 and 230 Hz: give another range"}
