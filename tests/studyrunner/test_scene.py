@@ -24,8 +24,9 @@ from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, l
 from studyrunner.scene_building import SceneModels
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
+from tests.mpi.launching import options
 from tests.studies.scene_models import plain, sector
-from tests.studyrunner.small_studies import CHEAP, SLIDER, compute, same_values, words
+from tests.studyrunner.small_studies import CHEAP, SLIDER, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -106,8 +107,8 @@ def test_what_is_no_model_is_built_again(wrong):
 def test_a_scene_file_holds_the_contact_stiffness_or_gets_it_from_the_study():
     rigid, soft = (build_scene("sdof_slider", **given) for given in ({}, {"contact_stiffness": 1e11}))
     own = "scene.contact_stiffness=1e11"
-    for name, options in (("soft", words(own)), ("rigid", [])):
-        assert main(["sdof_slider", *options, "--write-scene", f"{name}.h5"]) == 0
+    for name, given in (("soft", options(own)), ("rigid", [])):
+        assert main(["sdof_slider", *given, "--write-scene", f"{name}.h5"]) == 0
         study = SLIDER.replace('"sdof_slider"', f'"{name}.h5"\nfriction_coefficient = 0.5')
         Path(f"{name}.toml").write_text(study, encoding="utf-8")
     np.testing.assert_array_equal(read_scene("soft.h5").linear[0].stiffness, soft.linear[0].stiffness)
