@@ -18,11 +18,10 @@ from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import variable_sizes
 from studyrunner.coordinates import COORDINATES
 from studyrunner.kinds.task import Index, PointResult
-from studyrunner.result.arrays import attributes, coordinates, scene_arrays
+from studyrunner.result.arrays import attributes, coordinates
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
 from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn
-from studyrunner.scene.answers import SceneVariable
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study import Study
@@ -303,9 +302,7 @@ def made_result(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Inde
     return dataset
 
 
-def build_dataset(
-    study: Study, facts: SceneFacts, results: Sequence[PointResult], of_scene: Sequence[SceneVariable] = ()
-) -> xr.Dataset:
+def build_dataset(study: Study, facts: SceneFacts, results: Sequence[PointResult]) -> xr.Dataset:
     """The result of a study: axes in the order of the study, then cycle, then contact or response."""
     axes, sizes = study.dimensions, variable_sizes(study, facts)
     sizes = {name: len(values) for name, values in axes.items()} | sizes
@@ -319,16 +316,11 @@ def build_dataset(
                 dataset[name].values[point][:, list(study.outputs.loops)] = values
             elif name in dataset:
                 dataset[name].values[point] = values
-    arrays = [*coordinates(study, facts, pair_arrays(study, [facts])), *scene_arrays(study, of_scene)]
-    named = {scene.name for scene in of_scene if not scene.coordinate}
-    found = {}
-    for array in arrays:
-        lengths = [sizes.get(each, size) for each, size in zip(array.dimensions, array.values.shape, strict=True)]
-        values = np.array(np.broadcast_to(array.values, lengths)) if array.over_axes else array.values
-        found[array.name] = xr.Variable(array.dimensions, values, attributes(array.name, array.entry))
-    coords = {name: variable for name, variable in found.items() if name not in named}
-    dataset = dataset.assign({name: found[name] for name in named}).assign_coords(coords)
-    return dataset.assign_attrs({**describe_run(study, facts), POINTS_LEFT: np.int32(0)})
+    coords = {
+        array.name: xr.Variable(array.dimensions, array.values, attributes(array.name, array.entry))
+        for array in coordinates(study, facts, pair_arrays(study, [facts]))
+    }
+    return dataset.assign_coords(coords).assign_attrs({**describe_run(study, facts), POINTS_LEFT: np.int32(0)})
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
