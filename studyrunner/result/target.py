@@ -73,10 +73,10 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
                     sync(file)
                 finally:
                     trial.unlink()
-    except (OSError, ValueError) as error:
-        # a name that the system cannot encode is a ValueError
-        reason = error.strerror if isinstance(error, OSError) else "it has a name that no file has"
-        remedy = f"give a file that can be written: {reason}"
+    except OSError as error:
+        remedy = f"give a file that can be written: {error.strerror}"
+    except ValueError:
+        remedy = f"give a name in {sys.getfilesystemencoding().upper()}, as those of its folders"
     if remedy:
         raise UserError("command line", option, str(path), remedy)
     return target

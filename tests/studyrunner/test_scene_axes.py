@@ -9,6 +9,7 @@ import xarray as xr
 
 from studies.finite_element.elimination import NotPositiveDefiniteError
 from studies.finite_element.reduction import Reduction
+from studyrunner import compute_worn_joint
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.opening import open_known
@@ -114,6 +115,12 @@ def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended()
     np.testing.assert_allclose(states.worn_volume.isel(cycle=-1), wears, rtol=1e-2)
     np.testing.assert_allclose(response[1], before.response_amplitude.sel(cycle=1000.0), rtol=1e-3)
     assert response[1] > 1.002 * response[0]
+    # what is computed again of the joint adds the depth at the start
+    most = states.isel(worn_cycle=int(np.argmax(states.worn_volume.values[:, -1])))
+    compute_worn_joint("worn.nc", "again", loops=[0], progress=False)
+    with xr.open_dataset("again/worn_joint_loops.nc") as again:
+        depth = float(most.worn_depth + most.wear_depth.isel(cycle=-1))
+        assert again.worn_depth.values.ravel()[-1] == pytest.approx(depth, rel=1e-12)
 
 
 # --- variables of the scene itself ---
