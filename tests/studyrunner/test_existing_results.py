@@ -110,14 +110,6 @@ def test_a_folder_of_an_older_version_is_named_and_left_alone(solver, capsys):
     assert solver.n_results == 6
 
 
-def test_progress_that_is_damaged_belongs_to_no_study(solver, capsys):
-    killed(solver)
-    solver.begin_again()
-    Path("out.nc.progress").write_bytes(b"x" * 5000)
-    assert main(OTHER) == 0
-    assert "out.nc.progress.old" in capsys.readouterr().err
-
-
 @pytest.mark.slow
 def test_in_python():
     assert main(SMALL) == 0
