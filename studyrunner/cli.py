@@ -33,7 +33,8 @@ from studyrunner.system.process import (
 from studyrunner.user_error import StorageError, UserError, Verbatim, show_text
 
 if TYPE_CHECKING:
-    from studyrunner.options import Options
+    import argparse
+
     from studyrunner.study.study import Study
 
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3
@@ -237,7 +238,7 @@ def _write_scene(study: Study, path: Path) -> int:
     return CONVERGED
 
 
-def _compute(ranks: Ranks, study: Study, options: Options) -> int:
+def _compute(ranks: Ranks, study: Study, options: argparse.Namespace) -> int:
     from solver.outcome import COMPLETE
     from studyrunner.result.target import check_result
     from studyrunner.run import RunOptions, compute_study

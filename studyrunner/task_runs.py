@@ -12,7 +12,7 @@ from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Keep, Result, StartResult, Task
-from studyrunner.mpi.cost_model import CostModel
+from studyrunner.mpi.dispatch import CostModel
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Office, Run
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task

@@ -1,5 +1,7 @@
-"""Decides which rank gets which task. This module sends no messages and is given its clock: the server on real ranks
-and a simulation with thousands of ranks make the same decisions.
+"""Decides which rank gets which task, by expected run times that finished tasks correct. This module sends no messages
+and is given its clock: the server on real ranks and a simulation with thousands of ranks make the same decisions.
+
+Expected times decide the order of the tasks and the time left that a user sees. They decide no number of a result.
 
 By hand: the pools of mpi4py and schwimmbad know no expected run times and leave rank 0 idle (speed-up 0.92 of 2 ranks,
 here 1.97).
@@ -8,11 +10,10 @@ here 1.97).
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable, Iterator
+import math
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
 
 Task = Any
 """What is done as a whole by one rank. It has
@@ -22,6 +23,13 @@ Task = Any
 - n_results: that the task gives one after the other, at least 1;
 - gives_starts: whether other tasks wait for the results.
 """
+
+CostKeys = Sequence[tuple[Hashable, ...]]
+"""Groups of similar tasks that a task belongs to: sequences of keys, each from a general group to a special one."""
+
+Measurement = Sequence[tuple[Hashable, float, float]]
+"""What is learnt from one task: keys of groups, each with the measured and the expected time, s. The expected time of a
+key contains the corrections of all other sequences of keys."""
 
 AHEAD_SECONDS = 0.2
 """A rank gets a second task in advance behind a task that takes less than this time, s."""
@@ -34,8 +42,60 @@ _WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
 _AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
 _WAITING = 1000
 _WAITING_A_RANK = 16
-_FEW_MEASURED = 16
-_MEASURED_SHARE = 8
+_LEAST = 1e-6
+
+
+class CostModel:
+    """Corrects estimated times by the measured times of similar tasks.
+
+    The correction is a product of factors, one for each sequence of keys. The factor of a key is the sum of the
+    measured times over the sum of the expected times. The factor of the key before counts as one more measurement, so
+    that a few unusual times do not decide. Before the first key the factor is 1.
+    """
+
+    def __init__(self) -> None:
+        self._sums: dict[Hashable, tuple[float, float, int]] = {}
+        # Factors asked for since the last measurement: most of thousands of waiting tasks share their keys.
+        self._factors: dict[tuple[Hashable, ...], float] = {}
+
+    def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:
+        """Adds the times of a task, s; the estimated time is positive."""
+        factors = [self._factor(keys) for keys in cost_keys]
+        expected = estimated * math.prod(factors)
+        found = [
+            (key, measured, expected / each) for keys, each in zip(cost_keys, factors, strict=True) for key in keys
+        ]
+        self._add(found, 1)
+        return found
+
+    def forget(self, measurement: Measurement) -> None:
+        """Takes back a measurement."""
+        self._add(measurement, -1)
+
+    def correction(self, cost_keys: CostKeys) -> float:
+        """Factor by which an estimated time is multiplied, positive."""
+        return math.prod(self._factor(keys) for keys in cost_keys)
+
+    def measured(self, key: Hashable) -> float:
+        """Sum of the measured times, s, of all tasks with a key."""
+        return self._sums.get(key, (0.0, 0.0, 0))[0]
+
+    def _factor(self, keys: tuple[Hashable, ...]) -> float:
+        if keys not in self._factors:
+            found = 1.0
+            for key in keys:
+                measured, expected, n = self._sums.get(key, (0.0, 0.0, 0))
+                if n > 0:
+                    mean = expected / n
+                    found = (measured + found * mean) / (expected + mean)
+            self._factors[keys] = max(found, _LEAST)
+        return self._factors[keys]
+
+    def _add(self, measurement: Measurement, sign: int) -> None:
+        self._factors.clear()
+        for key, measured, expected in measurement:
+            before = self._sums.get(key, (0.0, 0.0, 0))
+            self._sums[key] = (before[0] + sign * measured, before[1] + sign * expected, before[2] + sign)
 
 
 @dataclass(frozen=True)
@@ -76,7 +136,7 @@ class _Waiting:
         heapq.heappush(self._order, self._entry(number))
 
     def pop(self) -> tuple[int, Task]:
-        _, number = heapq.heappop(self._order)
+        number = heapq.heappop(self._order)[1]
         return number, self._tasks.pop(number)[0]
 
     def reorder(self) -> None:
@@ -102,7 +162,6 @@ class Dispatcher:
         self._costs = costs
         self._clock = clock
         self._n_known = 0
-        self._n_measured = 0
         self._began = clock()
         self._next_watch = self._began + WATCH_SECONDS
         self._first = _Waiting(costs)
@@ -132,9 +191,6 @@ class Dispatcher:
 
     def assign(self) -> Iterator[tuple[int, Assignment]]:
         """Ranks that get a task now, and the tasks."""
-        if self._n_measured >= max(_FEW_MEASURED, len(self._others) // _MEASURED_SHARE):
-            self._n_measured = 0
-            self._others.reorder()
         while self._free and self._n_waiting:
             rank, _ = self._free.popitem()
             assignment = self._hand_out(rank)
@@ -155,7 +211,6 @@ class Dispatcher:
         given.measurement = ()
         if typical:
             self._costs.learn(task.cost_keys, task.cost_of(first=given.n_left == task.n_results), seconds)
-            self._n_measured += 1
         given.n_left -= 1
         given.began = self._clock()
         if given.n_left == 0:
@@ -204,7 +259,6 @@ class Dispatcher:
             if at_least > task.cost * self._costs.correction(task.cost_keys):
                 self._costs.forget(given.measurement)
                 given.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
-        self._n_measured = 0
         self._others.reorder()
 
     @property

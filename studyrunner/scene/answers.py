@@ -13,9 +13,9 @@ from pydantic import BaseModel
 
 from studies.scene_answers import ExactAnswer, WearQuestion, stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import changed_keys, scene_answer
+from studies.scenes import changed_keys, scene_answer, scene_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.scene.computed import Computed, frequencies_once, harmonics_to_build
+from studyrunner.scene.computed import harmonics_to_build
 from studyrunner.scene.scene import build_mesh, has_frequencies
 from studyrunner.scene.scene_set import SceneSet, axes_of_difference
 from studyrunner.study.mistakes import scene_errors
@@ -44,18 +44,14 @@ class SceneVariable:
     coordinate: bool = False
 
 
-def build_scene_variables(study: Study, model: ReducedModel, computed: Computed) -> tuple[SceneVariable, ...]:
+def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SceneVariable, ...]:
     """What the study asks of its scene, but exact answers. Natural frequencies of a bundled sector take some seconds.
 
-    computed: holds those of an earlier run. Raises UserError where the scene cannot give them.
+    Raises UserError where the scene cannot give them.
     """
-    found: list[SceneVariable] = []
     with scene_errors(study.source, None):
-        if "mesh" in study.scene_variables:
-            found += _mesh(study)
-        if "natural_frequency" in study.scene_variables:
-            found += _frequencies(computed, study, model)
-    return tuple(found)
+        of_mesh = tuple(_mesh(study)) if "mesh" in study.scene_variables else ()
+        return of_mesh + (tuple(_frequencies(study, model)) if "natural_frequency" in study.scene_variables else ())
 
 
 def _mesh(study: Study) -> Iterator[SceneVariable]:
@@ -71,8 +67,9 @@ def _mesh(study: Study) -> Iterator[SceneVariable]:
         yield SceneVariable(name, entry, values[name])
 
 
-def _frequencies(computed: Computed, study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
-    found = frequencies_once(study, computed) if has_frequencies(study) else stuck_frequencies(model)
+def _frequencies(study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
+    scene = study.scene
+    found = scene_frequencies(scene.model, scene.parameters) if has_frequencies(study) else stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()
     labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
     yield SceneVariable("natural_frequency", entry, found.frequencies)

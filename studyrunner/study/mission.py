@@ -79,6 +79,14 @@ class MissionBlock(Section):
             return abs(self.frequency["stop"] ** 2 - self.frequency["start"] ** 2) / (2.0 * self.frequency["rate"])
         return self.cycles if self.cycles is not None else (self.seconds or 0.0) * frequency
 
+    def describe(self, frequency: float) -> str:
+        """In words. frequency: of steady vibration, Hz."""
+        how = {"ramp": "begins with a ramp", "sweep": "begins with a sweep", "continue": "continues the block before"}
+        cycles = f"{self.cycles_at(frequency):.4g} cycles a mission"
+        if isinstance(self.frequency, dict):
+            return "passage from {start:g} to {stop:g} Hz at {rate:g} Hz/s, ".format(**self.frequency) + cycles
+        return f"{frequency:g} Hz, {cycles}, {how[self.begin]}"
+
     def as_table(self) -> dict[str, Any]:
         """The block as the study file has it."""
         own = {name: value for name, value in self.model_dump(mode="json").items() if value is not None}

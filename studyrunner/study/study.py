@@ -32,7 +32,9 @@ from studyrunner.study.study_of_result import Archived
 from studyrunner.values import Section
 from studyrunner.variables import (
     ASKED,
+    COUNTS,
     KEPT,
+    LOOPS,
     OF_A_MISSION,
     OF_A_MODE_POINT,
     OF_MISSIONS,
@@ -55,6 +57,7 @@ class Kind:
     usual, of_samples: variables where the study names none, and where samples are drawn.
     counted: what the slow time counts; empty where nothing wears.
     unused: keys without a use, by table. why: the remedy where one is given.
+    time: how well the time of a run is known before, for `--plan`.
     """
 
     name: str
@@ -67,6 +70,7 @@ class Kind:
     counted: str
     unused: Mapping[str, tuple[str, ...]]
     why: str
+    time: str
 
 
 def _other_axes(*axes: str) -> tuple[str, ...]:
@@ -92,6 +96,7 @@ WEAR = Kind(
     "cycle",
     {},
     "",
+    "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long",
 )
 MODES = Kind(
     "nonlinear modes",
@@ -109,6 +114,7 @@ MODES = Kind(
         "outputs": ("loops",),
     },
     "leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
+    "to a factor of three; a mode that is lost at a large amplitude takes longer",
 )
 MISSIONS = Kind(
     "missions",
@@ -126,6 +132,7 @@ MISSIONS = Kind(
         "outputs": ("loops",),
     },
     "leave it out: slow_time.missions counts in place of cycles, and missions choose their own steps",
+    "to a factor of three, if every block wears",
 )
 
 
@@ -165,14 +172,10 @@ class Study(Section):
         return MISSIONS if self.mission else MODES if self.axes.modal_amplitude is not None else WEAR
 
     @property
-    def variables(self) -> Mapping[str, Variable]:
-        """Variables that the points of such a study have, if they are asked for."""
-        return self.kind.asked
-
-    @property
-    def kept(self) -> Mapping[str, Variable]:
-        """Variables that the result of such a study always holds."""
-        return self.kind.kept
+    def recorded(self) -> Mapping[str, Variable]:
+        """Variables of its points, beside those that every result holds."""
+        asked = {name: entry for name, entry in self.kind.asked.items() if name in self.outputs.variables}
+        return asked | (LOOPS if self.outputs.loops else {}) | (COUNTS if self.to_the_end else {})
 
     @property
     def sizes(self) -> Mapping[str, int]:
@@ -183,7 +186,7 @@ class Study(Section):
     @property
     def scene_variables(self) -> tuple[str, ...]:
         """What `outputs.variables` asks of the scene, names of SCENE."""
-        return tuple(name for name in self.outputs.variables if name in SCENE and name not in self.variables)
+        return tuple(name for name in self.outputs.variables if name in SCENE and name not in self.kind.asked)
 
     @property
     def files(self) -> tuple[Path, ...]:

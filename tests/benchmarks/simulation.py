@@ -1,7 +1,7 @@
 """Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
 
 Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
-result makes possible is decided by `studyrunner.mpi.dispatch`, `cost_model` and `studyrunner.task_runs`.
+result makes possible is decided by `studyrunner.mpi.dispatch` and `studyrunner.task_runs`.
 """
 
 import heapq
@@ -13,8 +13,7 @@ import numpy as np
 
 from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
-from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
-from studyrunner.mpi.dispatch import Assignment, Dispatcher
+from studyrunner.mpi.dispatch import Assignment, CostKeys, CostModel, Dispatcher, Measurement
 from studyrunner.task_runs import TaskProgress
 
 

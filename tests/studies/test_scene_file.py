@@ -9,8 +9,7 @@ import pytest
 from solver.model import ContactInterface, LinearModel
 from studies.model_check import check_model
 from studies.scene_error import SceneError
-from studies.scene_file import read_scene, write_scene
-from studies.scene_layout import scene_datasets
+from studies.scene_file import read_scene, scene_datasets, write_scene
 from tests.studies.scene_models import changed, drop, plain, put, sector
 
 

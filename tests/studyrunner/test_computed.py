@@ -7,9 +7,8 @@ from solver.packing import Packed, pack
 from studies.scenes import sector
 from studyrunner.scene import computed as computed_module
 from studyrunner.scene import scene as scene_module
-from studyrunner.scene.answers import build_scene_variables
 from studyrunner.scene.computed import InMemory
-from studyrunner.scene.scene import _parts, build_study_scene, describe_scene
+from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, write_study_scene
 from studyrunner.study.study_file import read_study
 
 SCENES: dict[str, tuple[str, list[str]]] = {
@@ -55,18 +54,6 @@ def test_a_scene_is_built_once(case, monkeypatch):
     assert type(again.contact.surface) is type(built.contact.surface)
 
 
-@pytest.mark.slow
-def test_natural_frequencies_are_computed_once(monkeypatch):
-    study, kept = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['natural_frequency']"]), InMemory()
-    model = build_study_scene(study, computed=kept)
-    first = build_scene_variables(study, model, kept)
-    forbid(monkeypatch)
-    for one, other in zip(build_scene_variables(study, model, kept), first, strict=True):
-        assert one.name == other.name
-        np.testing.assert_array_equal(one.values, other.values)
-        assert one.values.dtype == other.values.dtype
-
-
 def key_of(study):
     return {computed_module.model_key(study)}
 
@@ -81,6 +68,17 @@ def test_a_changed_file_or_source_makes_another_scene(tmp_path, monkeypatch):
     assert key_of(read_study("blade_root")) == before
     monkeypatch.setattr(computed_module, "package_digest", lambda package: f"another {package}")
     assert key_of(read_study("blade_root")) != before
+
+
+def test_a_changed_scene_file_makes_another_scene(tmp_path):
+    study = tmp_path / "of_file.toml"
+    tables = '[study]\nname = "s"\n[scene]\nmodel = "scene.h5"\nfriction_coefficient = 0.5\n[axes]\nfrequency = 1\n'
+    study.write_text(f"{tables}contact_stiffness = [1e9, 1e10]\n")
+    keys = []
+    for mass in (1.0, 2.0):
+        write_study_scene(read_study("two_masses", {"scene.mass_1": mass}), tmp_path / "scene.h5")
+        keys += [computed_module.model_key(variant) for variant in read_study(study).variants]
+    assert len(set(keys)) == 4
 
 
 @pytest.mark.parametrize("wrong", [Packed("{", ()), pack(None), pack((1, 2)), pack(((0, 1), "model"))])

@@ -8,8 +8,7 @@ import xarray as xr
 from solver.outcome import Outcome
 from studyrunner.cli import main
 from studyrunner.kinds.wear import History, Sweep
-from studyrunner.mpi.cost_model import CostModel
-from studyrunner.mpi.dispatch import Dispatcher
+from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from tests.mpi.launching import results
 from tests.studyrunner.faked_runs import SMALL
 from tests.studyrunner.test_schedule import Job

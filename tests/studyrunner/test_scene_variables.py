@@ -13,7 +13,6 @@ from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.scene import computed
 from studyrunner.scene.answers import build_scene_variables, exact_answers
-from studyrunner.scene.computed import InMemory
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, fake_histories
@@ -33,9 +32,9 @@ def test_the_file_is_the_one_of_the_plain_twin(bytes_a_slab, tmp_path, monkeypat
     study = read_study("sdof_slider", GRID)
     of_scene = exact_answers(study)
     frequencies = read_study("two_masses", ["outputs.variables=['natural_frequency']"])
-    of_scene += build_scene_variables(frequencies, build_study_scene(frequencies), InMemory())
+    of_scene += build_scene_variables(frequencies, build_study_scene(frequencies))
     mesh = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['mesh']"])
-    of_scene += build_scene_variables(mesh, build_study_scene(mesh), InMemory())
+    of_scene += build_scene_variables(mesh, build_study_scene(mesh))
     plan = build_tasks(study, FACTS.n_displacements)
     results = [result for _, result in fake_histories(plan)]
     write_study(study, results, tmp_path / "out.nc", of_scene)

@@ -8,8 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from studyrunner.mpi import dispatch
-from studyrunner.mpi.cost_model import CostModel
-from studyrunner.mpi.dispatch import Dispatcher
+from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
 
