@@ -38,7 +38,6 @@ def all_scenes() -> str:
 
 
 def _head(model: str) -> list[str]:
-    """Title and description."""
     scene_parameters(model)  # imports the scene
     return [f"## `{model}`", "", inspect.getdoc(sys.modules[f"studies.scenes.{model}"]) or "", ""]
 

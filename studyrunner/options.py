@@ -37,8 +37,6 @@ is in the file OUT.nc.progress; with it a study that is changed computes only wh
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that reports mistakes as UserError."""
-
     def error(self, message: str) -> NoReturn:
         raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
 

@@ -53,7 +53,7 @@ def format_plan(
     contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
     nothing = "nothing" if study.solver.shortcuts else "nothing: solver.shortcuts = false"
     left_out = [f"{count(number, 'point')}: {reason}" for reason, number in plan.left_out.items()] or [nothing]
-    n_unknowns, is_automatic = max(task.n_unknowns for task in plan.results), AUTO in study.harmonics
+    n_unknowns, is_automatic = max(task.n_unknowns for task in plan.results), AUTO in study.solver.harmonics
     memory = memory_a_rank(n_unknowns, n_values, is_automatic, built_with) / 1e9
     automatic = f", with {AUTOMATIC_HARMONICS} for automatic harmonics" if is_automatic else ""
     # a history with the sweep that it waits for
@@ -87,7 +87,6 @@ def _followed(study: Study) -> str:
 
 
 def _slow_time(study: Study) -> Iterator[tuple[str, str]]:
-    """Cycles, or missions with their blocks."""
     n_kept = len(study.cycles_kept)
     if study.mission:
         yield "missions", f"{study.slow_time.missions}, of which {count(n_kept, 'number is', 'numbers are')} kept"
@@ -103,10 +102,10 @@ def _slow_time(study: Study) -> Iterator[tuple[str, str]]:
 def _solver(study: Study, facts: SceneFacts) -> str:
     """Settings of the solver, and the largest number of automatic harmonics in this scene."""
     shown = [
-        f"{key} {' or '.join('automatic' if value == AUTO else f'{value:g}' for value in getattr(study, key))}"
+        f"{key} {' or '.join('automatic' if value == AUTO else f'{value:g}' for value in getattr(study.solver, key))}"
         for key in SOLVER_AXES
     ]
-    if AUTO in study.harmonics and facts.largest_harmonics is not None:
+    if AUTO in study.solver.harmonics and facts.largest_harmonics is not None:
         shown[0] += f" (at most {facts.largest_harmonics}, for which the scene holds the nodal diameters)"
     return ", ".join(shown)
 
@@ -189,7 +188,6 @@ def _on_frequencies(study: Study, parts: Sequence[Study], stuck: float) -> Itera
 
 
 def _numbers(parts: Sequence[Study], name: str) -> list[float]:
-    """Numbers under a key of [scene]."""
     values = [dict(each.scene.parameters).get(name) for each in parts]
     values += [each for value in values if isinstance(value, dict) for each in value.values()]
     return [float(value) for value in values if isinstance(value, int | float)]

@@ -60,11 +60,7 @@ class ModelCache(OrderedDict[tuple[int, ...], Models]):
 
 
 class SceneModels:
-    """Rank 0: which rank has which models, and the files of models in use.
-
-    A rank holds the models of two tasks at most (`ModelCache`) and two tasks at most (`Dispatcher`). So a rank that
-    loses models here, by two later tasks with other models, has done the task that brought these.
-    """
+    """Rank 0: which rank has which models (`ModelCache`), and the files of models in use."""
 
     def __init__(self, read: Callable[[int], ReducedModel], seeing: Collection[int], beside: Path) -> None:
         """read: the model of a scene. seeing: ranks that see the files. beside: the file that they stand beside."""
@@ -86,7 +82,6 @@ class SceneModels:
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
     def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
-        """The model of a scene as a rank gets it."""
         if rank not in self._seeing:
             return self._read(number)
         if number not in self._files:

@@ -265,7 +265,6 @@ def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
 
 
 def _of_target(task: Mission, history: MissionHistory) -> str:
-    """What there is to say of the target."""
     if task.until is None or not history.outcome.complete:
         return ""
     if math.isnan(history.missions_to_target):

@@ -73,14 +73,12 @@ class StartResult:
     """Start state at one frequency of a sweep.
 
     moves: whether any pair slips or lifts; otherwise nothing wears. n_unknowns: of the state; 0 where there is none.
-    fault: of the machine, which ended the computation; then this is no result. Empty without a fault.
     """
 
     place: int
     start: Packed
     moves: bool
     n_unknowns: int
-    fault: str = ""
 
     def pack(self) -> Packed:
         """Everything except the place, for a file."""
@@ -111,11 +109,6 @@ class PointResult:
     def outcome(self) -> int:
         """Outcome of the computation, as a number of the result file."""
         return int(self.values["outcome"])
-
-    @property
-    def fault(self) -> str:
-        """As in `StartResult`."""
-        return str(self.values["message"]) if self.outcome == Outcome.NOT_COMPUTED else ""
 
 
 Result = StartResult | PointResult
@@ -259,7 +252,7 @@ def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:
 def grid(study: Study, *names: str) -> Iterator[dict[str, int]]:
     """Indices along these axes and those of `SOLVER_AXES`, in all combinations, the last one fastest."""
     sizes = {name: len(getattr(study.axes, name)) for name in names}
-    sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
+    sizes |= {name: len(getattr(study.solver, name)) for name in SOLVER_AXES}
     for places in itertools.product(*map(range, sizes.values())):
         yield dict(zip(sizes, places, strict=True))
 
@@ -267,7 +260,7 @@ def grid(study: Study, *names: str) -> Iterator[dict[str, int]]:
 def settings_at(study: Study, at: Mapping[str, int]) -> SolverSettings:
     """Settings of the solver. at: indices along the axes, those of `SOLVER_AXES` among them."""
     limit = math.inf if study.solver.time_limit is None else study.solver.time_limit
-    return SolverSettings(**{key: getattr(study, key)[at[key]] for key in SOLVER_AXES}, time_limit=limit)
+    return SolverSettings(**{key: getattr(study.solver, key)[at[key]] for key in SOLVER_AXES}, time_limit=limit)
 
 
 def described(settings: SolverSettings) -> list[tuple[str, object]]:

@@ -129,14 +129,13 @@ class Sweep(_FromRest):
             n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
             yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 
-    def failed(self, place: int, outcome: int, message: str) -> StartResult:
+    def failed(self, place: int, outcome: int, message: str) -> StartResult:  # noqa: ARG002
         """A start without a state."""
         from solver.results.history import StartState
 
         nan = math.nan
         broken = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
-        fault = message if outcome == Outcome.NOT_COMPUTED else ""
-        return StartResult(place, pack(broken), moves=False, n_unknowns=0, fault=fault)
+        return StartResult(place, pack(broken), moves=False, n_unknowns=0)
 
     def describe(self, place: int) -> str:
         """Where the sweep goes."""
@@ -247,7 +246,6 @@ class History(_FromRest):
                 yield replace(result, place=place, progress=progress)
 
     def _asked(self, integrated: Integrated) -> SlowTime:
-        """What the solver integrates."""
         from solver.wear.integrate import SlowTime
         from solver.wear.step import steps_of
 

@@ -104,7 +104,6 @@ class _Planner:
                 self._add_histories(sweep, position, same)
 
     def _add_histories(self, sweep: Sweep, position: int, starts: Sequence[_Start]) -> None:
-        """Tasks of all points that start from one state and wear by one law."""
         owners: dict[float, list[tuple[_Start, int]]] = {}
         for start in starts:
             for place, value in enumerate(start.part.study.axes.wear_coefficient):

@@ -31,9 +31,6 @@ Measurement = Sequence[tuple[Hashable, float, float]]
 """What is learnt from one task: keys of groups, each with the measured and the expected time, s. The expected time of a
 key contains the corrections of all other sequences of keys."""
 
-AHEAD_SECONDS = 0.2
-"""A rank gets a second task in advance behind a task that takes less than this time, s."""
-
 WATCH_SECONDS = 1.0
 """Shortest time between two looks at the running tasks, s. Without these looks 256 ranks are 0.81 busy for 0.98
 (`tests.benchmarks.scheduling usual`)."""
@@ -108,14 +105,14 @@ class Assignment:
 
 @dataclass
 class _Running:
-    """A task that a rank has: results still to come, and when it was begun, None where it waits behind another one.
+    """A task that a rank has: results still to come, and when the last one came or the task was given.
 
     measurement: what the cost model has learnt from a task that takes longer than expected.
     """
 
     task: Task
     n_left: int
-    began: float | None
+    began: float
     measurement: Measurement = ()
 
 
@@ -167,11 +164,8 @@ class Dispatcher:
         self._first = _Waiting(costs)
         self._others = _Waiting(costs)
         self._given: dict[int, _Running] = {}
-        self._of_rank: list[list[int]] = [[] for _ in range(n_ranks)]
-        # Ranks without a task, and those that may get one more: the last is the next to get one.
+        # ranks without a task: the last is the next to get one
         self._free = dict.fromkeys(reversed(range(n_ranks)))
-        self._ahead: dict[int, None] = {}
-        self._shunned: set[int] = set()
 
     @property
     def done(self) -> bool:
@@ -193,43 +187,24 @@ class Dispatcher:
         """Ranks that get a task now, and the tasks."""
         while self._free and self._n_waiting:
             rank, _ = self._free.popitem()
-            assignment = self._hand_out(rank)
-            self._see_ahead(rank)
-            yield rank, assignment
-        while self._ahead and self._n_waiting > self._n_ranks:
-            rank, _ = self._ahead.popitem()
-            yield rank, self._hand_out(rank)
+            is_first = self._first and (self.wants_more or not self._others)
+            number, task = (self._first if is_first else self._others).pop()
+            self._given[number] = _Running(task, task.n_results, self._clock())
+            yield rank, Assignment(number, task)
 
-    def deliver(self, rank: int, number: int, seconds: float, *, typical: bool = True) -> Task:
-        """Notes a result, which took so many seconds; returns its task.
-
-        typical: whether similar tasks may take as long; not where the task broke off.
-        """
+    def deliver(self, rank: int, number: int, seconds: float) -> Task:
+        """Notes a result, which took so many seconds; returns its task."""
         given = self._given[number]
         task = given.task
         self._costs.forget(given.measurement)
         given.measurement = ()
-        if typical:
-            self._costs.learn(task.cost_keys, task.cost_of(first=given.n_left == task.n_results), seconds)
+        self._costs.learn(task.cost_keys, task.cost_of(first=given.n_left == task.n_results), seconds)
         given.n_left -= 1
         given.began = self._clock()
         if given.n_left == 0:
             del self._given[number]
-            self._of_rank[rank].remove(number)
-            self._ahead.pop(rank, None)
-            if self._of_rank[rank]:
-                self._given[self._of_rank[rank][0]].began = self._clock()
-                self._see_ahead(rank)
-            elif rank not in self._shunned:
-                self._free[rank] = None
+            self._free[rank] = None
         return task
-
-    def shun(self, rank: int) -> None:
-        """Gives a faulty rank no more tasks, as long as there is another rank."""
-        if len(self._shunned) + 1 < self._n_ranks:
-            self._shunned.add(rank)
-            self._free.pop(rank, None)
-            self._ahead.pop(rank, None)
 
     def task(self, number: int) -> Task:
         """A running task."""
@@ -237,12 +212,12 @@ class Dispatcher:
 
     def running(self) -> list[tuple[Task, int, float]]:
         """Running tasks, longest first: the task, number of results to come, time since the last result, s."""
-        now, tasks = self._clock(), self._given.values()
-        busy = [(each.task, each.n_left, now - each.began) for each in tasks if each.began is not None]
+        now = self._clock()
+        busy = [(each.task, each.n_left, now - each.began) for each in self._given.values()]
         return sorted(busy, key=lambda entry: -entry[2])
 
     def watch(self) -> None:
-        """Called many times a second: now and then learns from tasks that take longer than expected.
+        """Called many times a second: now and then learns from tasks that take longer than expected, and orders anew.
 
         A history that takes a hundred times as long as most corrects the cost model long before its end, in time for
         the order of similar tasks.
@@ -253,10 +228,8 @@ class Dispatcher:
         self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
         for given in self._given.values():
             task = given.task
-            if given.began is None or task.gives_starts:
-                continue
             at_least = _AS_LONG_AGAIN * (now - given.began)
-            if at_least > task.cost * self._costs.correction(task.cost_keys):
+            if not task.gives_starts and at_least > task.cost * self._costs.correction(task.cost_keys):
                 self._costs.forget(given.measurement)
                 given.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
         self._others.reorder()
@@ -264,16 +237,3 @@ class Dispatcher:
     @property
     def _n_waiting(self) -> int:
         return len(self._first) + len(self._others)
-
-    def _hand_out(self, rank: int) -> Assignment:
-        number, task = (self._first if self._first and (self.wants_more or not self._others) else self._others).pop()
-        self._given[number] = _Running(task, task.n_results, None if self._of_rank[rank] else self._clock())
-        self._of_rank[rank].append(number)
-        return Assignment(number, task)
-
-    def _see_ahead(self, rank: int) -> None:
-        """Notes whether a rank with one task may get a second task."""
-        task = self._given[self._of_rank[rank][0]].task
-        short = task.n_results == 1 and task.cost * self._costs.correction(task.cost_keys) < AHEAD_SECONDS
-        if short and rank not in self._shunned:
-            self._ahead[rank] = None

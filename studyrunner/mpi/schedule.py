@@ -21,6 +21,7 @@ from typing import Any
 from studyrunner.mpi.dispatch import Assignment, CostModel, Dispatcher, Task
 from studyrunner.mpi.mapped_file import WhetherSeen
 from studyrunner.mpi.ranks import POLL_SECONDS, RankInterrupted, Ranks, wait_for_message
+from studyrunner.system.machine import MachineFaultError
 from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 
 SECONDS_TO_PROGRESS = 3.0
@@ -75,10 +76,6 @@ class Office:
         """The task as a rank gets it; called once for each task that is sent, in the order of sending."""
         return task
 
-    def is_sick(self, rank: int, result: Result) -> bool:  # noqa: ARG002
-        """Whether a result shows that its rank should get no more tasks."""
-        return False
-
     def keep(self, task: Task, progress: object) -> None:
         """Takes the progress of a task; never after the last result of the task."""
 
@@ -90,7 +87,7 @@ def serve_tasks(ranks: Ranks, office: Office, run: Run, costs: CostModel | None 
     """Rank 0: has all tasks done and computes some of them. costs: learns the run times of tasks.
 
     An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here, and
-    KeyboardInterrupt where another rank was interrupted.
+    MachineFaultError or KeyboardInterrupt where another rank has said so.
     """
     server = _Server(ranks, office, run, costs or CostModel())
     try:
@@ -194,8 +191,6 @@ class _LocalWorker:
 
 
 class _Server:
-    """Rank 0: sends tasks, receives results."""
-
     def __init__(self, ranks: Ranks, office: Office, run: Run, costs: CostModel) -> None:
         self._ranks = ranks
         self._office = office
@@ -238,11 +233,10 @@ class _Server:
         elif isinstance(message, RankInterrupted):
             begin_ending()
             raise KeyboardInterrupt
+        elif isinstance(message, MachineFaultError):
+            raise message
         elif isinstance(message, _Delivery):
-            sick = self._office.is_sick(rank, message.result)
-            if sick:
-                self.dispatcher.shun(rank)
-            task = self.dispatcher.deliver(rank, message.number, message.seconds, typical=not sick)
+            task = self.dispatcher.deliver(rank, message.number, message.seconds)
             self.dispatcher.add(self._office.take(task, message.result))
             self.hand_out()
         else:

@@ -44,7 +44,7 @@ def harmonics_to_build(study: Study) -> int:
     """Number of harmonics that a scene is built for, those that show the error of a given number included."""
     # two levels up: 1, 3, 5, 7, 9, 13, 19, 27...
     shown = 2 * max(study.given_harmonics, default=0) + 3
-    return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else shown
+    return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.solver.harmonics else shown
 
 
 def model_once(study: Study, computed: Computed, build: Callable[[], ReducedModel]) -> ReducedModel:

@@ -43,7 +43,6 @@ def contact_changes(
 
 
 def _of_parts(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> tuple[ContactChange, ...]:
-    """The same of a study, or of one block, by part."""
     changes: list[ContactChange] = []
     for variant, own, of_sample in drawn_pairs(study, scenes, facts):
         if variant.scene.worn is not None:

@@ -49,18 +49,11 @@ def test_a_report_that_nobody_hears_of(tmp_path):
     assert (tmp_path / "out-report" / "index.html").exists()
 
 
-@pytest.mark.parametrize(
-    ("before", "options", "said"),
-    [
-        ("", "-o /dev/stdout", "give the name of an ordinary file"),
-        ("ulimit -v 450000;", "", "ulimit -v = 461 MB: give each process at least 1000 MB"),
-    ],
-)
-def test_what_cannot_end_well_is_refused_at_the_beginning(before, options, said, tmp_path):
-    status, _, line = shell(f"{before} {sys.executable} -m studyrunner.cli two_masses {options}", tmp_path)
+def test_what_cannot_end_well_is_refused_at_the_beginning(tmp_path):
+    status, _, line = shell(f"{sys.executable} -m studyrunner.cli two_masses -o /dev/stdout", tmp_path)
     assert (status, line.count("\n")) == (2, 1)
     assert line.startswith("run-study: ")
-    assert said in line
+    assert "give the name of an ordinary file" in line
 
 
 def test_nothing_else_gets_the_number_of_a_stream(tmp_path):
