@@ -210,6 +210,8 @@ class ContactPair:
         return True
 
     def _phase_at(self, name: str, y: FloatArray) -> str:
+        if self.tangent is None:
+            return self._likely_phase(y)
         if name in SLIDING and not self.elastic:
             return "forward" if y[self._n + self._place] > 0 else "backward"
         return name
@@ -239,8 +241,16 @@ class ContactPair:
             closed = None
         if closed is not None:
             return closed
+        return self._settle(name, y, transient=2, attempts=15)
+
+    def orbit_from_rest(self, transient: int) -> Orbit:
+        """Periodic motion from rest, after at least so many periods. Raises NoPeriodicMotionError."""
+        y = self.system.extended(np.zeros(self._n), np.zeros(self._n))
+        return self._settle(self._likely_phase(y), y, transient, attempts=20)
+
+    def _settle(self, name: str, y: FloatArray, transient: int, attempts: int) -> Orbit:
         moving = [phase for phase in self._parts if phase != "stick"]
-        return solve_orbit(self.system, name, y, moving=moving, transient=2, attempts=15, fixed=self._fixed)
+        return solve_orbit(self.system, name, y, moving, transient, attempts, self._fixed)
 
     def _likely_phase(self, y: FloatArray) -> str:
         """Phase of a state that need not be exact."""

@@ -224,7 +224,6 @@ def solve_orbit(
     system: PiecewiseLinear,
     name: str,
     y: FloatArray,
-    *,
     moving: Sequence[str] = (),
     transient: int = 30,
     attempts: int = 20,

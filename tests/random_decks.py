@@ -11,9 +11,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import linprog
 
+from solver.continuation.first_state import solve_static_state
 from solver.harmonic_balance.state import State
 from solver.model import FloatArray, ReducedModel
-from solver.structure.joint import Joint
+from solver.newton.run import Run
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from solver.structure.joint import Joint, build_case
 from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
 from studies.finite_element.pairing import ContactSurfaces
@@ -25,6 +29,10 @@ from tests.studies.fe_models.solid_meshes import block, joined
 
 SALT = 1785  # year of Coulomb's "Théorie des machines simples": other seeds of the tests have nothing to do with these
 DIRECTIONS = 64  # of the polygons that stand for a friction disc
+OMEGA = 2.0 * np.pi * 1000.0  # rad/s; the penalty alone depends on it
+NAMED = (Outcome.STATIC_SLIDING, Outcome.STATIC_OPEN)
+EXPECTED = {"possible": (Outcome.CONVERGED,), "impossible": NAMED, "at the limit": (Outcome.CONVERGED, *NAMED)}
+"""Outcomes that are right where forces can balance the load, where they cannot, and in between."""
 
 
 @dataclass(frozen=True)
@@ -203,3 +211,16 @@ def law_errors(joint: Joint, point: State) -> dict[str, float]:
         "slip in another direction": float(np.abs(off_direction).max() / largest_force / length),
         "equilibrium": float(np.abs(out_of_balance).max() / largest_force),
     }
+
+
+def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
+    """Whether there is a static state (a key of `EXPECTED`), what the solver says, and the errors of the laws."""
+    settings = SolverSettings()
+    joint = build_case(deck.model, deck.friction, OMEGA, settings).joint(OMEGA, 0.0)
+    structure = joint.structure
+    possible = equilibrium_possible(structure.static_stiffness, structure.static_force, deck.friction)
+    exists = {True: "possible", False: "impossible", None: "at the limit"}[possible]
+    point = solve_static_state(joint, np.zeros(joint.contact.n_contact), Run(settings.tolerance))
+    if isinstance(point, Outcome):
+        return exists, point, {}
+    return exists, Outcome.CONVERGED, law_errors(joint, point)

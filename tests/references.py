@@ -11,15 +11,8 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from tests.event_driven import (
-    FloatArray,
-    NoPeriodicMotionError,
-    Orbit,
-    Phase,
-    PiecewiseLinear,
-    close_orbit,
-    solve_orbit,
-)
+from tests.contact_pair import ContactPair
+from tests.event_driven import FloatArray, NoPeriodicMotionError, Orbit, PiecewiseLinear, close_orbit, solve_orbit
 
 
 class StopsOccurError(ValueError):
@@ -82,58 +75,9 @@ def coulomb_orbit(
 
     Raises NoPeriodicMotionError.
     """
-    mass, damping, stiffness = (np.array(matrix, dtype=np.float64) for matrix in (mass, damping, stiffness))
-    load = np.array(load, dtype=np.complex128)
-    n, j = len(load), friction_dof
-    force_rows = np.hstack(
-        [-stiffness, -damping, load.real[:, np.newaxis], -load.imag[:, np.newaxis], np.zeros((n, 1))]
-    )
-
-    def phase_flow(acceleration: FloatArray, velocity: FloatArray) -> FloatArray:
-        flow = np.zeros((2 * n + 3, 2 * n + 3))
-        flow[:n], flow[n : 2 * n] = velocity, acceleration
-        flow[2 * n, 2 * n + 1], flow[2 * n + 1, 2 * n] = -omega, omega
-        return flow
-
-    velocity = np.hstack([np.zeros((n, n)), np.eye(n), np.zeros((n, 3))])
-    phases = {}
-    for name, sign in (("forward", 1.0), ("backward", -1.0)):
-        pushed = force_rows.copy()
-        pushed[j, -1] -= sign * friction_force
-        phases[name] = Phase(phase_flow(np.linalg.solve(mass, pushed), velocity), sign * velocity[[j]])
-
-    others = [index for index in range(n) if index != j]
-    acceleration = np.zeros_like(force_rows)
-    acceleration[others] = np.linalg.solve(mass[np.ix_(others, others)], force_rows[others])
-    still = velocity.copy()
-    still[j] = 0
-    held = force_rows[j] - mass[j] @ acceleration  # what the contact takes up while it sticks
-    limit = np.zeros(2 * n + 3)
-    limit[-1] = friction_force
-    phases["stick"] = Phase(phase_flow(acceleration, still), np.array([limit - held, limit + held]))
-
-    def next_phase(name: str, y: FloatArray) -> tuple[str, FloatArray]:
-        y = y.copy()
-        y[n + j] = 0.0
-        taken_up = held @ y
-        if name != "stick" and abs(taken_up) < friction_force:
-            return "stick", y
-        return ("forward" if taken_up > 0 else "backward"), y
-
-    def phase_at(name: str, y: FloatArray) -> str:
-        if name == "stick":
-            return name
-        return "forward" if y[n + j] > 0 else "backward"
-
-    system = PiecewiseLinear(n, omega, phases, next_phase, phase_at)
-    start = system.extended(np.zeros(n), np.zeros(n))
-    return solve_orbit(
-        system,
-        *next_phase("forward", start),
-        moving=("forward", "backward"),
-        transient=transient,
-        fixed=lambda name: [n + j] if name == "stick" else [],
-    )
+    load = np.asarray(load, complex)
+    given = mass, damping, stiffness, np.zeros(load.size), load
+    return ContactPair(*given, None, friction_dof, friction_force, 0.0, 1.0, omega).orbit_from_rest(transient)
 
 
 def slider_orbit(
@@ -222,8 +166,11 @@ def vibro_impact_orbit(
     if sweep_start is None:
         sweep_start = min(0.5 * natural, omega) if sweep == "up" else max(4.0 * natural, omega)
 
+    spring = np.array([[wall_stiffness, -wall_stiffness], [-wall_stiffness, wall_stiffness + stiffness]])
+    parts = np.diag([0.0, mass]), np.diag([0.0, damping]), spring, np.zeros(2), np.array([0.0, force])
+
     def system_at(frequency: float) -> PiecewiseLinear:
-        return _bilinear(mass, damping, stiffness, force, wall_stiffness, gap, frequency)
+        return ContactPair(*parts, 0, None, 0.0, gap, 0.0, frequency).system
 
     start = system_at(sweep_start)
     at_rest = np.array([min(wall_stiffness * gap / (stiffness + wall_stiffness), 0.0), 0.0])
@@ -264,25 +211,3 @@ def _land(system: PiecewiseLinear, state: FloatArray) -> Orbit | None:
 
 def _state(orbit: Orbit | None, otherwise: FloatArray) -> FloatArray:
     return otherwise if orbit is None else orbit.sample(1)[:, 0]
-
-
-def _bilinear(
-    mass: float, damping: float, stiffness: float, force: float, wall_stiffness: float, gap: float, omega: float
-) -> PiecewiseLinear:
-    def phase(wall: float, side: float) -> Phase:
-        flow = np.zeros((5, 5))
-        flow[0, 1] = 1
-        flow[1] = np.array([-(stiffness + wall), -damping, force, 0, wall * gap]) / mass
-        flow[2, 3], flow[3, 2] = -omega, omega
-        return Phase(flow, side * np.array([[1.0, 0, 0, 0, -gap]]))
-
-    def next_phase(name: str, y: FloatArray) -> tuple[str, FloatArray]:
-        y = y.copy()
-        y[0] = gap
-        return ("closed" if name == "open" else "open"), y
-
-    def phase_at(_: str, y: FloatArray) -> str:
-        return "closed" if y[0] > gap else "open"
-
-    phases = {"open": phase(0.0, -1.0), "closed": phase(wall_stiffness, 1.0)}
-    return PiecewiseLinear(1, omega, phases, next_phase, phase_at)

@@ -142,10 +142,6 @@ def test_overrides_are_values_or_texts():
     assert isinstance(study, Study)
     assert study == read_study("sdof_slider", AS_TEXTS)
     assert study.axes.frequency == tuple(FREQUENCIES)
-    with pytest.raises(UserError, match=r"^sdof_slider: slow_time.cycle = 3: unknown key, give cycles$"):
-        read_study("sdof_slider", {"slow_time.cycle": 3})
-    with pytest.raises(UserError, match=r"^overrides: study.name.x = 3: name holds a value and no keys: give all"):
-        read_study("sdof_slider", {"study.name.x": 3})
 
 
 @pytest.mark.slow
@@ -167,43 +163,38 @@ def test_a_run_that_is_interrupted_goes_on(tmp_path, monkeypatch):
     assert solver.n_results == 1
 
 
-def test_several_processes_do_not_compute_the_same(tmp_path, monkeypatch):
-    monkeypatch.setenv("PMI_SIZE", "2")
-    with pytest.raises(
-        UserError, match=r"^run_study: processes = 2: call it in one process, or give `mpiexec run-study`"
-    ):
-        run_study("sdof_slider", tmp_path / "out.nc")
+SLIDER = "sdof_slider"
+MISTAKES = (
+    (lambda: read_study(SLIDER, {"slow_time.cycle": 3}), "sdof_slider: slow_time.cycle = 3: unknown key, give cycles"),
+    (lambda: read_study(SLIDER, {"study.name.x": 3}), "overrides: study.name.x = 3: name holds a value and no keys"),
+    (
+        lambda: run_study(SLIDER, Path("none/out.nc"), progress=False),
+        'run_study: output = "none/out.nc": give a file in',
+    ),
+    (lambda: run_study(read_study(SLIDER), overrides=SMALL), "run_study: overrides: give them to read_study"),
+    (lambda: run_study("nothing"), "nothing: the study: there is none of this name"),
+    (lambda: build_scene("nothing"), 'model: no bundled scene is called "nothing"; give one of'),
+    (lambda: build_scene(SLIDER, friction_coefficient=0.3), "friction_coefficient: 0.3; give it to the solver"),
+    (lambda: build_scene(SLIDER, mas=1.0), "mas: unknown parameter; give one of contact_stiffness, mass"),
+    (lambda: build_scene(SLIDER, mass=-1.0), "mass: -1.0; give a number above 0"),
+    (lambda: build_scene(SLIDER, mass="1"), "mass: 1; give a number"),
+    (lambda: read_scene(Path(__file__)), "model: test_public_api.py"),
+)
+
+
+@pytest.mark.parametrize(("call", "message"), MISTAKES)
+def test_what_is_wrong_with_a_run_or_a_scene_is_said_in_one_line(call, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises((UserError, SceneError), match=f"^{re.escape(message)}"):
+        call()
     assert not list(tmp_path.iterdir())
 
 
-def test_what_is_wrong_with_a_run_is_said_in_one_line(tmp_path):
-    with pytest.raises(UserError, match=r"^run_study: output = .*: give a file in a folder that exists"):
-        run_study("sdof_slider", tmp_path / "none" / "out.nc", progress=False)
-    with pytest.raises(UserError, match=r"^run_study: overrides: give them to read_study"):
-        run_study(read_study("sdof_slider"), overrides=SMALL)
-    with pytest.raises(UserError, match=r"^nothing: the study: there is none of this name"):
-        run_study("nothing")
-
-
-# --- scenes ---
-
-
-def test_what_is_wrong_with_a_scene_is_said_in_one_line(tmp_path):
-    for name, parameters, message in (
-        ("nothing", {}, 'model: no bundled scene is called "nothing"; give one of'),
-        ("sdof_slider", {"friction_coefficient": 0.3}, "friction_coefficient: 0.3; give it to the solver"),
-        ("sdof_slider", {"mas": 1.0}, "mas: unknown parameter; give one of contact_stiffness, mass"),
-        ("sdof_slider", {"mass": -1.0}, "mass: -1.0; give a number above 0"),
-        ("sdof_slider", {"mass": "1"}, "mass: 1; give a number"),
-    ):
-        with pytest.raises(SceneError, match=f"^{re.escape(message)}"):
-            build_scene(name, **parameters)
-    path = tmp_path / "no.h5"
-    with pytest.raises(FileNotFoundError):
-        read_scene(path)
-    path.write_text("no scene", encoding="utf-8")
-    with pytest.raises(SceneError, match=r"no\.h5"):
-        read_scene(path)
+def test_several_processes_do_not_compute_the_same(tmp_path, monkeypatch):
+    monkeypatch.setenv("PMI_SIZE", "2")
+    with pytest.raises(UserError, match=r"^run_study: processes = 2: call it in one process, or give"):
+        run_study(SLIDER, tmp_path / "out.nc")
+    assert not list(tmp_path.iterdir())
 
 
 # --- one joint ---
@@ -329,7 +320,6 @@ def test_a_point_that_fails_is_one_point():
     [
         ({"mass": [[1.0, 0.0]]}, "mass: give shape (2, 2) instead of (1, 2)"),
         ({"mass": [[1.0], [0.0, 1.0]]}, "mass: give rows of equal length"),
-        ({"mass": "heavy"}, "mass: give numbers"),
         ({"stiffness": [[2.0, -1.0], [0.0, 2.0]]}, "stiffness: give a symmetric matrix"),
         ({"stiffness": [[2.0, 1.0j], [-1.0j, 2.0]]}, "stiffness: give real numbers"),
         ({"damping": [[np.nan, 0.0], [0.0, 1.0]]}, "damping: give finite numbers"),
@@ -345,14 +335,8 @@ def test_a_point_that_fails_is_one_point():
     ],
 )
 def test_what_is_wrong_with_matrices_is_said_in_one_line(change, message):
-    right = {
-        "mass": np.eye(2),
-        "damping": None,
-        "stiffness": [[2.0, -1.0], [-1.0, 2.0]],
-        "contact_dofs": [[0, 1, -1]],
-        "area": 1.0,
-        "load_harmonic": [0.0, 1.0],
-    }
+    right = {"mass": np.eye(2), "damping": None, "stiffness": [[2.0, -1.0], [-1.0, 2.0]]}
+    right |= {"contact_dofs": [[0, 1, -1]], "area": 1.0, "load_harmonic": [0.0, 1.0]}
     build_model(**right)
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
         build_model(**(right | change))

@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.references import (
-    NoPeriodicMotionError,
     StopsOccurError,
     coulomb_orbit,
     den_hartog_amplitude,
@@ -124,10 +123,3 @@ def test_wear_with_den_hartog_has_its_closed_solution():
     )
     grown = np.arctanh(np.sqrt(1 - (10 * b) ** 2)) + 1.1e-11 / 1e-4 * 1e5 * 4 * full * cycles
     assert depth == pytest.approx((10 - np.sqrt(1 - np.tanh(grown) ** 2) / abs(b)) / 1e5, rel=1e-9, abs=1e-18)
-
-
-@pytest.mark.slow
-def test_no_periodic_motion_is_said():
-    # At resonance without damping, friction below pi/4 of the force cannot bound the motion.
-    with pytest.raises(NoPeriodicMotionError):
-        slider_orbit(1.0, 0.0, 1.0, 1.0, 0.3, 1.0)

@@ -29,7 +29,8 @@ from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure, State
 from solver.model import BoolArray, ComplexArray, FloatArray, LinearModel
-from solver.newton.linear_solver import MOST_PRODUCTS, SMALL_JOINT, ritz_values
+from solver.newton.krylov import ritz_values
+from solver.newton.linear_solver import MOST_PRODUCTS, SMALL_JOINT
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF, Resolution, all_orders, samples_for

@@ -15,7 +15,7 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.wear_law import WearingWork
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
-from solver.newton.linear_solver import SIGN_PRODUCTS, ritz_values
+from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
 from solver.newton.run import Run
 from solver.outcome import in_digits
 from solver.structure.joint import Joint

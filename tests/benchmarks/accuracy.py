@@ -8,13 +8,12 @@ minutes, response and peak of the cantilever with rigid friction at its tip, and
 error above the tolerance or above twice its estimate.
 """
 
+from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from tests.benchmarks.frame import Table, arguments
 from tests.cantilever import FRICTION, Cantilever
-from tests.event_driven import NoPeriodicMotionError
-from tests.solver.exact import errors_of, states
+from tests.solver.exact_scenes import SPRINGS, exact_tip, find, reported_tip, textbook_scenes
 from tests.solver.models import branch_states
-from tests.solver.test_rigid import SPRINGS, exact, reported
 
 CANTILEVERS = [  # spring, force, N, frequency, rad/s
     *((name, *at) for name in ("rigid", "stiff spring") for at in ((3.0, 0.7), (3.0, 0.96), (6.0, 0.85))),
@@ -26,16 +25,11 @@ def exact_states(rtol: float) -> None:
     """The textbook scenes."""
     columns = ("amplitude", "response", "estimate", "wear rate", "estimate", "harmonics", "samples", "iterations")
     table = Table(f"rtol {rtol:g}", *columns, "good")
-    for name, state in states().items():
-        try:
-            errors = errors_of(state(), SolverSettings(rtol=rtol))
-        except NoPeriodicMotionError:
-            print(f"{name} has no periodic motion")
-            continue
-        good = errors.accurate and errors.safe and max(errors.response, errors.wear) <= rtol
-        numbers = (errors.amplitude, errors.response, errors.estimate.response, errors.wear, errors.estimate.wear_rate)
-        effort = (errors.orders[-1], errors.samples, errors.iterations)
-        table.row(name, *map(float, numbers), *effort, "yes" if good else "no")
+    for name, (scene, sweep) in textbook_scenes().items():
+        found = find(scene, SolverSettings(rtol=rtol), sweep)
+        good = found.outcome is Outcome.CONVERGED and found.safe and max(found.response, found.wear_rate) <= rtol
+        numbers = (found.amplitude, found.response, found.response_estimate, found.wear_rate, found.wear_rate_estimate)
+        table.row(name, *numbers, found.highest, found.samples, found.iterations, "yes" if good else "no")
 
 
 def cantilevers(rtol: float) -> None:
@@ -44,7 +38,7 @@ def cantilevers(rtol: float) -> None:
     for name, force, omega in CANTILEVERS:
         model, settings = Cantilever(spring=SPRINGS[name]).model(), SolverSettings(rtol=rtol)
         (start,) = branch_states(model, FRICTION, force, [omega], settings)
-        found = zip(reported(model, FRICTION, start, settings), exact(name, force, omega), strict=True)
+        found = zip(reported_tip(model, start, settings), exact_tip(name, force, omega), strict=True)
         errors = [float(abs(own / true - 1.0)) for own, true in found]
         good = 0.5 * max(errors) < start.response_error <= rtol and max(errors) < rtol
         table.row(name, force, omega, *errors, start.response_error, "yes" if good else "no")

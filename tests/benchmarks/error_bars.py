@@ -7,17 +7,16 @@
 The truth of a dovetail is the adaptive scheme with a tolerance ten times smaller and harmonics given, from the start
 state of a sweep in steps five times as fine; that of a random joint the same with 13 harmonics for its five. Wanted: at
 least half the true error everywhere, in the median not more than ten times it. Where both are below `FLOOR` of the
-volume nothing is compared: the truth is not known better. The responses are compared on the way, too, and at the end
-the depths of all pairs that have a tenth of the deepest. Frequencies of a travelling wave (`--diameter`) are offsets
-from the resonance of the glued structure, Hz. `--stuck-modes` reduces the structure in another way. `--fixed` takes
-fixed harmonics instead of automatic ones, and the adaptive scheme alone.
+volume nothing is compared: the truth is not known better. Columns: relative errors of the worn volume at the end, and
+their ratio; the smallest ratio of volumes and of responses on the way; that of the depths of all pairs that have a
+tenth of the deepest; how many of these depths are outside of their errors. Frequencies of a travelling wave
+(`--diameter`) are offsets from the resonance of the glued structure, Hz.
 
 At 212.5 Hz the truth is one of three. Two pairs of mesh 2 come to rest at 15 000 cycles, or go on by a hair: 0.082 mm3,
 0.094 where one goes on, 0.106 where both do, by harmonics and steps of the sweep. The same holds for 0.155 and 0.163
 mm3 at 212.25 Hz.
 """
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -43,30 +42,14 @@ KINDS = (("3d", "3d"), ("3d", "one_tangent"), ("one_tangent", "one_tangent", "3d
 COLUMNS = ("estimated", "true", "ratio", "on the way", "responses", "depths", "outside", "of", "CPU s")
 
 
-@dataclass(frozen=True)
-class Compared:
-    """Errors of one history; the fields are the columns of the table.
-
-    estimated, true: relative error of the worn volume at the end. on_the_way, responses, depths: smallest ratio of
-    estimated and true error of worn volume and responses on the way, and of the depths of the deep pairs at the end.
-    outside, pairs: number of these pairs whose true error is beyond its estimate, of how many.
-    """
-
-    estimated: float
-    true: float
-    ratio: float
-    on_the_way: float
-    responses: float
-    depths: float
-    outside: int
-    pairs: int
-    seconds: float
+def smallest_ratio(estimated: FloatArray, true: FloatArray, seen: np.ndarray) -> float:
+    """Smallest ratio of estimated and true errors where they are seen, inf where none are; all (n,)."""
+    return float((estimated[seen] / true[seen]).min(initial=np.inf))
 
 
-def compare(history: WearHistory, truth: WearHistory, seconds: float) -> Compared:
-    """Errors of a history against the true one at the same counts."""
+def compare(history: WearHistory, truth: WearHistory) -> list[float]:
+    """The columns of the table, without the time, of a history against the true one at the same counts."""
     true = np.abs(history.worn_volume - truth.worn_volume)
-    estimated = history.worn_volume_error * history.worn_volume
     # only where something has worn and the truth is known
     worn = (truth.worn_volume > 1e-3 * np.nanmax(truth.worn_volume)) & np.isfinite(true)
     moved = np.linalg.norm(history.response - truth.response, axis=1) / np.linalg.norm(truth.response, axis=1)
@@ -75,82 +58,64 @@ def compare(history: WearHistory, truth: WearHistory, seconds: float) -> Compare
     off, off_estimated = np.abs(history.wear_depth[-1] - depth)[deep], history.wear_depth_error[-1][deep]
     off = np.where(off > FLOOR * depth[deep], off, 0.0)
     last = float(true[-1] / volume) if volume > 0.0 else 0.0
-    return Compared(
-        history.error_estimate,
-        last,
-        history.error_estimate / last if last > 0.0 else float("nan"),
-        smallest_ratio(estimated, true, worn & (true > FLOOR * truth.worn_volume)),
+    volumes = history.worn_volume_error * history.worn_volume, true, worn & (true > FLOOR * truth.worn_volume)
+    return [
+        *(history.error_estimate, last, history.error_estimate / last if last > 0.0 else float("nan")),
+        smallest_ratio(*volumes),
         smallest_ratio(history.response_error, moved, worn & (moved > FLOOR)),
         smallest_ratio(off_estimated, off, off > 0.0),
-        int((off > off_estimated).sum()),
-        int(deep.sum()),
-        seconds,
-    )
-
-
-def smallest_ratio(estimated: FloatArray, true: FloatArray, seen: np.ndarray) -> float:
-    """Smallest ratio of estimated and true errors where they are seen, inf where none are; all (n,)."""
-    return float((estimated[seen] / true[seen]).min(initial=np.inf))
-
-
-def dovetail_starts(model: ReducedModel, frequencies: FloatArray, settings: SolverSettings) -> list[StartState]:
-    """Start states of a sweep whose steps follow rtol."""
-    return branch_states(model, 0.5, 0.5, list(2.0 * np.pi * frequencies), settings)
-
-
-def fine_starts(model: ReducedModel, frequencies: FloatArray, settings: SolverSettings) -> list[StartState]:
-    """The same with steps of the sweep in which the vibration changes by 3 %."""
-    before, path.CHANGE_LIMITS = path.CHANGE_LIMITS, (0.03, 0.03)
-    try:
-        return dovetail_starts(model, frequencies, settings)
-    finally:
-        path.CHANGE_LIMITS = before
+        *(int((off > off_estimated).sum()), int(deep.sum())),
+    ]
 
 
 class Comparison:
     """Histories compared with their truth, in a table, and the worst of all."""
 
     def __init__(self, title: str) -> None:
-        self.title, self.table, self.compared = title, Table(title, *COLUMNS), list[Compared]()
+        self.table = Table(title, *COLUMNS)
 
     def add(
         self, name: str, truth: WearHistory, model: ReducedModel, friction: float, start: StartState, *asked: object
     ) -> None:
         """A row for a history from a start state; asked: the arguments of `march_wear` from the step on."""
         found = measure(lambda: march_wear(model, friction, start, WEAR, *asked))
-        self.compared.append(compare(found.result, truth, found.seconds))
-        self.table.row(f"{name} {found.result.outcome.meaning}", *vars(self.compared[-1]).values())
+        row = *compare(found.result, truth), found.seconds
+        self.table.row(f"{name} {found.result.outcome.meaning}", *row)
 
     def summarise(self) -> None:
-        """Median and worst ratios, and how many are too small."""
-        known = [one for one in self.compared if np.isfinite(one.on_the_way)]
-        ratios = [one.ratio for one in known if one.true > FLOOR]
+        """Median and worst ratios, and how many are too small, of the histories whose truth is known."""
+        known = [row[1:] for row in self.table.rows[1:] if np.isfinite(float(row[4]))]
         if known:
-            low = {name: sum(getattr(one, name) < 0.5 for one in known) for name in ("on_the_way", "responses")}
-            least = {name: min(getattr(one, name) for one in known) for name in ("on_the_way", "responses", "depths")}
-            print(
-                f"{self.title}: {len(known)} histories, ratio at the end in the median {np.median(ratios):.2f}, at"
-                f" least {min(ratios):.2f}; smallest {least}, below 0.5 {low};"
-                f" {sum(one.outside for one in known)} of {sum(one.pairs for one in known)} depths outside"
-            )
+            _, true, ratio, *least, outside, pairs, _ = np.array(known, dtype=float).T
+            at_end = ratio[true > FLOOR]
+            print(f"{len(known)} histories, at the end: median {np.median(at_end):.2f}, least {at_end.min():.2f}")
+            for name, column in zip(COLUMNS[3:6], least, strict=True):
+                print(f"{name}: least {column.min():.2f}, {(column < 0.5).sum()} below 0.5")
+            print(f"{outside.sum():.0f} of {pairs.sum():.0f} depths outside")
 
 
-def dovetail(title: str, model: ReducedModel, steps: list[float], frequencies: FloatArray, fixed: list[int]) -> None:
-    """All schemes and steps at some frequencies, Hz; fixed: harmonics, adaptive scheme alone."""
-    cycles, comparison = np.linspace(0.0, 1e5, 101), Comparison(title)
+def fine_starts(model: ReducedModel, omegas: list[float], settings: SolverSettings) -> list[StartState]:
+    """Start states of a sweep whose steps change the vibration by 3 %."""
+    before, path.CHANGE_LIMITS = path.CHANGE_LIMITS, (0.03, 0.03)
+    try:
+        return branch_states(model, 0.5, 0.5, omegas, settings)
+    finally:
+        path.CHANGE_LIMITS = before
+
+
+def dovetail(title: str, model: ReducedModel, steps: list[float], frequencies: FloatArray) -> None:
+    """All schemes and steps at some frequencies, Hz."""
+    cycles, comparison, omegas = np.linspace(0.0, 1e5, 101), Comparison(title), list(2.0 * np.pi * frequencies)
     runs: list[tuple[Scheme, float]] = [("adaptive", 1e-2)]
-    if not fixed:
-        runs += [(scheme, step) for scheme in ("implicit", "explicit") for step in steps]
-    exact = SolverSettings(harmonics=9, samples=128, rtol=1e-3)
-    fine = fine_starts(model, frequencies, exact)
-    truths = [march_wear(model, 0.5, start, WEAR, 1000.0, "adaptive", cycles, exact) for start in fine]
-    for settings in [SolverSettings(harmonics=harmonics) for harmonics in fixed] or [SolverSettings()]:
-        for frequency, truth, start in zip(
-            frequencies, truths, dovetail_starts(model, frequencies, settings), strict=True
-        ):
-            for scheme, step in runs:
-                name = f"H {settings.harmonics}, {frequency:.7g} Hz, {scheme} {step:g}"
-                comparison.add(name, truth, model, 0.5, start, step, scheme, cycles, settings)
+    runs += [(scheme, step) for scheme in ("implicit", "explicit") for step in steps]
+    exact, settings = SolverSettings(harmonics=9, samples=128, rtol=1e-3), SolverSettings()
+    starts = branch_states(model, 0.5, 0.5, omegas, settings)
+    for frequency, fine, start in zip(frequencies, fine_starts(model, omegas, exact), starts, strict=True):
+        truth = march_wear(model, 0.5, fine, WEAR, 1000.0, "adaptive", cycles, exact)
+        for scheme, step in runs:
+            comparison.add(
+                f"{frequency:.7g} Hz, {scheme} {step:g}", truth, model, 0.5, start, step, scheme, cycles, settings
+            )
     comparison.summarise()
 
 
@@ -159,8 +124,7 @@ def random_joints(n: int) -> None:
     comparison = Comparison("random joints")
     settings, exact = SolverSettings(harmonics=5, samples=64), SolverSettings(harmonics=13, samples=256, rtol=3e-4)
     for seed in range(n):
-        random = np.random.default_rng(seed)
-        model = random_model(seed, KINDS[seed % len(KINDS)])
+        random, model = np.random.default_rng(seed), random_model(seed, KINDS[seed % len(KINDS)])
         amplitude = float(random.uniform(40.0, 150.0))
         (start,), (fine,) = (branch_states(model, 0.4, amplitude, [600.0], given) for given in (settings, exact))
         if start.state is None or fine.state is None:
@@ -179,14 +143,12 @@ def random_joints(n: int) -> None:
 
 def main() -> None:
     """Everything that is asked for."""
-    given = arguments(__doc__, mesh=[1], diameter=[0], stuck_modes=20, random=0, step=STEPS, fixed=[0], frequency=[0.0])
+    given = arguments(__doc__, mesh=[1], diameter=[0], stuck_modes=20, random=0, step=STEPS, frequency=[0.0])
     for mesh, diameter in product(given.mesh, given.diameter):
         model = scene("dovetail_sector", HARMONICS, mesh=mesh, nodal_diameter=diameter, stuck_modes=given.stuck_modes)
         frequencies = np.array(given.frequency if any(given.frequency) else OFFSETS if diameter else FREQUENCIES[mesh])
-        if diameter:
-            frequencies += glued_frequency(model)
-        fixed = [harmonics for harmonics in given.fixed if harmonics]
-        dovetail(f"mesh {mesh}, d {diameter}", model, given.step, frequencies, fixed)
+        first = glued_frequency(model) if diameter else 0.0
+        dovetail(f"mesh {mesh}, d {diameter}", model, given.step, first + frequencies)
     if given.random:
         random_joints(given.random)
 

@@ -81,11 +81,11 @@ class Table:
         if picture is None:
             return
         figure, axes = plt.subplots(figsize=(6.0, 4.2))
-        at = [self.columns.index(name) for name in (x, y)]
-        names = [str(row[0]).split(",")[0] for row in self.rows[1:]]
-        for name, marker in zip(dict.fromkeys(names), itertools.cycle("os^Dvx"), strict=False):
-            own = [row for row, its in zip(self.rows[1:], names, strict=True) if its == name]
-            axes.plot(*([row[place] for row in own] for place in at), marker=marker, label=name)
+        lines: dict[str, list[list[Any]]] = {}
+        for row in self.rows[1:]:
+            lines.setdefault(str(row[0]).split(",")[0], []).append([row[self.columns.index(name)] for name in (x, y)])
+        for (name, points), marker in zip(lines.items(), itertools.cycle("os^Dvx"), strict=False):
+            axes.plot(*zip(*points, strict=True), marker=marker, label=name)
         axes.set(xlabel=x, ylabel=y, title=self.columns[0], xscale=scale, yscale=scale)
         axes.legend()
         figure.savefig(picture, dpi=110, bbox_inches="tight")

@@ -12,6 +12,7 @@ import numpy as np
 
 from solver import backbone
 from studies import build_scene
+from tests.benchmarks.frame import Table
 from tests.benchmarks.time_integration import advance, at_rest, build, push_mode
 
 AMPLITUDES = (5e-4, 6e-4, 8e-4, 1e-3)  # m sqrt(kg)
@@ -48,26 +49,25 @@ def decay_of(signal, step):
 
 
 def main():
-    """Print the table."""
+    """Prints the table."""
     model = build_scene("dovetail_sector", mesh=1)
     structure = build(model, 0.5, 212.7, 0.0, STEPS)
-    rest = at_rest(model, structure, model.contact.gap)
-    begun = push_mode(structure, rest, LET_GO + 0j)
+    begun = push_mode(structure, at_rest(model, structure, model.contact.gap), LET_GO + 0j)
     row = np.real(model.linear[0].response)[0]
     signal = free_decay(structure, begun, model.contact.gap, PERIODS) @ row
     height, frequency, damping = decay_of(signal, structure.step)
     modes = {way: backbone(model, AMPLITUDES, 0.5, sweep=way) for way in ("down", "up")}
+    table = Table("m sqrt(kg), tip, mm, of", "Hz", "error", "damping, %", "error")
     for place, amplitude in enumerate(AMPLITUDES):
         tip = abs(modes["down"].response[place, 0])
         nearest = int(np.argmin(abs(height - tip)))
         window = slice(nearest - HALF_WINDOW, nearest + HALF_WINDOW + 1)
-        said = f"decay {frequency[window].mean():.4f} Hz, {100 * damping[window].mean():.4f} %"
+        name = f"{amplitude:.0e}, {1e3 * tip:.3f}"
+        table.row(f"{name}, decay", float(frequency[window].mean()), None, 100.0 * float(damping[window].mean()), None)
         for way, mode in modes.items():
-            said += (
-                f"; {way} {mode.frequency[place]:.4f} +- {mode.frequency_error[place]:.4f} Hz,"
-                f" {100 * mode.damping_ratio[place]:.4f} +- {100 * mode.damping_error[place]:.4f} %"
-            )
-        print(f"{amplitude:.0e} m sqrt(kg), tip {1e3 * tip:.3f} mm: {said}", flush=True)
+            damped = 100.0 * mode.damping_ratio[place], 100.0 * mode.damping_error[place]
+            numbers = mode.frequency[place], mode.frequency_error[place], *damped
+            table.row(f"{name}, mode {way}", *map(float, numbers))
 
 
 if __name__ == "__main__":

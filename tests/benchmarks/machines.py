@@ -17,16 +17,16 @@ from dataclasses import replace
 import numpy as np
 
 from solver.settings import SolverSettings
+from tests.benchmarks.error_bars import FREQUENCIES, WEAR
 from tests.benchmarks.frame import Table, arguments
 from tests.solver.models import branch_states, march_wear, scene
 
 CORES = ("", "Haswell", "Zen", "Nehalem", "SandyBridge")
-FREQUENCIES = {1: [212.5, 212.75, 213.0, 213.25], 2: [211.0, 211.25, 211.5, 211.75, 212.0, 212.25, 212.5]}
 SCHEMES = ("adaptive", "implicit", "explicit")
 NOISE = 1e-13
 
 
-def compute_variant(mesh: int, seed: int) -> list[tuple[str, str, float, float]]:
+def compute_variant(mesh: int, seed: int, frequencies: list[float]) -> list[tuple[str, str, float, float]]:
     """Label, outcome, volume and its error, m3, of all points. seed: of the noise, 0 for none."""
     model, random, settings = scene("dovetail_sector", 13, mesh=mesh), np.random.default_rng(seed), SolverSettings()
 
@@ -34,15 +34,13 @@ def compute_variant(mesh: int, seed: int) -> list[tuple[str, str, float, float]]
         noise = (NOISE if seed else 0.0) * random.normal(size=matrix.shape)
         return matrix * (1.0 + 0.5 * (noise + noise.T))
 
-    parts = ("mass", "stiffness", "damping")
-    linear = {
-        k: replace(each, **{name: shaken(getattr(each, name)) for name in parts}) for k, each in model.linear.items()
-    }
-    model, cycles, found = replace(model, linear=linear), np.linspace(0.0, 1e5, 101), []
-    omegas = [2.0 * np.pi * frequency for frequency in FREQUENCIES[mesh]]
-    for frequency, start in zip(FREQUENCIES[mesh], branch_states(model, 0.5, 0.5, omegas, settings), strict=True):
+    (linear,), found = model.linear.values(), []
+    linear = replace(linear, **{name: shaken(getattr(linear, name)) for name in ("mass", "stiffness", "damping")})
+    model, cycles = replace(model, linear={0: linear}), np.linspace(0.0, 1e5, 101)
+    omegas = [2.0 * np.pi * frequency for frequency in frequencies]
+    for frequency, start in zip(frequencies, branch_states(model, 0.5, 0.5, omegas, settings), strict=True):
         for scheme in SCHEMES:
-            history = march_wear(model, 0.5, start, 1.1e-11, 1000.0, scheme, cycles, settings)
+            history = march_wear(model, 0.5, start, WEAR, 1000.0, scheme, cycles, settings)
             volume = float(history.worn_volume[-1])
             error = volume * history.error_estimate
             found.append((f"{frequency} Hz, {scheme}", history.outcome.meaning, volume, error))
@@ -51,14 +49,14 @@ def compute_variant(mesh: int, seed: int) -> list[tuple[str, str, float, float]]
 
 def main() -> None:
     """All variants, one after the other."""
-    given = arguments(__doc__, mesh=1, noise=20, one=-1)
+    given = arguments(__doc__, mesh=1, noise=20, frequency=[0.0], one=-1)
+    frequencies = given.frequency if any(given.frequency) else list(FREQUENCIES[given.mesh])
     if given.one >= 0:
-        print(json.dumps(compute_variant(given.mesh, given.one)))
+        print(json.dumps(compute_variant(given.mesh, given.one, frequencies)))
         return
-    variants = [(core, 0) for core in CORES] + [("", seed) for seed in range(1, given.noise + 1)]
     table, first = Table("kernels", "noise", "apart", "where", "outcomes"), None
-    for core, seed in variants:
-        command = [sys.executable, "-m", "tests.benchmarks.machines", "--mesh", str(given.mesh), "--one", str(seed)]
+    for core, seed in [(core, 0) for core in CORES] + [("", seed) for seed in range(1, given.noise + 1)]:
+        command = [sys.executable, "-m", "tests.benchmarks.machines", *sys.argv[1:], "--one", str(seed)]
         environment = {**os.environ, **({"OPENBLAS_CORETYPE": core} if core else {})}
         points = json.loads(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
         first = first or points

@@ -1,19 +1,17 @@
 """Runs the notebooks of `studies/notebooks` and stores in them what comes out, as a forge shows it.
 
-    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.notebooks dovetail.nc
-    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.notebooks dovetail.nc trends wear_maps
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.notebooks dovetail.nc [trends wear_maps ...]
 
-`dovetail.nc` is the result of the bundled study, `run-study dovetail`, read by some notebooks; three read `scatter.nc`,
-`modes.nc` and `mission.nc` beside it, the results of the bundled studies of these names; the others run a small study
-of their own. Without names all are run, in a folder of their own. Two runs on one machine store the same, but for the
-CPU times of `error_against_run_time`: nothing is kept of when, where and by which version of Python they ran.
+`dovetail.nc` is the result of the bundled study; three notebooks read `scatter.nc`, `modes.nc` and `mission.nc` beside
+it, the results of the bundled studies of these names. Without names all are run, in a folder of their own. Two runs on
+one machine store the same, but for the CPU times of `error_against_run_time`.
 """
 
-import argparse
 import base64
 import os
+import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import nbformat
@@ -22,31 +20,19 @@ from nbclient import NotebookClient
 from nbformat import NotebookNode
 
 import studies
-from tests.benchmarks.small_png import shrink
+from tests.benchmarks.pictures import shrink
 
 ROOT = Path(studies.__file__).parent.parent
 NOTEBOOKS = tuple(sorted((ROOT / "studies" / "notebooks").glob("*.ipynb")))
 LANGUAGE = {"name": "python"}
-_HTML_OF_XARRAY = "xr-wrap"
-"""A class in the interactive view of a dataset: it has new random names each time, and a forge shows it badly."""
+RESULTS = ("scatter.nc", "modes.nc", "mission.nc")
 
 
 def execute(path: Path, here: Path, variables: Mapping[str, str]) -> NotebookNode:
-    """A notebook after its cells were run in a folder.
+    """A notebook after its cells were run in an empty folder.
 
-    Parameters
-    ----------
-    path
-        The notebook; it is not changed.
-    here
-        Empty folder to run in; the settings of Jupyter and IPython are beside it, those of the user are not read.
-    variables
-        Of the environment, beside those of this process; what names another result is not taken from there.
-
-    Raises
-    ------
-    nbclient.exceptions.CellExecutionError
-        Where a cell fails.
+    The settings of Jupyter and IPython are beside the folder, those of the user are not read. variables: of the
+    environment, beside those of this process but what names another result. Raises CellExecutionError of nbclient.
     """
     aside = here.with_name(f"{here.name}-jupyter")
     # The kernel is this very interpreter, whatever kernels are installed on the machine.
@@ -77,49 +63,38 @@ def settle(notebook: NotebookNode) -> NotebookNode:
         cell.metadata = nbformat.from_dict({})
         if cell.cell_type != "code":
             continue
-        cell.outputs = _join_streams(cell.outputs)
+        joined: list[NotebookNode] = []
         for output in cell.outputs:
             data = output.get("data", {})
             if data:
                 output.metadata = nbformat.from_dict({})
-            if _HTML_OF_XARRAY in data.get("text/html", ""):
+            # the interactive view of a dataset has new random names each time, and a forge shows it badly
+            if "xr-wrap" in data.get("text/html", ""):
                 del data["text/html"]
             if "image/png" in data:
                 data["image/png"] = base64.b64encode(shrink(base64.b64decode(data["image/png"]))).decode()
+            # what is printed arrives in pieces, of a number that differs
+            if joined and output.output_type == "stream" and joined[-1].get("name") == output.name:
+                joined[-1].text += output.text
+            else:
+                joined.append(output)
+        cell.outputs = joined
     return notebook
 
 
-def _join_streams(outputs: Sequence[NotebookNode]) -> list[NotebookNode]:
-    """What is printed arrives in pieces, of a number that differs: pieces that follow each other are one."""
-    joined: list[NotebookNode] = []
-    for output in outputs:
-        before = joined[-1] if joined else None
-        if before is not None and output.output_type == "stream" and before.get("name") == output.name:
-            before.text += output.text
-        else:
-            joined.append(output)
-    return joined
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
+def main() -> None:
     """Remakes the outputs of the notebooks that are named."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("result", type=Path, help="result file of the bundled study dovetail")
-    parser.add_argument("names", nargs="*", help=f"of {', '.join(path.stem for path in NOTEBOOKS)}")
-    options = parser.parse_args(arguments)
-    if unknown := set(options.names) - {path.stem for path in NOTEBOOKS}:
-        parser.error(f"no notebooks: {', '.join(sorted(unknown))}")
-    result = options.result.resolve(strict=True)
+    result, *names = sys.argv[1:]
     for path in NOTEBOOKS:
-        if options.names and path.stem not in options.names:
+        if names and path.stem not in names:
             continue
         with tempfile.TemporaryDirectory() as folder:
             here = Path(folder, "here")
             here.mkdir()
-            (here / "dovetail.nc").symlink_to(result)
-            for other in ("scatter.nc", "modes.nc", "mission.nc"):
-                if result.with_name(other).is_file():
-                    (here / other).symlink_to(result.with_name(other))
+            (here / "dovetail.nc").symlink_to(Path(result).resolve(strict=True))
+            for other in RESULTS:
+                if Path(result).with_name(other).is_file():
+                    (here / other).symlink_to(Path(result).resolve().with_name(other))
             nbformat.write(settle(execute(path, here, {})), path)
         print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB", flush=True)
 

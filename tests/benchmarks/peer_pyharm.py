@@ -1,11 +1,9 @@
 """Curves of `peers` by pyHarm, in its environment: prints JSON. pyHarm is made for large joints, not for one slider.
 
-The dovetail:
-
-- `Penalty3D` is pyHarm's: a spring closes the gap, friction of Coulomb behind springs follows the normal force.
-- `DLFT3D` is pyHarm's rigid contact, unchanged. Between a body and the ground it divides the force by two bodies, so a
-  pair is a spring of twice the penalty; the derivative of the linear forces is missing in its Jacobian.
-- `Rigid` is the same law with the ground counted as no body, and with that derivative.
+On the dovetail `Penalty3D` is pyHarm's: a spring closes the gap, friction of Coulomb behind springs follows the normal
+force. `Rigid` is the law of its rigid contact, `DLFT3D`, which between a body and the ground divides the force by two
+bodies and lacks the derivative of the linear forces in its Jacobian: the ground counts as no body, and the derivative
+is there.
 
 pyHarm's closing is negative: the normal displacements change their sign.
 """
@@ -118,14 +116,8 @@ def dovetail(asked: dict[str, Any], model: dict[str, Any]) -> dict[str, Any]:
     }
     newton = {"tol_residual": asked["tolerance"], "tol_delta_x": 1e-9, "max_iter": asked["most"]}
     step = float(omega[1] - omega[0])
-    course = {
-        "predictor": "previous",
-        "corrector": "nocontinuation",
-        "ds0": step,
-        "ds_max": step,
-        "ds_min": step / 64.0,
-    }
-    course |= {"puls_inf": float(omega[0]), "puls_sup": float(omega[-1]) - 1e-3 * step}
+    course = {"predictor": "previous", "corrector": "nocontinuation", "ds0": step, "ds_max": step}
+    course |= {"ds_min": step / 64.0, "puls_inf": float(omega[0]), "puls_sup": float(omega[-1]) - 1e-3 * step}
     parts = {"plugin": [Load, Rigid, WholeSlope], "substructures": {"root": body}, "connectors": connectors}
     return study_of(asked, parts, newton, course, "WholeSlope" if asked["element"] == "Rigid" else "Base")
 

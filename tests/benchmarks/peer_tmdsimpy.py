@@ -1,9 +1,7 @@
 """Curves of `peers` by tmdsimpy: prints JSON. tmdsimpy is made for nonlinear modes of bolted joints.
 
-The slider has elastic friction: rigid friction is not its case. The dovetail:
-
-- `ElasticDryFriction3D` is tmdsimpy's: a spring closes the gap, and each of two springs slides at the limit of Coulomb.
-- `CircularFriction` is the same with one limit for the length of both.
+The slider has elastic friction: rigid friction is not its case. On the dovetail a spring closes the gap, and each of
+two springs slides at the limit of Coulomb.
 """
 
 import json
@@ -14,22 +12,6 @@ from typing import Any
 import numpy as np
 
 SMALLEST = 1.0 / 8.0  # of the distance of two frequencies: the step after attempts that failed
-
-
-def make_circular() -> None:
-    """Gives tmdsimpy's friction one limit for both directions."""
-    import jax.numpy as jnp  # type: ignore[import-not-found]
-    from tmdsimpy.jax.nlforces import elastic_dry_fric_3d  # type: ignore[import-not-found]
-
-    def follow(now: int, force: Any, motion: Any, spring: Any, friction: Any) -> Any:
-        stuck = [spring * (motion[now, i::3] - motion[now - 1, i::3]) + force[now - 1, i::3] for i in (0, 1)]
-        limit, square = friction * force[now, 2::3], stuck[0] ** 2 + stuck[1] ** 2
-        inside = square <= limit**2
-        # no root of zero, whose derivative is not a number
-        share = jnp.where(inside, 1.0, limit / jnp.sqrt(jnp.where(inside, 1.0, square)))
-        return force.at[now, 0::3].set(share * stuck[0]).at[now, 1::3].set(share * stuck[1])
-
-    elastic_dry_fric_3d._local_eldry_loop_body = follow
 
 
 def slider(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
@@ -52,8 +34,6 @@ def dovetail(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any, Any]:
     from tmdsimpy.jax.solvers import NonlinearSolverOMP  # type: ignore[import-not-found]
     from tmdsimpy.vibration_system import VibrationSystem  # type: ignore[import-not-found]
 
-    if asked["element"] == "CircularFriction":
-        make_circular()
     with np.load(asked["file"]) as file:
         model = dict(file)
     n = len(model["M"])
@@ -92,14 +72,8 @@ def curve(asked: dict[str, Any]) -> dict[str, Any]:
         if not frequencies or frequency - frequencies[-1] < 2.0 * smallest:
             break  # the end of the curve
         waiting.append(0.5 * (frequencies[-1] + frequency))
-    spent = time.process_time() - began
-    return {
-        "frequency": frequencies,
-        "amplitude": amplitudes,
-        "iterations": evaluations,
-        "seconds": spent,
-        "failed": failed,
-    }
+    effort = {"iterations": evaluations, "seconds": time.process_time() - began, "failed": failed}
+    return {"frequency": frequencies, "amplitude": amplitudes, **effort}
 
 
 if __name__ == "__main__":

@@ -4,16 +4,15 @@
 
 Slider: one response curve of a mass of 0.1 kg on a mount (1.6e5 N/m, 20 N s/m) under 10 N, held by friction of 5 N, at
 27 frequencies from 120 to 250 Hz: rigid friction, and elastic friction behind a spring of 1.6e6 N/m, against the exact
-motion. Dovetail: 16 pairs, 0.5 N, friction 0.5, unworn, 25 frequencies from 211 to 214 Hz. Its true motion is that of
-rigid contact: a start state of this project with 25 harmonics and `rtol` 1e-4, which `time_integration` confirms. Other
-programs get the model, the first state of the own curve as their first guess, and the springs or penalties that are
-asked for; no friction history: in each period they begin with sliders that are not displaced.
+motion. Dovetail: 16 pairs, 0.5 N, friction 0.5, unworn, 25 frequencies from 211 to 214 Hz, against a start state of
+this project with 25 harmonics and `rtol` 1e-4, which `time_integration` confirms. Other programs get the model, the
+first state of the own curve as their first guess, and springs or penalties; no friction history.
 
 Printed are the CPU time of the second of two equal runs (compiling is left out), the iterations really made, and the
 error of the first harmonic at the frequencies that the program has chosen; the same in `peers.csv` of the folder.
-Environments are built in the folder, pyHarm and JAX from the package index. tmdsimpy and NLvib are no packages:
-`--tmdsimpy` and `--nlvib` name copies of their repositories, without them git fetches them. NLvib runs under Octave
-(`octave-cli`); it has no friction whose normal force changes. What cannot be had is said in a sentence.
+Environments are built in the folder, pyHarm and JAX from the package index. `--tmdsimpy` and `--nlvib` name copies of
+the repositories tmd-lab/tmdsimpy and maltekrack/NLvib. NLvib runs under Octave (`octave-cli`); it has no friction whose
+normal force changes. What cannot be had is said in a sentence.
 """
 
 from __future__ import annotations
@@ -24,6 +23,7 @@ import subprocess
 import tempfile
 import venv
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +36,8 @@ from solver.settings import SolverSettings
 from studies import build_scene
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.references import slider_orbit
+from tests.solver.exact_scenes import behind_spring
 from tests.solver.models import branch_states
-from tests.solver.random_orbits import behind_spring
 
 MASS, DAMPING, MOUNT, FORCE, FRICTION, SPRING = 0.1, 20.0, 1.6e5, 10.0, 5.0, 1.6e6
 SLIDER = {"mass": MASS, "damping": DAMPING, "mount": MOUNT, "force": FORCE, "friction": FRICTION, "spring": SPRING}
@@ -47,26 +47,20 @@ STRUCTURE = 2e8  # N/m: what the bodies resist a displacement of one pair with, 
 HARMONICS, SAMPLES = (5, 13), 256
 NEWTON = {"tolerance": 1e-6, "most": 25}  # of the residual, N, and iterations; a curve that converges takes ten
 PYHARM, JAX = ("pyharm-os==1.2.2",), ("jax[cpu]", "scipy")
-TMDSIMPY, NLVIB = "https://github.com/tmd-lab/tmdsimpy", "https://github.com/maltekrack/NLvib"
-ELEMENTS = {
-    "pyHarm": [
-        ("Penalty3D", "springs", STRUCTURE, 5),
-        ("Penalty3D", "springs", 10.0 * STRUCTURE, 5),
-        ("DLFT3D", "rigid, as it is", STRUCTURE, 5),
-        *(("Rigid", "rigid, own element", STRUCTURE, harmonics) for harmonics in HARMONICS),
-    ],
-    "tmdsimpy": [
-        ("ElasticDryFriction3D", "springs, square limit", STRUCTURE, 5),
-        ("CircularFriction", "springs, own element", STRUCTURE, 5),
-        ("CircularFriction", "springs, own element", 10.0 * STRUCTURE, 5),
-    ],
-}
-"""Elements of other programs for the dovetail: name there, words for the table, springs or penalty, N/m, harmonics."""
+ELEMENTS = (
+    ("pyHarm", "Penalty3D", "springs", STRUCTURE, 5),
+    ("pyHarm", "Penalty3D", "springs", 10.0 * STRUCTURE, 5),
+    *(("pyHarm", "Rigid", "rigid, own element", STRUCTURE, harmonics) for harmonics in HARMONICS),
+    ("tmdsimpy", "ElasticDryFriction3D", "springs", STRUCTURE, 5),
+)
+"""Program and its element for the dovetail, words for the table, springs or penalty, N/m, harmonics."""
 # One core, as the own curves. With the 32 bits that JAX takes unless told otherwise Newton's method does not converge.
 _SURROUNDINGS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_ENABLE_X64": "1"}
-# frequency, Hz, and amplitude, m, of the points that converged; iterations, CPU seconds, attempts that failed
 Curve = dict[str, Any]
+"""Frequency, Hz, and amplitude, m, of the points that converged; iterations, CPU seconds, attempts that failed."""
 Truth = Callable[[FloatArray], FloatArray]
+Program = Callable[[], tuple[list[str], str, dict[str, str]]]
+"""Gives command, script and further input of a program."""
 
 
 def exact(kind: str, frequency: float) -> float:
@@ -77,19 +71,6 @@ def exact(kind: str, frequency: float) -> float:
     limit, damping = FRICTION / FORCE, DAMPING / np.sqrt(MOUNT * MASS)
     pair = behind_spring(SPRING / MOUNT, damping, limit, 2.0 * np.pi * frequency / rate)
     return float(abs(pair.response(pair.orbit_near(np.zeros(2), np.zeros(2)))).item()) * FORCE / MOUNT
-
-
-def own_curve(model: ReducedModel, frequencies: FloatArray, force: float, settings: SolverSettings) -> Curve:
-    """The curve of this project."""
-    found = [measure(lambda: frequency_response(model, frequencies, force, MU, settings=settings)) for _ in range(2)][1]
-    there = np.isfinite(found.result.response[:, 0])
-    return {
-        "frequency": frequencies[there].tolist(),
-        "amplitude": np.abs(found.result.response[there, 0]).tolist(),
-        "iterations": found.iterations,
-        "seconds": found.seconds,
-        "failed": int((~there).sum()),
-    }
 
 
 def show(table: Table, name: str, harmonics: int | str, curve: Curve, truth: Truth) -> None:
@@ -109,10 +90,16 @@ def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArr
     """The rows of this project."""
     for harmonics in (*HARMONICS, "auto"):
         settings = SolverSettings(harmonics=harmonics, samples="auto" if harmonics == "auto" else SAMPLES)
-        show(table, f"fretwear, {kind}", harmonics, own_curve(model, frequencies, force, settings), truth)
+        asked = (model, frequencies, force, MU)
+        runs = [measure(lambda: frequency_response(*asked, settings=settings)) for _ in range(2)]  # noqa: B023
+        response = runs[1].result.response[:, 0]
+        there = np.isfinite(response)
+        curve = {"frequency": frequencies[there], "amplitude": np.abs(response[there]), "failed": int((~there).sum())}
+        effort = {"iterations": runs[1].iterations, "seconds": runs[1].seconds}
+        show(table, f"fretwear, {kind}", harmonics, {**curve, **effort}, truth)
 
 
-def slider(table: Table, programs: dict[str, Callable[[Curve], Curve]]) -> None:
+def slider(table: Table, programs: dict[str, Program]) -> None:
     """The rows of the slider."""
     asked = {**SLIDER, "first": 120.0, "last": 250.0, "n_frequencies": 27, "samples": SAMPLES}
     asked["frequency"] = SLIDER_FREQUENCIES.tolist()
@@ -126,34 +113,30 @@ def slider(table: Table, programs: dict[str, Callable[[Curve], Curve]]) -> None:
         own_rows(table, f"slider, {kind}", model, SLIDER_FREQUENCIES, FORCE, truth)
         for name in programs if kind == "elastic" else ("pyHarm",):
             for harmonics in HARMONICS:
-                curve = attempt(name, programs[name], {**asked, "kind": kind, "harmonics": harmonics})
-                if curve is not None:
-                    show(table, f"{name}, slider, {kind}", harmonics, curve, truth)
+                label = f"{name}, slider, {kind}"
+                peer_row(table, label, programs[name], harmonics, {**asked, "kind": kind}, truth)
 
 
-def dovetail(table: Table, programs: dict[str, Callable[[Curve], Curve]], folder: Path) -> None:
+def dovetail(table: Table, programs: dict[str, Program], folder: Path) -> None:
     """The rows of the dovetail."""
-    model, known = build_scene("dovetail_sector", mesh=1), dict[float, float]()
+    model = build_scene("dovetail_sector", mesh=1)
+
+    @cache
+    def fine(frequencies: tuple[float, ...]) -> FloatArray:
+        settings = SolverSettings(rtol=1e-4, harmonics=25, samples=512)
+        return np.abs(frequency_response(model, frequencies, LOAD, MU, settings=settings).response[:, 0])
 
     def truth(frequencies: FloatArray) -> FloatArray:
-        places = np.round(frequencies, 6).tolist()
-        if new := [place for place in places if place not in known]:
-            fine = SolverSettings(rtol=1e-4, harmonics=25, samples=512)
-            found = frequency_response(model, new, LOAD, MU, settings=fine)
-            known.update(zip(new, np.abs(found.response[:, 0]).tolist(), strict=True))
-        return np.array([known[place] for place in places])
+        return fine(tuple(np.round(frequencies, 6).tolist()))
 
     own_rows(table, "dovetail, rigid", model, FREQUENCIES, LOAD, truth)
     file = folder / "dovetail.npz"
     asked = {"file": str(file), "pairs": model.contact.n_contact, "friction": MU, "samples": SAMPLES, **NEWTON}
     asked["frequency"] = FREQUENCIES.tolist()
-    for name, elements in ELEMENTS.items():
-        for element, words, stiffness, harmonics in elements:
-            write_model(file, model, 0.0 if "rigid" in words else 1.0 / stiffness, harmonics)
-            wanted = {**asked, "element": element, "stiffness": stiffness, "harmonics": harmonics}
-            curve = attempt(name, programs[name], wanted)
-            if curve is not None:
-                show(table, f"{name}, dovetail, {words}, {stiffness:.0e}", harmonics, curve, truth)
+    for name, element, words, stiffness, harmonics in ELEMENTS:
+        write_model(file, model, 0.0 if "rigid" in words else 1.0 / stiffness, harmonics)
+        label, wanted = f"{name}, dovetail, {words}, {stiffness:.0e}", {"element": element, "stiffness": stiffness}
+        peer_row(table, label, programs[name], harmonics, {**asked, **wanted}, truth)
 
 
 def write_model(file: Path, model: ReducedModel, compliance: float, harmonics: int) -> None:
@@ -182,62 +165,50 @@ def write_model(file: Path, model: ReducedModel, compliance: float, harmonics: i
     np.savez(file, **arrays, row=np.real(linear.response[0]), start=guess.ravel())
 
 
-def environment(folder: Path, name: str, packages: tuple[str, ...]) -> str:
+def environment(folder: Path, packages: tuple[str, ...]) -> str:
     """Interpreter of an environment with the packages. Raises CalledProcessError."""
-    python = folder / name / "bin" / "python"
+    python = folder / "bin" / "python"
     if not python.exists():
-        venv.create(folder / name, with_pip=True)
+        venv.create(folder, with_pip=True)
         subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True, capture_output=True, text=True)
     return str(python)
 
 
-def repository(place: Path, address: str) -> str:
-    """A copy of a repository, fetched by git if there is none. Raises CalledProcessError."""
-    if not place.exists():
-        fetch = ["git", "clone", "-q", "--depth", "1", address, place]
-        subprocess.run(fetch, check=True, capture_output=True, text=True)
-    return str(place)
-
-
-def curve_of(command: list[str], script: str, asked: Curve) -> Curve:
-    """What a script of this folder prints last. Raises CalledProcessError, FileNotFoundError without the program."""
-    command = [*command, str(Path(__file__).with_name(script)), json.dumps(asked)]
-    with tempfile.TemporaryDirectory() as folder:  # pyHarm writes where it runs
-        surroundings = {**os.environ, **_SURROUNDINGS}
-        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=surroundings)
-    curve: Curve = json.loads(done.stdout.splitlines()[-1])
-    return curve
-
-
-def attempt(name: str, program: Callable[[Curve], Curve], asked: Curve) -> Curve | None:
-    """The curve of another program; None, and a sentence, where it is not to be had."""
+def peer_row(table: Table, label: str, program: Program, harmonics: int, asked: dict[str, Any], truth: Truth) -> None:
+    """A row of another program, from what its script prints last; a sentence where it is not to be had."""
     try:
-        return program(asked)
+        command, script, more = program()
+        command = [
+            *command,
+            str(Path(__file__).with_name(script)),
+            json.dumps({**asked, "harmonics": harmonics, **more}),
+        ]
+        with tempfile.TemporaryDirectory() as folder:  # pyHarm writes where it runs
+            surroundings = {**os.environ, **_SURROUNDINGS}
+            done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=surroundings)
     except (subprocess.CalledProcessError, FileNotFoundError) as error:
         said = (getattr(error, "stderr", None) or str(error)).strip().splitlines() or ["no message"]
         # Octave says first what is wrong, Python last
-        print(f"{name} is not run here: {next((line for line in said if line.startswith('error: ')), said[-1])}")
-    return None
+        line = next((line for line in said if line.startswith("error: ")), said[-1])
+        print(f"{label} is not run here: {line}")
+    else:
+        show(table, label, harmonics, json.loads(done.stdout.splitlines()[-1]), truth)
 
 
 def main() -> None:
     """Builds the environments and prints the table."""
-    cache = str(Path.home() / ".cache" / "fretwear_peers")
-    given = arguments(__doc__, ("slider", "dovetail"), folder=cache, tmdsimpy=None, nlvib=None)
+    home = str(Path.home() / ".cache" / "fretwear_peers")
+    given = arguments(__doc__, ("slider", "dovetail"), folder=home, tmdsimpy=None, nlvib=None)
     folder = Path(given.folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    copies = [(given.tmdsimpy or folder / "tmdsimpy_copy"), (given.nlvib or folder / "nlvib_copy")]
-    tmdsimpy, nlvib = (copy.resolve() for copy in copies)
-    programs: dict[str, Callable[[Curve], Curve]] = {
-        "pyHarm": lambda asked: curve_of([environment(folder, "pyharm", PYHARM)], "peer_pyharm.py", asked),
-        "tmdsimpy": lambda asked: curve_of(
-            [environment(folder, "tmdsimpy", JAX)],
+    programs: dict[str, Program] = {
+        "pyHarm": lambda: ([environment(folder / "pyharm", PYHARM)], "peer_pyharm.py", {}),
+        "tmdsimpy": lambda: (
+            [environment(folder / "tmdsimpy", JAX)],
             "peer_tmdsimpy.py",
-            {**asked, "source": repository(tmdsimpy, TMDSIMPY)},
+            {"source": str(given.tmdsimpy)},
         ),
-        "NLvib": lambda asked: curve_of(
-            ["octave-cli", "-q"], "peer_nlvib.m", {**asked, "source": repository(nlvib, NLVIB)}
-        ),
+        "NLvib": lambda: (["octave-cli", "-q"], "peer_nlvib.m", {"source": str(given.nlvib)}),
     }
     columns = ("program", "harmonics", "points", "failed", "iterations", "CPU s", "largest, mm", "at Hz")
     table = Table(*columns, "error, %", "median, %", file=folder / "peers.csv")

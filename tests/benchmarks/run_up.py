@@ -44,8 +44,7 @@ def time_integrated(model: ReducedModel, passage: Passage, amplitude: float, n_s
 
 def steady(model: ReducedModel, passage: Passage, amplitude: float) -> MissionHistory:
     """One passage that wears next to nothing, through steady states."""
-    block = Block(model, passage, amplitude, FRICTION, begin=passage.sweep)
-    return integrate_mission((block,), WEAR_PER_WORK, 1)
+    return integrate_mission((Block(model, passage, amplitude, FRICTION, begin=passage.sweep),), WEAR_PER_WORK, 1)
 
 
 def main() -> None:

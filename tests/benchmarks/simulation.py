@@ -6,14 +6,12 @@ result makes possible is decided by `studyrunner.mpi.dispatch` and `studyrunner.
 
 import heapq
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
-from studyrunner.mpi.dispatch import Assignment, CostKeys, CostModel, Dispatcher, Measurement
+from studyrunner.mpi.dispatch import Assignment, Dispatcher
 from studyrunner.task_runs import TaskProgress
 
 
@@ -41,26 +39,21 @@ class MemoryIndex:
         )
 
     def sweeps_left(self) -> list[Task]:
-        """All of them."""
         return list(self.plan.sweeps)
 
-    def is_finished(self, task: Task) -> bool:
-        """None is."""
-        del task
+    def is_finished(self, _: Task) -> bool:
         return False
 
     is_suspect = is_finished
 
     def known_starts(self) -> list[tuple[Task, StartResult]]:
-        """None is known."""
         return []
 
     def waiting_for(self, start: tuple[int, int] | None) -> Sequence[Task]:
-        """All of them."""
         return () if start is None else self.plan.waiting.get(start, ())
 
     def add(self, task: Task, result: Result) -> None:
-        """It is not kept."""
+        """The result is not stored."""
 
 
 @dataclass(frozen=True)
@@ -85,52 +78,28 @@ class Replay:
         return min(1.0, self.work / (self.n_ranks * self.longest_way))
 
 
-class KnownCosts(CostModel):
-    """Takes the costs of tasks as they are."""
-
-    def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:  # noqa: ARG002
-        """Learns nothing."""
-        return ()
-
-    def correction(self, cost_keys: CostKeys) -> float:  # noqa: ARG002
-        """1."""
-        return 1.0
-
-
 def replay(
     plan: TaskPlan,
     started: Callable[[Sweep, int], tuple[StartResult, float]],
     history_seconds: Callable[[History], float],
     n_ranks: int,
     overheads: Overheads,
-    *,
-    known: bool = False,
 ) -> Replay:
     """Runs the tasks of a plan on simulated ranks. The same arguments give the same replay.
 
-    started: start state of a sweep at a place and its cost, s. history_seconds: cost of a history, s. known: the costs
-    are known before: sweeps with the longest way to the end of a history go first, then the longest histories.
+    started: start state of a sweep at a place and its cost, s. history_seconds: cost of a history, s.
     """
     clock = 0.0
     index = MemoryIndex(plan)
     plan, progress = index.plan, TaskProgress(index)  # type: ignore[arg-type]
-    dispatcher: Dispatcher = Dispatcher(n_ranks, KnownCosts() if known else progress.costs, lambda: clock)
-
-    def foreseen(tasks: Iterable[Task]) -> list[Task]:
-        return [replace(task, cost=_longest_way(task)) for task in tasks] if known else list(tasks)
-
-    def _longest_way(task: Task) -> float:
-        if isinstance(task, History):
-            return history_seconds(task)
-        first = sum(started(task, place)[1] for place in task.order)
-        return first + max((history_seconds(each) for each in plan.results if each.sweep == task.number), default=0.0)
-
+    dispatcher: Dispatcher = Dispatcher(n_ranks, progress.costs, lambda: clock)
     ticket = itertools.count()
     arrivals: list[tuple[float, int, int, int, float, Result]] = []
     queues: list[list[tuple[float, Assignment]]] = [[] for _ in range(n_ranks)]
-    free_at = [0.0] * n_ranks
-    computing = [False] * n_ranks
-    work = longest_way = last_end = 0.0
+    free_at, computing = [0.0] * n_ranks, [False] * n_ranks
+    work = longest_way = 0.0
+    ways: dict[tuple[int, int], float] = {}
+    left: dict[int, int] = {}
 
     def begin(rank: int) -> None:
         """The rank takes the next task that it has been sent; what it will send is known at once."""
@@ -141,23 +110,19 @@ def replay(
         now = max(sent + overheads.latency, free_at[rank])
         results: list[tuple[Result, float]] = []
         if isinstance(task, Sweep):
-            way = 0.0
-            for place in task.order:
-                start, seconds = started(task, place)
-                way += seconds
-                ways[task.number, place] = way
-                results.append((start, seconds))
+            results = [started(task, place) for place in task.order]
+            along = itertools.accumulate(seconds for _, seconds in results)
+            ways.update({(task.number, place): way for place, way in zip(task.order, along, strict=True)})
         else:
             seconds = history_seconds(task)
             longest_way = max(longest_way, ways[task.sweep, task.position] + seconds)
-            results += [(_history(task, place), seconds / task.n_results) for place in task.order]
+            points = (PointResult(task.points(place), {"outcome": 0}, place) for place in task.order)
+            results = [(point, seconds / task.n_results) for point in points]
         for result, seconds in results:
             now += seconds
             work += seconds
             heapq.heappush(arrivals, (now + overheads.latency, next(ticket), rank, assignment.number, seconds, result))
         free_at[rank] = now
-
-    ways: dict[tuple[int, int], float] = {}
 
     def hand_out() -> None:
         nonlocal clock
@@ -167,9 +132,8 @@ def replay(
             if not computing[rank]:
                 begin(rank)
 
-    dispatcher.add(foreseen(plan.sweeps))
+    dispatcher.add(list(plan.sweeps))
     hand_out()
-    left: dict[int, int] = {}
     while arrivals:
         arrived, _, rank, number, seconds, result = heapq.heappop(arrivals)
         # The master takes one message after the other.
@@ -177,21 +141,10 @@ def replay(
         task = dispatcher.deliver(rank, number, seconds)
         left[number] = left.get(number, task.n_results) - 1
         if left[number] == 0:
-            del left[number]
             computing[rank] = False
             if queues[rank]:
                 begin(rank)
-        dispatcher.add(foreseen(progress.take(task, result)))
+        dispatcher.add(list(progress.take(task, result)))
         dispatcher.watch()
         hand_out()
-        last_end = clock
-    return Replay(n_ranks, work, last_end, longest_way, plan.n_points - progress.n_points)
-
-
-def _history(task: History, place: int) -> PointResult:
-    return PointResult(task.points(place), {"outcome": 0}, place)
-
-
-def lognormal(rng: np.random.Generator, spread: float) -> float:
-    """A factor around 1 with this standard deviation of its logarithm."""
-    return float(np.exp(spread * rng.standard_normal()))
+    return Replay(n_ranks, work, clock, longest_way, plan.n_points - progress.n_points)

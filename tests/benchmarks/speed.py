@@ -24,21 +24,26 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.benchmarks.frame import Table, arguments, dense_solve, measure
+from tests.mpi.launching import launcher
 from tests.solver.models import branch_states, scene
 
 UNKNOWNS = 1584
 FRICTION, WEAR, CYCLES = 0.5, 1.1e-11, 1e5  # 1, 1/Pa
-MPIEXEC, RUN_STUDY = (Path(sys.executable).with_name(name) for name in ("mpiexec", "run-study"))
 REPEATS = 2  # of the default study on one rank and on two
 UNIT = dense_solve(UNKNOWNS)
 TABLE = Table("case", "CPU s", "units", "wanted", "iterations", "wanted")
 
 
-def show(name: str, compute: Callable[[], object], wanted: str, iterations: str = "") -> None:
+def row(name: str, seconds: float, wanted: str = "", iterations: int | None = None, fewer: str = "") -> None:
+    """A row: CPU s and iterations, each with what is wanted of it, in units or iterations."""
+    TABLE.row(name, seconds, seconds / UNIT, wanted, iterations, fewer)
+
+
+def second(name: str, compute: Callable[[], object], wanted: str, iterations: str = "") -> None:
     """A row, of the second one of two equal computations: kernels are loaded before."""
     measure(compute)
     found = measure(compute)
-    TABLE.row(name, found.seconds, found.seconds / UNIT, wanted, found.iterations, iterations)
+    row(name, found.seconds, wanted, found.iterations, iterations)
 
 
 def iteration() -> None:
@@ -56,25 +61,25 @@ def iteration() -> None:
 
     for name, solve in (("kept", lambda: once(kept)), ("own", lambda: once(JacobianSolver()))):
         spent = float(np.median([measure(solve).seconds for _ in range(8)][1:]))
-        TABLE.row(f"one Newton iteration, {name} factorisation", spent, spent / UNIT, "0.2", None, None)
+        row(f"one Newton iteration, {name} factorisation", spent, "0.2")
 
 
 def history() -> None:
     """An adaptive history of 48 pairs."""
     model = scene("dovetail_sector", 13)
-    show("adaptive history, 48 pairs", lambda: march_wear(model, 211.75, 0.5, FRICTION, WEAR, CYCLES), "30", "250")
+    second("adaptive history, 48 pairs", lambda: march_wear(model, 211.75, 0.5, FRICTION, WEAR, CYCLES), "30", "250")
 
 
 def slider() -> None:
     """A response curve of the slider."""
     model, frequencies = scene("sdof_slider"), np.linspace(120.0, 250.0, 27)
-    show("curve, slider, 27 frequencies", lambda: frequency_response(model, frequencies, 10.0, FRICTION), "5", "400")
+    second("curve, slider, 27 frequencies", lambda: frequency_response(model, frequencies, 10.0, FRICTION), "5", "400")
 
 
 def dovetail() -> None:
     """A response curve of 16 pairs."""
     model, frequencies = scene("dovetail_sector", mesh=1), np.linspace(211.0, 214.0, 25)
-    show("curve, 16 pairs, 25 frequencies", lambda: frequency_response(model, frequencies, 0.5, FRICTION), "", "1000")
+    second("curve, 16 pairs, 25 frequencies", lambda: frequency_response(model, frequencies, 0.5, FRICTION), "", "1000")
 
 
 def large() -> None:
@@ -82,16 +87,15 @@ def large() -> None:
     for mesh, pairs, frequency, wanted in ((4, 160, 210.75, ""), (6, 336, 210.0, "60 s")):
         built = measure(lambda mesh=mesh: scene("dovetail_sector", mesh=mesh))
         found = measure(lambda: march_wear(built.result, frequency, 0.5, FRICTION, WEAR, CYCLES))  # noqa: B023
-        TABLE.row(f"scene of {pairs} pairs", built.seconds, built.seconds / UNIT, None, None, None)
-        spent = built.seconds + found.seconds
-        TABLE.row(f"the same and a history, {frequency} Hz", spent, spent / UNIT, wanted, found.iterations, None)
+        row(f"scene of {pairs} pairs", built.seconds)
+        row(f"the same and a history, {frequency} Hz", built.seconds + found.seconds, wanted, found.iterations)
 
 
 def run(n_ranks: int, folder: Path) -> tuple[float, float]:
     """Wall and CPU seconds of the default study on so many ranks."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    command = [MPIEXEC, "-n", str(n_ranks), RUN_STUDY, "--fresh", "--overwrite", "-o", folder / "out.nc"]
-    subprocess.run(command, check=True, capture_output=True)
+    command = [*launcher(n_ranks), Path(sys.executable).with_name("run-study"), "--fresh", "--overwrite"]
+    subprocess.run([*command, "-o", folder / "out.nc"], check=True, capture_output=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.perf_counter() - began, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
@@ -102,7 +106,7 @@ def study() -> None:
         run(2, Path(name))  # fills the caches
         times = [(run(1, Path(name)), run(2, Path(name))) for _ in range(REPEATS)]
     (wall, spent), (both, _) = (min(each) for each in zip(*times, strict=True))
-    TABLE.row("default study, one rank", spent, spent / UNIT, "900", None, None)
+    row("default study, one rank", spent, "900")
     TABLE.row(f"two ranks over one, {both:.0f} over {wall:.0f} s", None, both / wall, "0.55", None, None)
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
     TABLE.row("largest memory of a rank, MiB", None, peak, None, None, None)

@@ -12,20 +12,15 @@ volume and tip amplitude of the bundled dovetail root; `--single 16000` takes th
   the increment of u_T over a step along lambda_T, zero inside the cone. Newton's method on the set of open, sticking
   and slipping pairs.
 - Wear: the depth of a pair grows after each period by k_w / area times the sum of lambda_N |increment of u_T|, times
-  the cycles for which a period stands. There are no jumps after which the motion settles anew: jumps of 500 and 1000
-  cycles leave friction histories that scatter (dovetail, mesh 1, 212.42 Hz: 1.868 to 1.910 mm3).
+  the cycles for which a period stands, without jumps after which the motion would have to settle anew.
 - The first mode of the glued joint dies out slowly, in some 300 periods. While the joint wears, and while an unworn
   motion settles, its complex amplitude goes several times as far in each period as by itself (projective integration,
-  Gear and Kevrekidis, SIAM J. Sci. Comput. 24 (2003) 1091), at most the cycles for which the period stands; all else
-  follows in a few periods. The motion lags behind the wear: at first an error as the cycles of a period, at the end of
-  the wear less (1e5 cycles, 40 and 20 cycles a period: 1.8830 and 1.8824 mm3 at 212.42 Hz, 0.7306 and 0.7204 at 213 Hz;
-  250 or 500 steps differ by 0.01 %). A worn joint has another resonance; where the mode beats, fewer periods are taken
-  in one. Without this the dovetail with 48 pairs went from a tip of 1.5 to one of 3 mm at 211.75 Hz. A motion that does
-  not settle ends the run.
+  Gear and Kevrekidis, SIAM J. Sci. Comput. 24 (2003) 1091), at most the cycles for which the period stands, and fewer
+  where the mode beats. The motion lags behind the wear: 1e5 cycles, 40 and 20 cycles a period: 1.8830 and 1.8824 mm3 at
+  212.42 Hz, 0.7306 and 0.7204 at 213 Hz; 250 or 500 steps differ by 0.01 %.
 - The friction history of sticking pairs converges more slowly than the volume, as the root of the cycles of a period:
-  at 212.5 Hz, 16 000 cycles, a pair that sticks is 0.20, 0.11, 0.06 um from its place with 20, 5, 1.5 cycles a period,
-  and it has moved 3 um (with 15 periods in one of the mode in each case). Where a pair only just slips this decides:
-  there, `--single 16000` takes the first cycles one by one, without projection.
+  at 212.5 Hz, 16 000 cycles, a pair that sticks is 0.20, 0.11, 0.06 um from its place with 20, 5, 1.5 cycles a period.
+  Where a pair only just slips this decides: there, `--single 16000` takes the first cycles one by one.
 """
 
 import time
@@ -37,6 +32,9 @@ import scipy.linalg
 from numba import njit
 
 from solver.model import ComplexArray, FloatArray, ReducedModel
+from studies import build_scene
+from tests.benchmarks.frame import Table, arguments
+from tests.benchmarks.ring_of_sectors import ring_of_sectors
 
 _LOAD_STEPS = 20  # of the static load
 _CONTACT_ITERATIONS = 90
@@ -364,10 +362,6 @@ def first_harmonic(structure: Structure, motion: Motion, rows: FloatArray) -> np
 
 def main() -> None:
     """Worn volume and tip of the dovetail root."""
-    from studies import build_scene
-    from tests.benchmarks.frame import arguments
-    from tests.benchmarks.ring_of_sectors import ring_of_sectors
-
     given = arguments(
         __doc__, mesh=1, steps=250, periods=1000, sectors=47, diameter=0, frequency=212.42, each=20.0, single=0.0,
         cycles=1e5, amplitude=0.5, friction=0.5, approach="up",
@@ -382,17 +376,18 @@ def main() -> None:
     began = time.process_time()
     structure, motion = loaded(model, given.friction, course, given.steps)
     rows = np.real(model.linear[0].response)
+    table = Table("cycles", "tip, mm", "worn, mm3", "slip work, J", "CPU s")
 
-    def say(what: str, now: Motion, more: str) -> None:
-        tip, spent = 1e3 * abs(first_harmonic(structure, now, rows)[0]), time.process_time() - began
-        print(f"{what}, tip {tip:.4f} mm, {more}, {spent:.0f} CPU s", flush=True)
+    def row(cycle: float, now: Motion, depth: FloatArray) -> None:
+        numbers = (1e9 * depth @ model.contact.area / n_apart, now.work.sum() / n_apart, time.process_time() - began)
+        table.row(f"{cycle:.0f}", 1e3 * float(abs(first_harmonic(structure, now, rows)[0])), *map(float, numbers))
 
-    say("unworn", motion, f"slip work {motion.work.sum() / n_apart:.4e} J")
+    row(0.0, motion, np.zeros(model.contact.n_contact))
     shown = 0.05 * given.cycles
     for cycle, depth, now in wear(model, structure, motion, 1.1e-11, given.each, given.cycles, given.single):
         if cycle >= shown * (1.0 - 1e-12):
             shown += 0.05 * given.cycles
-            say(f"{cycle:8.0f} cycles", now, f"worn {1e9 * depth @ model.contact.area / n_apart:.4f} mm3")
+            row(cycle, now, depth)
 
 
 if __name__ == "__main__":

@@ -1,43 +1,33 @@
 """Small models for the tests of the solver, all seeded, and the textbook and dovetail scenes at a small size."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
 
-from solver.continuation.arc_length import Arc
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.loading_history.start_states import follow_branch
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
 from solver.newton.run import Run
-from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.results.history import PeriodicState, StartState, WearHistory
-from solver.results.state_report import periodic_state
+from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
-from solver.structure.joint import Case, Joint, build_case
+from solver.structure.joint import Case, build_case
 from solver.wear.history import integrate_together
 from solver.wear.integrate import SlowTime
 from solver.wear.step import steps_of
 from studies.scenes import build_scene, scene_parameters
+from tests.random_scenes import COMPONENTS
 
 STIFFNESS = 1e7  # N/m
 MASS = 5.0  # kg
 PRELOAD = 100.0  # N on a pair
 OMEGA = 600.0  # rad/s, below the first natural frequencies of the random models
-COMPONENTS = {
-    "3d": (0, 1, 2),
-    "one_tangent": (0, 1),
-    "second_tangent": (0, 2),
-    "normal_only": (0,),
-    "constant_load": (1, 2),
-    "constant_load_one_tangent": (1,),
-}
 
 
 def definite(random: np.random.Generator, size: int, complex_values: bool = False) -> np.ndarray:
@@ -70,9 +60,10 @@ def random_contact(random: np.random.Generator, kinds: Sequence[str], n_inner: i
 
 
 def random_linear(
-    random: np.random.Generator, contact: ContactInterface, n: int, hermitian: bool = False
+    random: np.random.Generator, contact: ContactInterface, n_inner: int, hermitian: bool = False
 ) -> LinearModel:
     """Elastic joint with little mass of its own, pressed on its pairs, excited everywhere, damped, two responses."""
+    n = int((contact.dofs >= 0).sum()) + n_inner
     stiffness = STIFFNESS * definite(random, n, hermitian)
     load_static = 0.05 * PRELOAD * random.normal(size=n)
     closing = contact.dofs[:, 0]
@@ -96,8 +87,7 @@ def random_model(seed: int, kinds: Sequence[str] = ("3d", "3d", "3d"), n_inner: 
     """Random structure with preloaded pairs."""
     random = np.random.default_rng(seed)
     contact = random_contact(random, kinds, n_inner)
-    n = int((contact.dofs >= 0).sum()) + n_inner
-    return ReducedModel({0: random_linear(random, contact, n)}, contact, ("first", "second"))
+    return ReducedModel({0: random_linear(random, contact, n_inner)}, contact, ("first", "second"))
 
 
 def with_free_masses(model: ReducedModel, pairs: Sequence[int]) -> ReducedModel:
@@ -124,11 +114,8 @@ def cyclic_model(
     """Sector whose structures at different nodal diameters have nothing in common: an index mixed up is seen."""
     random = np.random.default_rng(seed)
     contact = random_contact(random, kinds, 4)
-    n = int((contact.dofs >= 0).sum()) + 4
-    linear = {
-        k: random_linear(random, contact, n, hermitian=k > 0)
-        for k in needed_nodal_diameters(nodal_diameter, n_sectors, n_harmonics)
-    }
+    waves = needed_nodal_diameters(nodal_diameter, n_sectors, n_harmonics)
+    linear = {k: random_linear(random, contact, 4, hermitian=k > 0) for k in waves}
     return ReducedModel(linear, contact, ("first", "second"), n_sectors, nodal_diameter)
 
 
@@ -138,17 +125,14 @@ def random_balance(
     seed: int,
     *,
     wear: bool,
-    friction: float = 0.4,
-    amplitude: float = 60.0,
     resolution: Resolution | None = None,
 ) -> tuple[Balance, FloatArray]:
     """Balance with a history that is not zero, and a predicted force at which pairs stick, slip and open."""
     random = np.random.default_rng(seed)
     resolution = resolution or first_resolution(settings)
-    case = build_case(model, friction, OMEGA, settings, resolution)
-    joint = case.joint(OMEGA, amplitude)
+    joint = build_case(model, 0.4, OMEGA, settings, resolution).joint(OMEGA, 60.0)
     n_contact = model.contact.n_contact
-    history = 0.3 * friction * PRELOAD / joint.penalty.tangential[:, None] * random.normal(size=(n_contact, 2))
+    history = 0.12 * PRELOAD / joint.penalty.tangential[:, None] * random.normal(size=(n_contact, 2))
     history[model.contact.dofs[:, 1:] < 0] = 0.0
     # so much wear in a step that its part of the Jacobian is as large as the others
     gain = random.uniform(0.1, 0.3, n_contact) / PRELOAD if wear else np.zeros(n_contact)
@@ -189,40 +173,7 @@ def first_point(case: Case, omega: float, amplitude: float, wear_depth: FloatArr
     """State found from nothing, which must exist; its parameter is the share 1 of the excitation."""
     point = solve_first_state(case, omega, amplitude, wear_depth, Run(case.settings.tolerance))
     assert isinstance(point, State)
-    assert point is not None
     return point
-
-
-def crossings(arc: Arc, target: float, toward: float = 0.0) -> Iterator[State]:
-    """States at which a branch passes a value of its parameter, the start left out."""
-    for before, reached, _ in arc.steps(toward or float(np.sign(target - arc.start.parameter))):
-        if (reached.parameter - target) * (before.parameter - target) <= 0.0 and before.parameter != target:
-            found = arc.state_at(before, reached, target)
-            assert found is not None
-            yield found
-
-
-def converged_state(
-    model: ReducedModel, friction: float, amplitude: float, omega: float, settings: SolverSettings, sweep: str = "up"
-) -> PeriodicState:
-    """The one state at an angular frequency, rad/s."""
-    (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
-    assert start.state is not None, start.outcome
-    return start.state
-
-
-def start_state(joint: Joint, point: State, iterations: int = 0) -> StartState:
-    """A state as a march takes it up, its errors not estimated."""
-    return StartState(
-        outcome=Outcome.CONVERGED,
-        state=periodic_state(joint, point),
-        penalty_omega=joint.omega,
-        resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
-        response_error=np.nan,
-        wear_rate_error=np.nan,
-        newton_iterations=iterations,
-        run_time=0.0,
-    )
 
 
 def march_wear(
@@ -251,3 +202,10 @@ def glued_frequency(model: ReducedModel) -> float:
     inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs.ravel())
     values = eigh(linear.stiffness[np.ix_(inner, inner)], linear.mass[np.ix_(inner, inner)], eigvals_only=True)
     return float(np.sqrt(values[0]) / (2.0 * np.pi))
+
+
+def assert_same(one: Any, other: Any) -> None:
+    """Two results are equal to the last bit, but for the time that they took."""
+    for entry in fields(other):
+        if entry.name != "run_time":
+            np.testing.assert_array_equal(getattr(one, entry.name), getattr(other, entry.name), entry.name)

@@ -1,6 +1,7 @@
 """What a periodic state must satisfy, from the full matrices of its model and the plain contact law.
 
-Nothing here passes through the condensed structure, the kernels or the penalty of the solver.
+Nothing here passes through the condensed structure, the kernels or the penalty of the solver. The law is written from
+Eqs. (11)-(15) in the convention of the project.
 """
 
 from dataclasses import dataclass
@@ -50,15 +51,12 @@ def series(values_h: FloatArray, n_samples: int) -> FloatArray:
 class FullMotion:
     """Motion of the whole structure that has the relative displacements of a state.
 
-    displacement[n] (n_displacements,): complex amplitudes of harmonic n, m. imbalance[n]: N, what is missing from
-    equilibrium under the loads and the contact force of the state; `force`, N, is the largest of those.
+    displacement[n] (n_displacements,): complex amplitudes of harmonic n, m.
     """
 
     model: ReducedModel
     state: PeriodicState
     displacement: tuple[ComplexArray, ...]
-    imbalance: tuple[float, ...]
-    force: float
 
     def excitation_work(self) -> float:
         """Work of the excitation over a period, J."""
@@ -81,29 +79,19 @@ class FullMotion:
 
 def full_motion(model: ReducedModel, state: PeriodicState) -> FullMotion:
     """Motion of the whole structure; relative displacements are given: a static structure may be free to slide."""
-    n_harmonics = (state.displacement_h.shape[2] - 1) // 2
     exists = model.contact.dofs >= 0
-    relative = model.contact.dofs[exists]
-    moved, imbalance, largest = [], [], 0.0
-    for n in range(n_harmonics + 1):
+    relative, moved = model.contact.dofs[exists], []
+    for n in range((state.displacement_h.shape[2] + 1) // 2):
         linear = harmonic_structure(model, n)
         matrix = linear.stiffness + 1j * n * state.omega * linear.damping - (n * state.omega) ** 2 * linear.mass
-        load = np.zeros(matrix.shape[0], complex)
-        if n == 0:
-            load += linear.load_static
-        if n == 1:
-            load += state.excitation_amplitude * linear.load_harmonic
-        load[relative] -= amplitudes(state.contact_force_h, n)[exists]
-        whole = np.zeros(matrix.shape[0], complex)
+        load = {0: linear.load_static, 1: state.excitation_amplitude * linear.load_harmonic}.get(n, 0.0 * matrix[0])
+        whole = np.zeros(len(matrix), complex)
         whole[relative] = amplitudes(state.displacement_h, n)[exists]
         inner = np.setdiff1d(np.arange(whole.size), relative)
         if inner.size:
-            right = (load - matrix @ whole)[inner]
-            whole[inner] = np.linalg.solve(matrix[np.ix_(inner, inner)], right)
+            whole[inner] = np.linalg.solve(matrix[np.ix_(inner, inner)], (load - matrix @ whole)[inner])
         moved.append(whole)
-        imbalance.append(float(np.abs(matrix @ whole - load).max()))
-        largest = max(largest, float(np.abs(load).max()), float(np.abs(state.contact_force_h).max()))
-    return FullMotion(model, state, tuple(moved), tuple(imbalance), largest)
+    return FullMotion(model, state, tuple(moved))
 
 
 def contact_work(state: PeriodicState, force_t: FloatArray) -> float:
@@ -114,3 +102,57 @@ def contact_work(state: PeriodicState, force_t: FloatArray) -> float:
         rate_h[..., 2 * n] = -n * state.omega * state.displacement_h[..., 2 * n - 1]
     n_samples = force_t.shape[2]
     return float((force_t * series(rate_h, n_samples)).sum() * 2.0 * np.pi / state.omega / n_samples)
+
+
+# --- the contact law once more, slow and plain ---
+
+
+def project(force: FloatArray, radius: float) -> FloatArray:
+    """Point of the Coulomb disc nearest to a tangential force (2,)."""
+    size = float(np.hypot(*force))
+    return force if size <= radius else force * (radius / size)
+
+
+def pair_period(predicted: FloatArray, friction: float, slip: FloatArray, passes: int) -> tuple[FloatArray, FloatArray]:
+    """Contact force (3, N) and slip at the N + 1 ends of the samples (2, N + 1) of the last of some passes.
+
+    predicted (3, N), N. slip (2,): at the start, in force units. A spring of unit stiffness ties the slider to the
+    predicted force: what it pulls beyond the disc moves the slider.
+    """
+    force = np.zeros_like(predicted)
+    trace = [np.array(slip, float)]
+    for _ in range(passes):
+        trace = [trace[-1]]
+        for n in range(predicted.shape[1]):
+            pull = predicted[1:, n] - trace[-1]
+            force[0, n] = max(predicted[0, n], 0.0)
+            force[1:, n] = project(pull, friction * force[0, n])
+            trace.append(trace[-1] + (pull - force[1:, n]))
+        if np.array_equal(trace[-1], trace[0]):
+            break  # all further passes are the same
+    return force, np.array(trace).T
+
+
+def status(predicted: FloatArray, friction: float, slip: FloatArray) -> FloatArray:
+    """0 separated, 1 stick, 2 slip, by the states before each sample (2, N); N integers."""
+    pull = np.hypot(*(predicted[1:] - slip))
+    return np.where(predicted[0] <= 0, 0, np.where(pull < friction * predicted[0], 1, 2))
+
+
+def mass_period(
+    predicted: FloatArray, limit: FloatArray, mass: float, drag: float, step: float, passes: int = 4
+) -> tuple[FloatArray, FloatArray]:
+    """Friction force and velocity (2, N) of `m v' + c v = p(t) - lambda`, |lambda| <= limit(t), in the last of some
+    periods from rest, by implicit Euler steps, s.
+
+    predicted (2, N), N, and limit (N,), N, at the middles of the steps. The force is the one on the disc that is
+    nearest to what would stop the mass.
+    """
+    force, moved, velocity = np.zeros((2, limit.size)), np.zeros((2, limit.size)), np.zeros(2)
+    for _ in range(passes):
+        for n in range(limit.size):
+            stopping = predicted[:, n] + mass / step * velocity
+            force[:, n] = project(stopping, limit[n])
+            velocity = (stopping - force[:, n]) / (mass / step + drag)
+            moved[:, n] = velocity
+    return force, moved

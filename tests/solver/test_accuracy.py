@@ -1,48 +1,140 @@
-"""Automatic harmonics and samples against exact motions, and the convergence of the marched mass with harmonics."""
+"""Automatic states against exact motions: as accurate as was asked for, errors not played down."""
 
 import numpy as np
 import pytest
 
-from solver.settings import SolverSettings
-from tests.solver.exact import errors_of, slider, states, two_masses
+from solver.accuracy.resolved_state import ResolvedState
+from solver.harmonic_balance.state import largest_responses
+from solver.newton.run import Run
+from solver.outcome import Outcome
+from solver.settings import Resolution, SolverSettings
+from solver.structure.fourier import synthesis
+from solver.structure.joint import build_case
+from tests.cantilever import FRICTION, Cantilever
+from tests.references import den_hartog_amplitude
+from tests.solver.exact_scenes import (
+    KINDS,
+    SPRINGS,
+    behind_spring,
+    drawn,
+    exact_tip,
+    find,
+    reported_tip,
+    textbook_scenes,
+    wall,
+)
+from tests.solver.models import branch_states, first_point, scene
 
-STATES = states()
+SCENES = textbook_scenes()
+
+
+def barely_slipping(tangential, damping, omega, over):
+    """Elastic dry friction whose limit is exceeded by a share `over` if it sticks."""
+    stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
+    return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(0.7j))
+
+
+HARD = {
+    # in contact for 2 % of the period: up to nine harmonics, each next one changes less than a tenth of the error
+    "short contact": wall(0.39251, 1.17792, 0.04593, 85.95555),
+    # with three harmonics there is a state that no exact motion is like, but the one with a single harmonic is
+    "spurious state": wall(1.67268, 0.52004, 0.19517, 84.16794),
+    # the wall is touched, or the friction limit is exceeded, between two of 64 samples only
+    "touch between samples": wall(0.30277, 1.09583, 0.13481, 24.17409),
+    "slip between samples": barely_slipping(3.15541, 0.09326, 1.2, 1.3e-4),
+    "slip in one sample": barely_slipping(0.27652, 0.055, 0.8, 2.6e-4),
+    # what is next to the turns among some samples is so among twice as many
+    "nested samples": barely_slipping(0.36178, 0.032, 0.9, 3e-5),
+}
+
+
+def check(scene, rtol, sweep):
+    found = find(scene, SolverSettings(rtol=rtol), sweep)
+    assert found.outcome is Outcome.CONVERGED
+    assert max(found.response, found.wear_rate) <= rtol, found
+    assert found.safe, found
+    return found
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "rtol"), [*((name, 1e-3) for name in STATES), *((name, 1e-2) for name in list(STATES)[::4])]
-)
-def test_an_automatic_state_is_as_accurate_as_was_asked_for(name, rtol):
-    exact = STATES[name]()
-    errors = errors_of(exact, SolverSettings(rtol=rtol))
-    assert errors.accurate
-    assert errors.amplitude < rtol
-    assert errors.response < rtol
-    assert errors.wear < rtol
-    assert errors.estimate.largest <= rtol
-    assert errors.safe, errors
-    if "open" not in name:
-        # a test of a state that is trivial would say nothing
-        assert errors.response > 1e-7
-
-
-def test_a_smaller_tolerance_takes_more_harmonics_or_samples():
-    for exact in (slider(10.0, 0.6), two_masses(0.4)):
-        coarse, fine = (errors_of(exact, SolverSettings(rtol=rtol)) for rtol in (1e-2, 1e-3))
-        assert fine.orders[-1] > coarse.orders[-1]
-        assert fine.samples >= coarse.samples
-        assert fine.response < coarse.response
+@pytest.mark.parametrize(("name", "rtol"), [(name, (1e-3, 1e-2)[n % 2]) for n, name in enumerate(SCENES)])
+def test_a_textbook_state_is_as_accurate_as_was_asked_for(name, rtol):
+    found = check(SCENES[name][0], rtol, SCENES[name][1])
+    assert max(found.response_estimate, found.wear_rate_estimate) <= rtol
+    # a test of a state that is trivial would say nothing
+    assert "open" in name or found.response > 1e-7
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "harmonics"), [("slider 10.0 N 0.9", [1, 3, 5, 9, 15]), ("two masses 0.5", [3, 5, 9, 15])]
-)
+@pytest.mark.parametrize(("name", "harmonics"), [("slider 10.0 N 0.9", [1, 3, 5, 9]), ("two masses 0.5", [3, 5, 9])])
 def test_states_converge_with_the_square_of_the_harmonics_at_least(name, harmonics):
-    exact = STATES[name]()
-    found = [errors_of(exact, SolverSettings(harmonics=n, samples=8192)) for n in harmonics]
-    for errors in ([each.response for each in found], [each.wear for each in found]):
+    found = [find(SCENES[name][0], SolverSettings(harmonics=n, samples=4096)) for n in harmonics]
+    for errors in ([each.response for each in found], [each.wear_rate for each in found]):
         assert np.polyfit(np.log(harmonics), np.log(errors), 1)[0] < -2.0
         assert errors == sorted(errors, reverse=True)
     assert found[0].response < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "seed", "rtol"), [(kind, *((2, 1e-2), (4, 1e-3))[n % 2]) for n, kind in enumerate(KINDS)]
+)
+def test_a_random_state_is_accurate_and_its_error_not_played_down(kind, seed, rtol):
+    scene, sweep = drawn(kind, seed), "up" if seed % 4 else "down"
+    if (kind, seed) == ("grazing", 2):
+        # its motion has a multiplier of -1.33, exactly (`test_floquet`): no mass stays at it
+        assert find(scene, SolverSettings(rtol=rtol), sweep).outcome is Outcome.PERIOD_DOUBLED
+    else:
+        check(scene, rtol, sweep)
+
+
+@pytest.mark.parametrize("name", HARD)
+def test_events_shorter_than_a_sample_or_a_harmonic_are_seen(name):
+    check(HARD[name], 1e-2, "up")
+
+
+# --- rigid friction at the tip of a cantilever, and the peak of a response ---
+
+CANTILEVERS = [  # spring, force, N, frequency, rad/s, rtol; `python -m tests.benchmarks.accuracy` has more
+    ("rigid", 3.0, 0.7, 1e-2),
+    ("soft spring", 3.0, 1.0, 1e-3),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "force", "omega", "rtol"), CANTILEVERS)
+def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(name, force, omega, rtol):
+    model, settings = Cantilever(spring=SPRINGS[name]).model(), SolverSettings(rtol=rtol)
+    (start,) = branch_states(model, FRICTION, force, [omega], settings)
+    assert start.outcome is Outcome.CONVERGED
+    first, peak = exact_tip(name, force, omega)
+    found, largest = reported_tip(model, start, settings)
+    error, peak_error = abs(found / first - 1.0), abs(largest / peak - 1.0)
+    assert 1e-8 < error < rtol
+    assert peak_error < rtol
+    assert 0.5 * max(error, peak_error) < start.response_error <= rtol
+
+
+def test_the_tail_of_the_friction_force_belongs_to_the_peak():
+    omega, settings = 0.62 * float(np.sqrt(1.6e6)), SolverSettings(harmonics=9, samples=512)
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    case = build_case(model, 0.5, omega, settings)
+    at = first_point(case, omega, 10.0, np.zeros(1)).evaluation
+    joint = case.joint(omega, 10.0)
+    exact_peak = den_hartog_amplitude(0.1, 1.6e5, 10.0, 5.0, omega)
+    series = np.abs(at.displacement_h[0, 1] @ synthesis(joint.basis.orders, np.linspace(0.0, 2.0 * np.pi, 1025))).max()
+    assert abs(series / exact_peak - 1.0) > 1e-3
+    assert largest_responses(joint, at) == pytest.approx([exact_peak], rel=1e-4)
+
+
+@pytest.mark.slow
+def test_a_state_is_found_again_where_its_mass_is_no_longer_marched():
+    beam, omega, force = Cantilever(spring=200.0), 0.85, 6.0
+    rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (79, 27))
+    case = build_case(beam.model(), FRICTION, omega, SolverSettings(), rich)
+    point = first_point(case, omega, force, np.zeros(1))
+    level = ResolvedState(case, case.joint(omega, force), point)
+    other = level.solve_at(poor, Run(case.settings.tolerance))
+    assert case.penalty.inertial[0] != other.case.penalty.inertial[0]
+    for each in (level, other):
+        assert abs(each.response()[0] / exact_tip("stiff spring", force, omega)[0] - 1.0) < 0.02

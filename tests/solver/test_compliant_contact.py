@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from solver import frequency_response, march_wear, with_contact_stiffness
-from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, TANGENTIAL_RATIO
+from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS as LARGEST
+from solver.compliant_contact import TANGENTIAL_RATIO
 from solver.structure.condensation import build_structure, relative_indices
 from studies import build_scene
 from tests.references import den_hartog_amplitude, slider_wear_depth
@@ -14,8 +15,7 @@ KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
 SOFT = 2e11  # N/m3; with the areas of the models about their stiffness
 
 
-@pytest.mark.parametrize("contact_stiffness", [1e-3 * SOFT, SOFT, 1e4 * SOFT, LARGEST_CONTACT_STIFFNESS])
-@pytest.mark.parametrize("wave", [False, True])
+@pytest.mark.parametrize(("wave", "contact_stiffness"), [(False, SOFT), (True, 1e-3 * SOFT), (False, LARGEST)])
 def test_contact_forces_move_the_contact_by_the_springs_more(wave, contact_stiffness):
     rigid = cyclic_model(9, KINDS, 6, 2, 5) if wave else random_model(1, KINDS, 4)
     soft = with_contact_stiffness(rigid, contact_stiffness)
@@ -40,18 +40,15 @@ def test_a_stuck_block_on_its_foundation_is_a_mass_on_two_springs():
     contact_stiffness = 5e9
     block = build_scene("sdof_slider", normal_load=1e6, normal_stiffness=0.0, contact_stiffness=contact_stiffness)
     spring = 1.6e5 + TANGENTIAL_RATIO * contact_stiffness * 1e-4
-    for frequency in (160.0, 300.0):
-        found = frequency_response(block, frequency, 10.0, friction_coefficient=0.5).response[0, 0]
-        assert abs(found) == pytest.approx(10.0 / abs(spring - 0.1 * (2.0 * np.pi * frequency) ** 2), rel=1e-9)
+    found = frequency_response(block, 300.0, 10.0, friction_coefficient=0.5).response[0, 0]
+    assert abs(found) == pytest.approx(10.0 / abs(spring - 0.1 * (2.0 * np.pi * 300.0) ** 2), rel=1e-9)
 
 
-@pytest.mark.parametrize("worn", [0.0, 2e-5])
-def test_a_spring_that_presses_gives_way_to_rough_surfaces(worn):
+def test_a_spring_that_presses_gives_way_to_rough_surfaces():
     """The force is divided by 1 + k_N / (contact stiffness times area), as the pages of the scene say."""
-    for contact_stiffness, share in ((None, 1.0), (2e10, 1.05)):
-        block = build_scene("sdof_slider", contact_stiffness=contact_stiffness)
-        found = march_wear(block, 160.0, 10.0, 0.5, 0.0, [0.0], wear_depth=[worn])
-        assert 1e-4 * found.mean_pressure[0, 0] == pytest.approx((10.0 - 1e5 * worn) / share, rel=1e-9)
+    block = build_scene("sdof_slider", contact_stiffness=2e10)
+    found = march_wear(block, 160.0, 10.0, 0.5, 0.0, [0.0], wear_depth=[2e-5])
+    assert 1e-4 * found.mean_pressure[0, 0] == pytest.approx((10.0 - 1e5 * 2e-5) / 1.05, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -86,7 +83,7 @@ def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series():
     assert history.wear_depth[:, 0] == pytest.approx(expected, rel=5e-3)
 
 
-@pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf, 1e23])
+@pytest.mark.parametrize("wrong", [0.0, np.nan, 1e23])
 def test_a_contact_stiffness_that_cannot_be_is_said(wrong):
     with pytest.raises(ValueError, match="give a positive number, at most 1e"):
         with_contact_stiffness(random_model(1, KINDS, 4), wrong)

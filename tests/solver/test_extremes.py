@@ -14,13 +14,11 @@ from solver import build_model
 from solver.accuracy.certificate import certify
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
-from solver.outcome import COMPLETE as COMPLETE_OUTCOMES
-from solver.outcome import Outcome
+from solver.outcome import COMPLETE, Outcome
 from solver.results.state_report import evaluated
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
-from tests.references import slider_amplitude
-from tests.solver.models import OMEGA, dovetail, march_wear, random_model, scene
+from tests.solver.models import OMEGA, dovetail, glued_frequency, march_wear, random_model, scene
 
 SETTINGS = SolverSettings(harmonics=5, samples=64)
 BOUND = 60.0  # s of the processor for a case that takes a few at most: what is found is a hang, not a busy machine
@@ -104,22 +102,18 @@ def judge_start(case, start):
 
 def judge_history(case, start, history):
     numbers = ("wear_depth", "wear_rate", "worn_volume", "mean_pressure", "slip_range", "open_fraction")
-    numbers += ("response", "response_peak")
+    known = history.cycles <= history.last_cycle if not history.outcome.complete else np.full(history.cycles.size, True)
+    for name in (*numbers, "response", "response_peak"):
+        assert np.isfinite(getattr(history, name)[known]).all(), name
+        assert np.isnan(getattr(history, name)[~known]).all(), name
     if not history.outcome.complete:
-        behind = ~(history.cycles <= history.last_cycle)
-        for name in numbers:
-            assert np.isnan(getattr(history, name)[behind]).all(), f"{name} has numbers behind the last cycle"
-            assert np.isfinite(getattr(history, name)[~behind]).all(), f"{name} has lost numbers"
         assert start.outcome is Outcome.CONVERGED or history.outcome is start.outcome
         return
     for name in numbers:
-        assert np.isfinite(getattr(history, name)).all(), f"{name} is not finite where the outcome is converged"
-    for name in numbers[:-2]:
         # the mean normal force of a pair that opens and is loaded by its tangent alone is a rounded zero
-        size = np.abs(getattr(history, name)).max()
-        assert (getattr(history, name) >= -1e-12 * size).all(), f"{name} is negative"
-    assert (np.diff(history.wear_depth, axis=0) >= 0.0).all(), "wear falls"
-    assert (np.diff(history.worn_volume) >= 0.0).all(), "wear falls"
+        values = getattr(history, name)
+        assert (values >= -1e-12 * np.abs(values).max()).all(), name
+    assert (np.diff(history.wear_depth, axis=0) >= 0.0).all()
     assert (history.open_fraction <= 1.0).all()
 
 
@@ -132,50 +126,33 @@ def run_converged(case):
 
 
 BASES = {"elastic": elastic(), "block": block(), "slider": slider()}
-COMPLETE, ANY = (*COMPLETE_OUTCOMES,), None
+BLADE = Case(dovetail(), 2 * np.pi * 212.5, 0.5, 25.0, 1.1e-11, 3e3, 1e3, settings=SolverSettings(3, 64))
 # a first step that wears all load off is no answer
 OR_TOO_LONG = (*COMPLETE, Outcome.STEP_TOO_LONG)
-BLADE = Case(dovetail(), 2 * np.pi * 212.5, 0.5, 25.0, 1.1e-11, 3e3, 1e3, settings=SolverSettings(3, 64))
 
 
-def undamped(case, **changed):
+def undamped(case):
     linear = case.model.linear[0]
     without = replace(linear, damping=np.zeros_like(linear.damping))
-    return replace(case, model=replace(case.model, linear={0: without}), **changed)
-
-
-def held_resonance(case):
-    """Angular frequency of the first resonance with all pairs held, rad/s."""
-    linear = case.model.linear[0]
-    inner = np.setdiff1d(np.arange(len(linear.mass)), case.model.contact.dofs)
-    held = np.ix_(inner, inner)
-    return float(np.sqrt(np.linalg.eigvals(np.linalg.solve(linear.mass[held], linear.stiffness[held])).real.min()))
+    return replace(case, model=replace(case.model, linear={0: without}))
 
 
 def extreme_cases():
     """Name, case, and the outcomes that its history may have; None where also its first state may be missing."""
     for name, base in BASES.items():
-        for friction in (0.0, 2.0) if name != "slider" else ():
+        for friction, other in ((0.0, 0.05), (2.0, 2.0)) if name != "slider" else ():
             yield f"{name}, friction {friction}", replace(base, friction=friction), COMPLETE
-            scheme = "explicit"
-            friction = friction or 0.05
-            yield f"{name}, friction {friction}, {scheme}", replace(base, friction=friction, scheme=scheme), OR_TOO_LONG
-        yield f"{name}, wear 1e-3", replace(base, wear=1e-3 * base.wear), COMPLETE
+            yield f"{name}, friction {other}, explicit", replace(base, friction=other, scheme="explicit"), OR_TOO_LONG
         yield f"{name}, wear 1e2, explicit", replace(base, wear=1e2 * base.wear, scheme="explicit"), OR_TOO_LONG
         yield f"{name}, wear 1e4", replace(base, wear=1e4 * base.wear), OR_TOO_LONG
         yield f"{name}, 50 times the load", replace(base, amplitude=50.0 * base.amplitude), COMPLETE
-    # lightly damped on stiff ground: a motion of the period of the excitation need not be stable, nor be found
-    bouncing = block(lift=0.2)
-    yield "a block that bounces", bouncing, ANY
-    yield "a block that bounces high", replace(bouncing, amplitude=5.0 * bouncing.amplitude), ANY
-    yield "blade unseated", BLADE, (Outcome.CONVERGED,)
-    yield "blade, no load", replace(BLADE, amplitude=5e-5), (Outcome.CONVERGED,)
-    yield "no damping, at a resonance of the held structure", undamped(elastic(), omega=held_resonance(elastic())), ANY
+    yield "blade unseated", BLADE, COMPLETE
+    held = 2.0 * np.pi * glued_frequency(elastic().model)
+    yield "no damping, at a resonance of the held structure", replace(undamped(elastic()), omega=held), None
     yield "no damping, elastic", undamped(elastic()), COMPLETE
     yield "no damping, block", undamped(block()), COMPLETE
     # no load but a vibrating one on pairs that just touch: predicted forces whose squares underflow
-    for amplitude in (1e-160, 0.0):
-        yield f"{amplitude} N", replace(block(preload=0.0, lift=0.2), amplitude=amplitude), ANY
+    yield "1e-160 N", replace(block(preload=0.0, lift=0.2), amplitude=1e-160), None
 
 
 EXTREMES = {name: (case, outcomes) for name, case, outcomes in extreme_cases()}
@@ -186,9 +163,14 @@ EXTREMES = {name: (case, outcomes) for name, case, outcomes in extreme_cases()}
 def test_extreme_cases_end_honestly(name):
     case, outcomes = EXTREMES[name]
     start, history = run(case)
-    assert outcomes is ANY or start.outcome is Outcome.CONVERGED, start.outcome.sentence
-    assert outcomes is ANY or history.outcome in outcomes, history.outcome.sentence
-    assert name != "a block that bounces" or start.outcome is Outcome.CONVERGED
+    assert outcomes is None or start.outcome is Outcome.CONVERGED, start.outcome.sentence
+    assert outcomes is None or history.outcome in outcomes, history.outcome.sentence
+
+
+@pytest.mark.slow
+def test_a_block_that_bounces_has_a_state():
+    """Lightly damped on stiff ground."""
+    assert run(block(lift=0.2))[0].outcome is Outcome.CONVERGED
 
 
 @pytest.mark.slow
@@ -198,7 +180,7 @@ def test_so_small_a_load_is_held_by_friction(base):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ratio", [1e-8, 1e-4, 1e4, 1e8])
+@pytest.mark.parametrize("ratio", [1e-8, 1e4])
 def test_contact_stiffness_ratio(ratio):
     history = run_converged(block((1e7, 1e7 * ratio)))
     # the stiffer of two pairs on one rigid block carries the load
@@ -207,25 +189,23 @@ def test_contact_stiffness_ratio(ratio):
     assert np.argmax(carried) == int(ratio > 1.0)
 
 
-@pytest.mark.parametrize("friction_force", [9.0, 9.99])
-def test_friction_alone_bounds_an_undamped_resonance(friction_force):
+def test_friction_alone_bounds_an_undamped_resonance():
     # more than pi/4 of the force: Den Hartog; the work of the force is then less than what friction takes
-    case = replace(slider(0.0, 0.0, 10.0, 2 * np.pi * np.sqrt(1.6e6) / (2 * np.pi)), friction=friction_force / 10.0)
+    case = replace(slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6))), friction=0.9)
     history = run_converged(replace(case, settings=SolverSettings(11, 256)))
     assert history.response_peak[0, 0] < 10.0 / 1.6e5 * 20.0
 
 
-@pytest.mark.parametrize("friction_force", [0.0, 3.0, 7.0])
-def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force):
-    case = slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6)))
-    start, history = run(replace(case, friction=friction_force / 10.0))
+@pytest.mark.parametrize("friction", [0.0, 0.7])
+def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction):
+    start, history = run(replace(slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6))), friction=friction))
     if start.outcome is Outcome.CONVERGED:
         # round-off in the frequency is a detuning: then the motion is beyond all bounds that matter
         assert history.response_peak.max() > 1e3 * 10.0 / 1.6e5
 
 
-@pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
-def test_gaps_never_reached(base):
+def test_gaps_never_reached():
+    base = block()
     contact = replace(base.model.contact, gap=np.full(base.model.contact.n_contact, 1.0))
     history = run_converged(replace(base, model=replace(base.model, contact=contact)))
     assert not history.wear_depth.any()
@@ -234,33 +214,9 @@ def test_gaps_never_reached(base):
 
 
 @pytest.mark.slow
-def test_500_pairs():
+def test_hundreds_of_pairs():
     # one tangent each and a constant load: the same with closing displacements takes fifty times as long
     settings = SolverSettings(1, 32)
-    case = Case(random_model(3, ("constant_load_one_tangent",) * 500), OMEGA, amplitude=20.0, settings=settings)
+    case = Case(random_model(3, ("constant_load_one_tangent",) * 200), OMEGA, amplitude=20.0, settings=settings)
     history = run_converged(case)
-    assert 0 < (history.wear_depth[-1] > 0.0).sum() < 500
-
-
-def test_a_pair_that_is_worn_through_at_once_asks_for_shorter_steps():
-    # 33 N on 1e-9 m2 wear 4 cm in 200 cycles: many times what takes the pair out of reach
-    _, history = run(block((1e7, 1e7, 1e7), area=(1e-9, 1e-6, 1e-3)))
-    assert history.outcome is Outcome.STEP_TOO_LONG
-    assert history.last_cycle == 0.0
-
-
-def test_a_single_step_beyond_the_limit_is_told_by_the_limit_alone():
-    # the slider under a spring: one step too long takes all of the preload, nothing is left that could oscillate
-    base = slider()
-
-    def rate(depth):
-        normal = 10.0 - 1e5 * depth
-        amplitude = slider_amplitude(0.1, 0.0, 1.6e5, 10.0, 0.5 * normal, base.omega)
-        return 1.1e-11 / 1e-4 * 4.0 * normal * amplitude
-
-    exact = 2.0 / ((rate(-1e-8) - rate(1e-8)) / 2e-8)
-    assert exact == pytest.approx(5.4e5, rel=0.01)
-    # all steps are reported: as many as `run` has counts
-    history = run_converged(replace(base, scheme="explicit", step=2.5 * exact, cycles=12.5 * exact))
-    assert history.wear_depth[1, 0] > 1e-4, "more than the whole preload allows"
-    assert history.step_limit == pytest.approx(exact, rel=0.1)
+    assert 0 < (history.wear_depth[-1] > 0.0).sum() < 200

@@ -1,63 +1,65 @@
-"""Contact kernels against the law, a plain twin, differences, and themselves without compilation."""
+"""Contact kernels and the law of a joint: against twins, closed forms and themselves without compilation.
+
+`test_balance` has their derivatives.
+"""
 
 import os
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, mean_normal_force
-from solver.structure.fourier import build_basis
-from tests.solver import contact_twin
-from tests.solver.kernel_cases import BASIS, FRICTION, kernel_case, kernel_results, run_pairs
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, mean_normal_force, mean_normal_tangent
+from solver.contact.elastic_pairs import march_period, march_tangent, new_period
+from solver.contact.sliding_masses import Masses, march_masses, mass_tangent
+from solver.model import FloatArray, IntArray
+from solver.settings import Resolution, SolverSettings
+from solver.structure.fourier import FourierBasis, build_basis, to_complex
+from solver.structure.joint import build_case
+from tests.contact_pair import ContactPair
+from tests.solver.models import OMEGA, PRELOAD, random_model, with_free_masses
+from tests.solver.reconstruction import mass_period, pair_period, status
 
-number = st.integers(-(10**8), 10**8).map(lambda count: 1e-6 * count)  # N; no squares that underflow
-friction_coefficients = st.one_of(st.just(0.0), st.floats(0.01, 2.0))
+FRICTION = 0.4
+ORDERS = (1, 2, 3)
+BASIS, MASS_BASIS = build_basis(ORDERS, 20), build_basis(ORDERS, 32)
 
-
-@given(
-    normal=number, tangents=st.tuples(number, number), states=st.tuples(number, number), friction=friction_coefficients
-)
-def test_every_sample_obeys_signorini_and_coulomb(normal, tangents, states, friction):
-    pressure, *rest, status = contact_sample(normal, *tangents, friction, *states)
-    force, state = np.array(rest[:2]), np.array(rest[2:])
-    moved = state - np.array(states)
-    assert pressure == max(normal, 0.0)
-    assert np.linalg.norm(force) <= friction * pressure * (1 + 1e-15)
-    # the spring between predicted force and slider carries the force
-    assert force + state == pytest.approx(np.array(tangents), abs=1e-13)
-    if status == SEPARATED:
-        assert normal <= 0
-        assert not force.any()
-    elif status == STICK:
-        assert np.linalg.norm(force) < friction * pressure
-        assert not moved.any()
-    else:
-        assert status == SLIP
-        assert np.linalg.norm(force) == pytest.approx(friction * pressure, rel=1e-14, abs=1e-300)
-        # slip along the force
-        assert moved @ force == pytest.approx(np.linalg.norm(moved) * np.linalg.norm(force), rel=1e-9, abs=1e-9)
+# --- elastic pairs ---
 
 
-def assert_that_of_the_twin(case, found, pair, start, periods, tolerance):
-    force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, start, periods)
+def pairs_case(n_contact, n_samples, seed):
+    """Predicted force of pairs that stick, slip and open, and slip at the start; the last pair has a constant load."""
+    random = np.random.default_rng(seed)
+    predicted_h = random.normal(size=(n_contact, 3, 7)) * 10.0
+    predicted_h[:, 0, 0] = 15.0
+    predicted_h[-1, 0, 1:] = 0.0
+    return predicted_h @ build_basis(ORDERS, n_samples).synthesis, random.normal(size=(n_contact, 2)) * 5.0
+
+
+def run_pairs(predicted_t, start, periodicity, most_periods):
+    period = new_period(predicted_t, np.full(len(start), FRICTION), start)
+    march_period(np.arange(len(start)), period, periodicity, most_periods)
+    return period
+
+
+def assert_that_of_the_twin(predicted_t, found, pair, start, periods, tolerance):
+    force, slip = pair_period(predicted_t[pair], FRICTION, start, periods)
     assert found.force_t[pair] == pytest.approx(force, abs=tolerance)
     assert found.state_t[pair] == pytest.approx(slip, abs=tolerance)
-    assert np.array_equal(found.status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
+    assert np.array_equal(found.status_t[pair], status(predicted_t[pair], FRICTION, slip[:, :-1]))
     return slip
 
 
-@pytest.mark.parametrize("most_periods", [1, 2, 5])
+@pytest.mark.parametrize("most_periods", [1, 5])
 def test_displacement_level_is_that_of_the_plain_twin(most_periods):
-    case = kernel_case(4, 24, seed=1)
-    found = run_pairs(case.predicted_t, case.start, 0.0, most_periods)
+    predicted_t, start = pairs_case(4, 24, seed=1)
+    found = run_pairs(predicted_t, start, 0.0, most_periods)
     for pair in range(4):
-        slip = assert_that_of_the_twin(case, found, pair, case.start[pair], found.periods[pair], 1e-11)
+        slip = assert_that_of_the_twin(predicted_t, found, pair, start[pair], found.periods[pair], 1e-11)
         assert found.change[pair] == pytest.approx(np.linalg.norm(slip[:, -1] - slip[:, 0]), abs=1e-11)
     assert found.periods.max() <= most_periods
     assert {SEPARATED, STICK, SLIP} <= set(found.status_t.ravel())
@@ -72,64 +74,175 @@ def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient():
     predicted[0, 1] = amplitude * np.cos(2 * np.pi * np.arange(n) / n)
     found = run_pairs(predicted, np.full((1, 2), 3.0), 1e-12, 8)
     assert found.change[0] == pytest.approx(0, abs=1e-12)
-    expected = 4 * pressure * (amplitude - FRICTION * pressure)
-    assert found.slip_work[0] == pytest.approx(expected, rel=1e-12, abs=0.0)
-    # the loop of lambda_T over X_T is a rectangle: mu times the wear integral is the work
-    work = 0.5 * (found.force_t[0, 1] + np.roll(found.force_t[0, 1], 1)) @ np.diff(found.state_t[0, 0])
-    assert work <= FRICTION * expected * (1 + 1e-12)
+    assert found.slip_work[0] == pytest.approx(4 * pressure * (amplitude - FRICTION * pressure), rel=1e-12)
 
 
 def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples():
     # max(cos(t - 1) - 0.3, 0): closed for |t - 1| < a, cos a = 0.3
     a = np.arccos(0.3)
-    exact = np.array([(np.sin(a) - 0.3 * a) / np.pi, (a - 0.3 * np.sin(a)) / np.pi])
-    errors = []
+    exact = np.array([(np.sin(a) - 0.3 * a) / np.pi, (a - 0.3 * np.sin(a)) / np.pi * np.cos(1.0)])
     for samples in (32, 64, 128, 256):
         predicted_t = np.zeros((1, 3, samples))
         predicted_t[0, 0] = np.cos(2 * np.pi * np.arange(samples) / samples - 1.0) - 0.3
         force_h = mean_normal_force(predicted_t)[0] @ build_basis((1,), samples).analysis
-        errors.append(max(abs(force_h[0] - exact[0]), abs(force_h[1] - exact[1] * np.cos(1.0))))
-    # kinks of slope sin a: at most (2 pi / N)^2 sin a, two of them, over the period
-    assert all(
-        error < 2 * (2 * np.pi / n) ** 2 * np.sin(a) / np.pi
-        for error, n in zip(errors, (32, 64, 128, 256), strict=True)
-    )
-
-
-def slowly_closing(seed, n_contact=6):
-    """Pairs that slip along one direction and are pulled across it: what lies across closes by a little a period."""
-    case = kernel_case(n_contact, BASIS.n_samples, seed=seed)
-    predicted_h = case.predicted_h.copy()
-    predicted_h[:, 0] *= 0.3
-    predicted_h[:, 0, 0] = 20.0
-    predicted_h[:, 1:] *= 0.1
-    predicted_h[:, 1, 1] = np.linspace(8.4, 10.0, n_contact)
-    return replace(case, predicted_h=predicted_h, predicted_t=predicted_h @ BASIS.synthesis)
+        # kinks of slope sin a: at most (2 pi / N)^2 sin a, two of them, over the period
+        assert np.abs(force_h[:2] - exact).max() < 2 * (2 * np.pi / samples) ** 2 * np.sin(a) / np.pi
 
 
 @pytest.mark.parametrize("seed", [31, 33])
 def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed):
-    case = slowly_closing(seed)
-    found = run_pairs(case.predicted_t, case.start, 1e-9, 400)
+    """Pairs that slip along one direction and are pulled across it: what lies across closes by a little a period."""
+    random, n_contact = np.random.default_rng(seed), 6
+    predicted_h = random.normal(size=(n_contact, 3, 7))
+    predicted_h[:, 0] *= 3.0
+    predicted_h[:, 0, 0], predicted_h[-1, 0, 1:] = 20.0, 0.0
+    predicted_h[:, 1, 1] = np.linspace(8.4, 10.0, n_contact)
+    predicted_t, begin = predicted_h @ BASIS.synthesis, random.normal(size=(n_contact, 2)) * 5.0
+    found = run_pairs(predicted_t, begin, 1e-9, 400)
     assert (found.change <= 1e-9).all()
     slowest = 0
-    for pair in range(len(case.start)):
-        start, plain, left = case.start[pair], 1, 1.0
+    for pair in range(n_contact):
+        start, plain, left = begin[pair], 1, 1.0
         while left >= 1e-12:
-            _, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, start, 1)
+            _, slip = pair_period(predicted_t[pair], FRICTION, start, 1)
             left, start, plain = np.linalg.norm(slip[:, -1] - start), slip[:, -1], plain + 1
         slowest = max(slowest, plain)
-        assert_that_of_the_twin(case, found, pair, start, 1, 1e-6)
+        assert_that_of_the_twin(predicted_t, found, pair, start, 1, 1e-6)
     assert slowest > 40
     assert found.periods.max() < 20
 
 
+# --- masses on sliders ---
+
+
+@dataclass(frozen=True)
+class MassCase:
+    """Masses on sliders. line: 0 where there is the first tangent alone, 1 the second, -1 both."""
+
+    predicted_h: FloatArray
+    mass: FloatArray
+    line: IntArray
+    basis: FourierBasis = MASS_BASIS
+    omega: float = 3.0
+
+    @property
+    def masses(self):
+        step = 2.0 * np.pi / self.omega / self.basis.n_samples
+        return Masses(self.mass, 0.1 * self.mass * self.omega, self.line, step)
+
+    def run(self):
+        """The period; friction force (n_contact, 2, m) by harmonics."""
+        n_contact, predicted_t = len(self.mass), self.predicted_h @ self.basis.synthesis
+        predicted_t[:, 1:] = (self.predicted_h[:, 1:] * self.basis.step_mean) @ self.basis.synthesis
+        period = new_period(predicted_t, np.full(n_contact, FRICTION), np.zeros((n_contact, 2)))
+        march_masses(np.arange(n_contact), period, self.masses)
+        return period, (period.force_t[:, 1:] @ self.basis.analysis) / self.basis.step_mean
+
+
+def several_masses(seed):
+    """Six masses that stick, turn at once, slip and open; the last one has a constant normal force."""
+    random = np.random.default_rng(seed)
+    predicted_h = random.normal(size=(6, 3, 7)) * 4.0
+    predicted_h[:, 1:, 0] *= 0.1
+    predicted_h[:, 0] *= 2.0
+    predicted_h[:, 0, 0] = 15.0
+    predicted_h[-1, 0, 1:] = 0.0
+    line = np.arange(6) % 3 - 1
+    predicted_h[line == 0, 2] = 0.0
+    predicted_h[line == 1, 1] = 0.0
+    return MassCase(predicted_h, random.uniform(0.5, 2.0, 6), line)
+
+
+def one_mass(predicted_h, n_samples, line):
+    return MassCase(predicted_h[None], np.array([0.7]), np.array([line]), build_basis(ORDERS, n_samples))
+
+
+@pytest.mark.parametrize(("amplitude", "n_phases"), [(8.0, 3), (30.0, 2)])
+def test_a_line_is_that_of_the_exact_motion_to_second_order(amplitude, n_phases):
+    """A free mass on a slider under a constant normal load and a harmonic force: with stops and without."""
+    predicted_h = np.zeros((3, 7))
+    predicted_h[0, 0], predicted_h[1, 1] = 15.0, amplitude
+    case = one_mass(predicted_h, 64, 0)
+    mass, drag = float(case.mass[0]), float(case.masses.drag[0])
+    given = [[mass]], [[drag]], [[0.0]], [0.0], [amplitude]
+    pair = ContactPair(*given, None, 0, 15.0, 0.0, FRICTION, case.omega)
+    orbit = pair.orbit_from_rest(20)
+    assert len({segment.phase for segment in orbit.segments}) == n_phases
+    rates = 1j * case.omega * np.array(ORDERS)
+    moved = np.array([orbit.harmonic(0, order) for order in ORDERS])
+    exact, work = np.array([amplitude, 0.0, 0.0]) - (rates * mass + drag) * rates * moved, pair.slip_work(orbit)
+    samples, errors = np.array([32, 64, 128, 256, 512, 1024, 2048]), []
+    for n_samples in samples.tolist():
+        period, force_h = one_mass(predicted_h, n_samples, 0).run()
+        error = np.abs(to_complex(force_h[0, 0]) - exact).max() / np.abs(exact).max()
+        errors.append((error, abs(period.slip_work[0] / work - 1.0)))
+    for each in np.array(errors).T:
+        # events fall anywhere in their steps, so the errors scatter about their order
+        assert np.polyfit(np.log(samples), np.log(each), 1)[0] < -1.6
+        assert (each < 80.0 / samples**2).all()
+
+
+@pytest.mark.parametrize(("seed", "line"), [(1, -1), (2, -1), (2, 0)])
+def test_a_mass_moves_as_in_a_plain_twin_with_tiny_steps(seed, line):
+    n_steps, random = 8192, np.random.default_rng(seed)
+    predicted_h = random.normal(size=(3, 7)) * 4.0
+    predicted_h[0, 0], predicted_h[2, :] = 15.0, predicted_h[2] if line < 0 else 0.0
+    predicted_h[1:, 0] *= 0.1
+    fine = one_mass(predicted_h, n_steps, line)
+    predicted, step, mass, drag = (
+        predicted_h @ fine.basis.synthesis,
+        fine.masses.step,
+        fine.mass[0],
+        fine.masses.drag[0],
+    )
+    normal = np.maximum(predicted[0], 0.0)
+    force, moved = mass_period(predicted[1:], FRICTION * normal, mass, drag, step)
+    expected, speed = force @ fine.basis.analysis, np.hypot(*moved)
+    assert 0.0 < (speed == 0.0).mean() < 0.9, "sticks and slips"
+    period, force_h = one_mass(predicted_h, n_steps // 8, line).run()
+    # the twin is of first order: 2 pi / N of the period, several times over
+    assert force_h[0] == pytest.approx(expected, abs=3e-3 * np.abs(expected).max())
+    assert period.slip_work[0] == pytest.approx((normal * speed).sum() * step, rel=3e-3)
+
+
+def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero():
+    case = several_masses(5)
+    held = case.predicted_h.copy()
+    held[:, 0] = 0.0
+    held[:, 0, 0] = 1e3
+    found, _ = replace(case, predicted_h=held).run()
+    assert (found.status_t == STICK).all()
+    for exactly_zero in (found.start, found.state_t, found.slip_work, found.change):
+        assert not exactly_zero.any()
+
+
+# --- without compilation ---
+
+
+def kernel_results():
+    """Results of all kernels, by name."""
+    (predicted_t, start), masses = pairs_case(3, BASIS.n_samples, seed=20), several_masses(21)
+    periods = run_pairs(predicted_t, start, 1e-9, 6), masses.run()[0]
+    out, mass_out = ((np.zeros((n, 21, 21)), np.zeros((n, 21))) for n in (3, 6))
+    march_tangent(np.arange(3), periods[0], BASIS.synthesis, BASIS.analysis, out)
+    mean_normal_tangent(np.arange(2), predicted_t, BASIS.synthesis, BASIS.analysis, out[0])
+    series = MASS_BASIS.synthesis, MASS_BASIS.step_mean, MASS_BASIS.analysis
+    mass_tangent(np.arange(6), periods[1], masses.masses, *series, mass_out)
+    results = {f"{name} {kind}": value for kind in (0, 1) for name, value in periods[kind]._asdict().items()}
+    tangents = dict(zip(("force", "work", "mass force", "mass work"), (*out, *mass_out), strict=True))
+    results |= tangents | {"mean_normal": mean_normal_force(predicted_t)}
+    return {name: np.asarray(values, float) for name, values in results.items()}
+
+
+def save_results(path):
+    np.savez(path, disabled=np.array(bool(numba.config.DISABLE_JIT)), **kernel_results())
+
+
 @pytest.mark.slow
 def test_kernels_give_the_same_numbers_without_compilation(tmp_path):
-    path = tmp_path / "plain.npz"
-    root = Path(__file__).parents[2]
+    path, root = tmp_path / "plain.npz", Path(__file__).parents[2]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(root)}
-    code = "import sys; from tests.solver.kernel_cases import save_results; save_results(sys.argv[1])"
+    code = "import sys; from tests.solver.test_kernels import save_results; save_results(sys.argv[1])"
     subprocess.run([sys.executable, "-c", code, str(path)], check=True, env=environment, cwd=root, timeout=1200)
     with np.load(path) as plain:
         assert bool(plain["disabled"])
@@ -137,3 +250,50 @@ def test_kernels_give_the_same_numbers_without_compilation(tmp_path):
         assert set(plain.files) == {*compiled, "disabled"}
         for name, values in compiled.items():
             assert values == pytest.approx(plain[name], rel=1e-12, abs=1e-12 * max(np.abs(values).max(), 1e-300)), name
+
+
+# --- elastic pairs and masses in one joint ---
+
+MIXED = ("3d", "constant_load", "one_tangent", "second_tangent", "3d", "constant_load_one_tangent")
+FREE, ELASTIC = [1, 3, 4], [0, 2, 5]
+
+
+def of_pairs(law, pairs):
+    """The law of some of the pairs alone."""
+    penalty = replace(law.penalty, **{name: value[pairs] for name, value in vars(law.penalty).items()})
+    contact = replace(law.contact, dofs=law.contact.dofs[pairs], area=law.contact.area[pairs])
+    return replace(law, penalty=penalty, contact=contact, friction_coefficient=law.friction_coefficient[pairs])
+
+
+@pytest.mark.parametrize(
+    ("resolution", "friction"),
+    [(Resolution((1, 2, 3), 32), np.linspace(0.3, 0.55, 6)), (Resolution((1, 3, 5), 64), FRICTION)],
+    ids=["of each pair", "odd"],
+)
+def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
+    model = with_free_masses(random_model(1, MIXED), FREE)
+    joint = build_case(model, friction, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
+    assert np.flatnonzero(joint.penalty.inertial).tolist() == FREE
+    # pairs stick, slip and open
+    random = np.random.default_rng(2)
+    predicted = random.normal(size=(6, 3, 2 * joint.basis.n_harmonics + 1)) * PRELOAD * 0.6
+    predicted[:, 1:, 0] *= 0.1
+    predicted.reshape(18, -1)[np.setdiff1d(np.arange(18), joint.component_index)] = 0.0
+    predicted[~joint.contact.has_normal, 0, 1:] = 0.0
+    predicted[:, 0, 0] = PRELOAD
+    history = random.normal(size=(6, 2)) * 0.1 * PRELOAD / joint.penalty.tangential[:, None]
+    together = joint.law.march(predicted, history)
+    assert {SEPARATED, STICK, SLIP} <= set(together.status_t[FREE].ravel())
+    assert {STICK, SLIP} <= set(together.status_t[ELASTIC].ravel())
+    tangents = joint.law.tangent(together)
+    for pairs in (FREE, ELASTIC, *([pair] for pair in range(6))):
+        part = of_pairs(joint.law, pairs)
+        alone = part.march(predicted[pairs], history[pairs])
+        for name in ("status_t", "periods"):
+            assert np.array_equal(getattr(together, name)[pairs], getattr(alone, name)), name
+        # a product of matrices of another height may differ in its last digit
+        for name in ("predicted_t", "force_t", "force_h", "state_t", "start", "slip_work"):
+            values = getattr(alone, name)
+            assert getattr(together, name)[pairs] == pytest.approx(values, rel=1e-12, abs=1e-12 * np.abs(values).max())
+        for whole, own in zip(tangents, part.tangent(alone), strict=True):
+            assert whole[pairs] == pytest.approx(own, abs=1e-11 * max(1.0, np.abs(whole).max()))

@@ -1,12 +1,31 @@
-"""Newton's method on small piecewise examples that know nothing of contact."""
+"""Newton's method, its directions, signs of determinants, Krylov methods and factorisations against dense algebra."""
 
-from dataclasses import dataclass, field
+import time
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pytest
+from numba import njit
 
-from solver.newton.run import solve_newton
+from solver.clock import computing_time
+from solver.contact.coulomb import SLIP
+from solver.harmonic_balance.dlft import Balance
+from solver.newton import linear_solver
+from solver.newton.krylov import STAGNATION_PRODUCTS, build_correction, solve_gmres
+from solver.newton.linear_solver import (
+    DENSE_UNKNOWNS,
+    DenseFactor,
+    JacobianSolver,
+    build_dense_factor,
+    build_factor,
+)
+from solver.newton.period_preconditioner import build_period_factor, stiffness_of_most
+from solver.newton.run import Bordered, bordered_step, solve_newton
+from solver.outcome import Outcome
+from solver.settings import Resolution, SolverSettings, all_orders
+from solver.structure.harmonic_stiffness import DenseStiffness
+from tests.solver.models import PRELOAD, branch_states, dovetail, march_wear, random_balance, random_model
 
 
 @dataclass(frozen=True)
@@ -23,7 +42,7 @@ class Example:
 
 @dataclass
 class Problem:
-    """A function with its (generalised) derivative, and how often it was evaluated."""
+    """A function with its (generalised) derivative, and where it was evaluated."""
 
     function: Any
     derivative: Any
@@ -36,8 +55,8 @@ class Problem:
     def direction(self, at):
         return np.linalg.solve(self.derivative(at.point), -at.residual)
 
-    def solve(self, start, tolerance=1e-10, direction=None):
-        return solve_newton(self.evaluate, direction or self.direction, np.asarray(start, float), tolerance)
+    def solve(self, start, tolerance=1e-10):
+        return solve_newton(self.evaluate, self.direction, np.asarray(start, float), tolerance)
 
 
 def test_convergence_is_quadratic_on_a_smooth_function():
@@ -49,28 +68,26 @@ def test_convergence_is_quadratic_on_a_smooth_function():
     assert errors[3] < errors[2] ** 2
 
 
-@pytest.mark.parametrize("size", [1, 3])
-def test_a_cycle_of_plain_newton_is_broken(size):
+def test_a_cycle_of_plain_newton_is_broken():
     # slopes 1, 5, 1 between kinks at -1 and 1, so that the tangent of either outer piece leads to the other one
     problem = Problem(
         lambda x: 5 * np.clip(x, -1, 1) + (x - np.clip(x, -1, 1)),
         lambda x: np.diag(np.where(np.abs(x) < 1, 5.0, 1.0)),
     )
-    point = np.linspace(2.0, 3.0, size)
+    point = np.linspace(2.0, 3.0, 3)
     for expected in (-4.0, 4.0, -4.0):
         point = point + problem.direction(problem.evaluate(point))
-        assert point == pytest.approx(expected * np.ones(size))
-    result = problem.solve(np.linspace(2.0, 3.0, size))
+        assert point == pytest.approx(expected * np.ones(3))
+    result = problem.solve(np.linspace(2.0, 3.0, 3))
     assert result.converged
-    assert result.unknown == pytest.approx(np.zeros(size), abs=1e-10)
+    assert result.unknown == pytest.approx(np.zeros(3), abs=1e-10)
 
 
-def test_no_solution_is_a_value():
+def test_no_solution_is_the_best_point_so_far():
     problem = Problem(lambda x: x**2 + 1.0, lambda x: np.diag(2 * x))
     result = problem.solve([1.3])
     assert not result.converged
     assert np.array_equal(result.evaluation.point, result.unknown)
-    # the best point so far, not the last one
     assert result.evaluation.scaled_residual() == min(np.linalg.norm(x**2 + 1) for x in problem.calls)
 
 
@@ -81,3 +98,248 @@ def test_a_residual_that_is_not_finite_sends_the_iteration_back():
     assert np.isnan(problem.evaluate(problem.calls[1]).scaled_residual())
     assert result.converged
     assert result.unknown[0] == pytest.approx(1.0, rel=1e-10, abs=0.0)
+
+
+def test_compiling_takes_no_computing_time():
+    @njit
+    def inner(values):
+        return values.sum()
+
+    @njit
+    def outer(values):
+        return inner(values) + inner(values[::-1])
+
+    cpu, computing = time.thread_time(), computing_time()
+    outer(np.arange(3.0))
+    cpu, computing = time.thread_time() - cpu, computing_time() - computing
+    assert cpu > 0.05
+    assert 0.0 <= computing < 0.2 * cpu
+
+
+SMALL = SolverSettings(3, 24)
+ACCURACY = 2e-3  # relative residual of a direction: Newton's method gains three digits with it
+ALL_KINDS = ("3d", "constant_load", "normal_only", "3d", "one_tangent", "second_tangent", "3d", "3d")
+THREE_STUCK = ("3d", "constant_load", "normal_only", *("3d",) * 9)
+LARGE = ("3d",) * 13  # 273 unknowns: above the size that is solved directly, and a small joint
+SLIDING = ALL_KINDS * 3  # no small joint: marches through the period
+
+
+def case(seed, kinds=LARGE, wear=True, pressed=None, highest=3, samples=24):
+    """A balance and a predicted force; pairs from `pressed` on stay closed and stuck."""
+    resolution = Resolution(all_orders(highest), samples)
+    balance, predicted = random_balance(random_model(seed, kinds, 4), SMALL, seed, wear=wear, resolution=resolution)
+    joint = balance.joint
+    if pressed is not None:
+        predicted[(joint.component_index // 3 >= pressed) & (joint.component_index % 3 == 0), 0] += 1e4 * PRELOAD
+    return balance, predicted
+
+
+def tangent_of(balance, predicted):
+    return balance.linearise(balance.evaluate(predicted))
+
+
+def dense_of(tangent):
+    return tangent.dense(np.arange(tangent.joint.contact.n_contact))
+
+
+def residual(tangent, step, right):
+    return np.linalg.norm(tangent.apply(step) - right) / np.linalg.norm(right)
+
+
+@pytest.mark.parametrize(("kinds", "seed", "wear"), [(LARGE, 6, False), (LARGE, 6, True), (SLIDING, 2, True)])
+def test_a_kept_factorisation_follows_jacobians_that_change(kinds, seed, wear):
+    balance, predicted = case(seed, kinds, wear)
+    assert predicted.size > DENSE_UNKNOWNS
+    solver, random = JacobianSolver(), np.random.default_rng(seed)
+    for _ in range(6):
+        tangent, right = tangent_of(balance, predicted), random.normal(size=predicted.shape)
+        # the promise is the residual: of the Jacobian of now, not of the one that was factorised
+        assert residual(tangent, solver.solve(tangent, [right])[0], right) < ACCURACY
+        # wear in the step is so large that signs of both kinds come up
+        assert solver.determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0]
+        predicted = predicted + 0.05 * np.abs(predicted).mean() * random.normal(size=predicted.shape)
+
+
+def test_pairs_that_stay_stuck_are_left_out_and_found_again():
+    solver, random = JacobianSolver(), np.random.default_rng(11)
+    # in steps ever more pairs are pressed so that they neither slip nor open, then they are let go again
+    for free in (13, 8, 3, 0, 3, 11, 13):
+        balance, predicted = case(10, wear=False, pressed=free)
+        tangent, right = tangent_of(balance, predicted), random.normal(size=predicted.shape)
+        assert tangent.active.size <= free
+        step = solver.solve(tangent, [right])[0]
+        assert residual(tangent, step, right) < ACCURACY
+        # everything is stuck: the unknown moves nothing and the Jacobian is the identity
+        assert free or np.array_equal(step, right)
+
+
+def gmres(matrix, right, rtol, restart, cycles, rounded=None):
+    """Solution, whether it has converged, and number of products."""
+    count = [0]
+
+    def product(vector):
+        count[0] += 1
+        return (matrix if rounded is None else rounded) @ vector
+
+    return *solve_gmres(product, lambda vector: matrix @ vector, right, rtol, restart, cycles)[:2], count[0]
+
+
+def test_a_correction_is_exact_where_gmres_has_been_and_saves_the_next_solve():
+    random = np.random.default_rng(3)
+    matrix = np.eye(60) + 0.05 * random.normal(size=(60, 60)) - 0.9 * np.outer(*np.eye(60)[:2])
+    first, second = random.normal(size=(2, 60))
+    space = solve_gmres(lambda x: matrix @ x, lambda x: matrix @ x, first, 1e-6, 30, 1)[2:]
+    correction = build_correction(*space)
+    images = correction.images
+    np.testing.assert_allclose([matrix @ correction.apply(each) for each in images], images, atol=1e-12)
+    across = second - (images @ second) @ images
+    np.testing.assert_allclose(correction.apply(across), across, atol=1e-12)
+    count = gmres(matrix, first + 1e-3 * second, 1e-3, 30, 1)[2]
+    corrected = np.array([matrix @ correction.apply(each) for each in np.eye(60)]).T
+    assert gmres(corrected, first + 1e-3 * second, 1e-3, 30, 1)[2] < 0.5 * count
+
+
+def test_a_singular_operator_gives_what_can_be_had_and_ends():
+    # J with a null vector on either side, and a right-hand side that it does not reach
+    random = np.random.default_rng(6)
+    left, null = (part / np.linalg.norm(part) for part in random.normal(size=(2, 100)))
+    matrix = np.eye(100) + 0.04 * np.random.default_rng(7).normal(size=(100, 100))
+    matrix = matrix - np.outer(left, left @ matrix)
+    matrix = matrix - np.outer(matrix @ null, null)
+    reached = matrix @ random.normal(size=100)
+    right = reached / np.linalg.norm(reached) + 0.3 * left
+    found, converged, count = gmres(matrix, right, 1e-3, 80, 6)
+    assert not converged
+    assert np.linalg.norm(found) < 100.0
+    # next to nothing but what lies out of reach is left
+    assert 0.3 <= np.linalg.norm(matrix @ found - right) < 0.6
+    assert count < 3 * STAGNATION_PRODUCTS
+    # the part that it reaches is no harder than with any other operator, in one cycle or in many
+    for restart, cycles in ((60, 1), (6, 20)):
+        found, converged, _ = gmres(matrix, reached, 1e-6, restart, cycles)
+        assert converged
+        assert np.linalg.norm(matrix @ found - reached) <= 1e-6 * np.linalg.norm(reached)
+    assert not gmres(np.full((5, 5), np.nan), np.ones(5), 1e-3, 5, 2)[1]
+
+
+def test_products_that_are_rounded_are_refined_by_exact_ones():
+    random = np.random.default_rng(3)
+    # a direction that moves far under a small force
+    left, right = (np.linalg.qr(random.normal(size=(30, 30)))[0] for _ in range(2))
+    matrix = (left * np.geomspace(1.0, 1e-7, 30)) @ right
+    wanted, rounded = matrix @ random.normal(size=30), matrix.astype(np.float32)
+    for exact, good in ((rounded, False), (matrix, True)):
+        found, _, _ = gmres(exact, wanted, 1e-9, 30, 1, rounded)
+        assert bool(np.linalg.norm(matrix @ found - wanted) < 1e-9 * np.linalg.norm(wanted)) is good
+
+
+@pytest.mark.parametrize(("seed", "wear"), [(1, False), (2, True)])
+def test_dense_factors_give_the_solution_and_the_determinant(seed, wear):
+    balance, predicted = case(seed, THREE_STUCK, wear, pressed=9)
+    tangent = tangent_of(balance, predicted)
+    found = build_dense_factor(tangent)
+    assert found.exact
+    right = np.random.default_rng(seed).normal(size=predicted.shape)
+    right[tangent.passive_rows] = 0.0
+    exact = np.linalg.solve(dense_of(tangent), right.ravel()).reshape(right.shape)[tangent.active_rows]
+    # the shift of neutral directions moves the eigenvalues by 1e-8
+    assert np.linalg.norm(found.solve(right)[tangent.active_rows] - exact) < 1e-6 * np.linalg.norm(exact)
+    assert found.sign == np.linalg.slogdet(dense_of(tangent))[0]
+
+
+def test_the_lowest_harmonics_steer_the_iteration(monkeypatch):
+    balance, predicted = case(5, THREE_STUCK, pressed=9)
+    tangent = tangent_of(balance, predicted)
+    monkeypatch.setattr(linear_solver, "LARGEST_DENSE", 5 * tangent.active_rows.size)
+    found = build_factor(tangent)
+    assert isinstance(found, DenseFactor)
+    assert not found.exact
+    right = np.random.default_rng(6).normal(size=predicted.shape)
+    assert residual(tangent, JacobianSolver().solve(tangent, [right])[0], right) < ACCURACY
+    assert JacobianSolver().determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0]
+
+
+def test_the_march_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_stiffness():
+    # as many harmonics as samples; lines on which slip forgets all that was before it
+    balance, predicted = case(5, ("constant_load_one_tangent",) * 9, wear=False, highest=12, samples=25)
+    structure = balance.joint.structure
+    stiffness = np.real(structure.dynamic_stiffness[2])
+    same = np.broadcast_to(stiffness.astype(complex), structure.dynamic_stiffness.shape)
+    structure = replace(structure, static_stiffness=stiffness, moving=DenseStiffness(np.array(same)))
+    assert np.array_equal(stiffness_of_most(structure), stiffness)
+    tangent = tangent_of(replace(balance, joint=replace(balance.joint, structure=structure)), 3.0 * predicted)
+    assert np.count_nonzero((tangent.at.status_t == SLIP).any(axis=1)) > 4
+    step = np.random.default_rng(6).normal(size=predicted.shape)
+    factor = build_period_factor(tangent)
+    assert factor is not None
+    # but for its single precision, 6e-8
+    assert np.linalg.norm(factor.solve(tangent.apply(step)) - step) < 1e-5 * np.linalg.norm(step)
+    # and is none of the identity
+    assert residual(tangent, step, step) > 0.1
+
+
+@dataclass(frozen=True)
+class Affine:
+    """A balance with two further unknowns q that push it, R(p) + B q = 0, and two linear equations of p and q."""
+
+    balance: Balance
+    pushes: np.ndarray  # (2, n_rel, m)
+    rows: np.ndarray  # (2, n_rel, m)
+    own: np.ndarray  # (2, 2)
+
+    def evaluate(self, predicted_h, values):
+        at = self.balance.evaluate(predicted_h)
+        at = replace(at, residual=at.residual + np.tensordot(values, self.pushes, 1))
+        errors = np.tensordot(self.rows, predicted_h, 2) + self.own @ values - 0.3
+        return Bordered(self.balance, at, values, errors)
+
+    def by_values(self, _):
+        return list(self.pushes), self.own
+
+    def by_step(self, _, __, step):
+        return np.tensordot(self.rows, step, 2)
+
+    def fraction(self, *_):
+        return 1.0
+
+
+@pytest.mark.parametrize("kinds", [("3d", "normal_only"), ("3d",) * 14])
+def test_a_bordered_step_is_that_of_the_whole_jacobian(kinds):
+    balance, predicted = random_balance(random_model(3, kinds), SolverSettings(3, 24), 4, wear=False)
+    random, shape = np.random.default_rng(5), predicted.shape
+    pushes, rows = random.normal(size=(2, 2, *shape)) / predicted.size
+    problem = Affine(balance, pushes, rows, random.normal(size=(2, 2)))
+    here = problem.evaluate(predicted, np.array([0.7, -0.2]))
+    tangent = balance.linearise(here.at)
+    step, found = bordered_step(problem, here, JacobianSolver(), 1e-9)
+    jacobian = tangent.dense(np.arange(balance.joint.contact.n_contact))
+    by_values = pushes.reshape(2, -1).T
+    whole = np.block([[jacobian, by_values], [rows.reshape(2, -1), problem.own]])
+    wanted = np.linalg.solve(whole, -np.concatenate([here.at.residual.ravel(), here.errors]))
+    assert step == pytest.approx(wanted, rel=1e-6, abs=1e-6 * np.abs(wanted).max())
+    reduced = problem.own - rows.reshape(2, -1) @ np.linalg.solve(jacobian, by_values)
+    assert found == pytest.approx(reduced, rel=1e-6, abs=1e-6)
+
+
+def dense_solve(self, tangent, rights, rtol=0.0):
+    """The whole Jacobian, all pairs, all harmonics."""
+    matrix = dense_of(tangent)
+    return np.array([np.linalg.solve(matrix, right.ravel()).reshape(right.shape) for right in rights])
+
+
+@pytest.mark.slow
+def test_wear_is_that_of_dense_solves(monkeypatch):
+    """264 unknowns, above the size that is always solved densely; adaptive steps are those of the reference."""
+    model, settings = dovetail(5), SolverSettings(harmonics=5, samples=64, tolerance=1e-10)
+    assert 33 * model.contact.n_contact > DENSE_UNKNOWNS
+    # one start for both: a sweep chooses its steps by what happens, and by every digit of that
+    (start,) = branch_states(model, 0.5, 0.5, [2.0 * np.pi * 212.86], settings)
+    asked = model, 0.5, start, 1.1e-11, 1000.0, "implicit", np.array([0.0, 2000.0]), settings
+    history = march_wear(*asked)
+    monkeypatch.setattr(JacobianSolver, "solve", dense_solve)
+    wanted = march_wear(*asked)
+    assert history.wear_depth[-1].max() > 1e-9
+    assert history.outcome is wanted.outcome is Outcome.CONVERGED
+    for name in ("wear_depth", "wear_rate", "response", "reference_volume"):
+        one, other = getattr(history, name), getattr(wanted, name)
+        assert np.linalg.norm(one - other) <= 1e-9 * np.linalg.norm(other)

@@ -1,71 +1,138 @@
-"""A few of the random scenes of the benchmark, and that they are what they are said to be."""
+"""Random scenes: symmetries of their states, and some of them solved to their end.
+
+A state is turned or scaled and must still be a state, which does not depend on the way by which it was found.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
 
-from solver.accuracy.resolved_state import ResolvedState
+from solver.continuation.first_state import solve_first_state
+from solver.harmonic_balance.dlft import Balance
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
+from solver.structure.joint import build_case
 from studies.model_check import check_model
 from tests.benchmarks.random_scenes import run_scene, solved
 from tests.random_scenes import COMPONENTS, random_scene
-from tests.solver.models import branch_states
 
-SCENES = [random_scene(seed) for seed in range(200)]
+# for the module: a mark on a test itself would change its source, and with it what hypothesis draws
+pytestmark = pytest.mark.slow
+profile = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+SETTINGS = SolverSettings(harmonics=5, samples=64)
+seeds = st.integers(0, 399)
+# powers of two scale without round-off
+scales = st.sampled_from([2.0**-20, 2.0**-3, 2.0, 2.0**10])
 
 
-def test_all_scenes_are_possible_structures():
-    for scene in SCENES:
+@lru_cache(maxsize=64)
+def found(seed):
+    """First state of a scene, without wear; None where there is none."""
+    scene = random_scene(seed)
+    omega = 2.0 * np.pi * scene.frequency_hz
+    case = build_case(scene.model, scene.friction, omega, SETTINGS)
+    unworn = np.zeros(scene.model.contact.n_contact)
+    point = solve_first_state(case, omega, scene.amplitude, unworn, Run(case.settings.tolerance))
+    if isinstance(point, Outcome):
+        return None
+    return scene, case.joint(omega, scene.amplitude), point
+
+
+def state(seed):
+    result = found(seed)
+    assume(result is not None)
+    scene, joint, point = result
+    return scene, joint, point.evaluation
+
+
+def residual_of(model, scene, evaluation, *, load=1.0, length=1.0):
+    """Scaled residual of a state in another model: forces `load` times, motion `length` times as large."""
+    omega = 2.0 * np.pi * scene.frequency_hz
+    case = build_case(model, scene.friction, omega, SETTINGS)
+    joint = case.joint(omega, load * scene.amplitude)
+    balance = Balance(joint, length * evaluation.history, length * evaluation.wear_depth)
+    predicted = balance.predict(length * evaluation.displacement_h, load * evaluation.force_h)
+    other = balance.evaluate(predicted)
+    return other.scaled_residual(), other
+
+
+@profile
+@given(seeds, scales)
+def test_loads_gaps_and_motion_scale_together(seed, scale):
+    scene, _, at = state(seed)
+    model = scene.model
+    linear = replace(model.linear[0], load_static=scale * model.linear[0].load_static)
+    contact = replace(model.contact, gap=scale * model.contact.gap, normal_load=scale * model.contact.normal_load)
+    residual, other = residual_of(
+        replace(model, linear={0: linear}, contact=contact), scene, at, load=scale, length=scale
+    )
+    assert residual <= 2.0 * SETTINGS.tolerance
+    assert np.abs(other.slip_work - scale**2 * at.slip_work).max() <= 1e-6 * scale**2 * at.slip_work.max()
+
+
+@profile
+@given(seeds, st.floats(0.1, 6.0))
+def test_the_tangents_may_be_turned(seed, angle):
+    # in place of the tangential displacements (t1, t2) the model has those in axes that are turned by the angle
+    scene, joint, at = state(seed)
+    model, dofs = scene.model, scene.model.contact.dofs
+    both = (dofs[:, 1:] >= 0).all(axis=1)
+    assume(both.any())
+    n = len(model.linear[0].stiffness)
+    # a pair marched with its mass or not: the choice and the penalty are those of the larger of the two tangents
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    back = np.eye(n)
+    displacement_h, force_h, history_m = at.displacement_h.copy(), at.force_h.copy(), at.history.copy()
+    for pair in np.flatnonzero(both):
+        back[np.ix_(dofs[pair, 1:], dofs[pair, 1:])] = turn.T
+        for values in (displacement_h, force_h):
+            values[pair, 1:] = turn @ values[pair, 1:]
+        history_m[pair] = turn @ history_m[pair]
+    linear = model.linear[0]
+    turned = replace(
+        linear,
+        mass=back.T @ linear.mass @ back,
+        damping=back.T @ linear.damping @ back,
+        stiffness=back.T @ linear.stiffness @ back,
+        load_static=back.T @ linear.load_static,
+        load_harmonic=back.T @ linear.load_harmonic,
+        response=linear.response @ back,
+    )
+    # the penalty of the unturned scene: it depends on the axes, and a state only at infinitely many harmonics not on it
+    omega = 2.0 * np.pi * scene.frequency_hz
+    case = build_case(replace(model, linear={0: turned}), scene.friction, omega, SETTINGS)
+    other_joint = replace(case, penalty=joint.penalty).joint(omega, scene.amplitude)
+    balance = Balance(other_joint, history_m, at.wear_depth)
+    other = balance.evaluate(balance.predict(displacement_h, force_h))
+    assert other.scaled_residual() <= 2.0 * SETTINGS.tolerance
+    # a pair that static load alone has brought to its limit slips by round-off
+    flexed = np.linalg.norm(joint.law.motion(at.force_h)) * np.linalg.norm(at.force_h)
+    round_off = 1e-9 * float(flexed)
+    assert np.abs(other.slip_work - at.slip_work).max() <= 1e-6 * at.slip_work.max() + round_off
+
+
+def test_all_scenes_are_possible_structures_of_all_kinds():
+    scenes = [random_scene(seed) for seed in range(200)]
+    for scene in scenes:
         check_model(scene.model)
         linear = scene.model.linear[0]
-        assert np.linalg.eigvalsh(linear.stiffness)[0] > 0.0
-        assert np.linalg.eigvalsh(linear.damping)[0] > 0.0
-        assert np.linalg.eigvalsh(linear.mass)[0] > -1e-12 * np.abs(linear.mass).max()
-        assert scene.amplitude > 0.0
-        assert scene.wear_coefficient > 0.0
-        assert scene.cycles == pytest.approx(5 * scene.step)
+        assert min(np.linalg.eigvalsh(part)[0] for part in (linear.stiffness, linear.damping)) > 0.0
+    words = ["0 inner", "6 inner", "massless", "light", "direct", "pressed", "touching", "near", "far"]
+    for word in (*words, *COMPONENTS):
+        assert sum(word in scene.facts for scene in scenes) >= 10, word
 
 
-def test_all_kinds_are_there():
-    sizes = {scene.model.contact.n_contact for scene in SCENES}
-    assert sizes == set(range(1, 9))
-    rows = {tuple(row >= 0) for scene in SCENES for row in scene.model.contact.dofs}
-    assert len(rows) == len(COMPONENTS)
-    for words in (("0 inner", "6 inner"), ("massless", "light", "direct"), ("pressed", "touching", "near", "far")):
-        for word in words:
-            assert sum(word in scene.facts for scene in SCENES) >= 10, word
-    frictions = np.array([scene.friction for scene in SCENES])
-    assert (frictions == 0.0).sum() >= 5
-    assert frictions.max() > 1.0
-    assert frictions.max() <= 2.0
-    assert {scene.scheme for scene in SCENES} == {"implicit", "explicit"}
-    assert sum(np.abs(scene.model.linear[0].load_harmonic.imag).max() > 0.0 for scene in SCENES) >= 50
-    singular = [np.linalg.matrix_rank(scene.model.linear[0].mass) < len(scene.model.linear[0].mass) for scene in SCENES]
-    assert sum(singular) >= 50
-
-
-@pytest.mark.slow
 def test_some_scenes_are_solved():
-    # the benchmark runs 1000 of them, of which some take minutes
-    records = [run_scene(random_scene(seed)) for seed in range(119, 128)]
+    """Of scene 16 few harmonics do not show an impact. The benchmark runs 1000 scenes, of which some take minutes."""
+    records = [run_scene(random_scene(seed)) for seed in (16, *range(119, 124))]
     assert all(solved(record) for record in records)
     for record in records:
         assert "NaN" not in record["march"]
         assert record["march"] != "wear falls"
-    assert sum(record.get("slips", False) for record in records) >= 5
-    assert 2 <= sum(record.get("opens", False) for record in records) <= 7
-
-
-@pytest.mark.slow
-def test_an_impact_that_few_harmonics_do_not_show_starts_from_the_force_samples(monkeypatch):
-    scene = random_scene(16)
-    asked = scene.model, scene.friction, scene.amplitude, [2.0 * np.pi * scene.frequency_hz], SolverSettings()
-    assert branch_states(*asked)[0].outcome is Outcome.CONVERGED
-    # started from zero, Newton's method diverges
-    solve_at = ResolvedState.solve_at
-
-    def from_zero(*given, with_tail=False):
-        return None if with_tail else solve_at(*given)
-
-    monkeypatch.setattr(ResolvedState, "solve_at", from_zero)
-    assert branch_states(*asked)[0].outcome is Outcome.INACCURATE
+    assert any(record.get("slips", False) for record in records)
+    assert any(record.get("opens", False) for record in records)

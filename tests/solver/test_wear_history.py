@@ -1,4 +1,4 @@
-"""Wear histories of the slider under a spring against its differential equation; a joint that is worn before."""
+"""Wear histories against differential equations and time integrations; what is stored and read between their steps."""
 
 from functools import lru_cache
 
@@ -7,11 +7,17 @@ import pytest
 
 from solver import frequency_response
 from solver import march_wear as march_model
+from solver.accuracy.certificate import Certificate
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.outcome import Outcome
 from solver.results.history import StartState
-from solver.results.state_report import LOOP_PHASES
-from solver.settings import Scheme, SolverSettings, ToTheEnd, first_resolution
+from solver.results.state_report import LOOP_PHASES, StateReport
+from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
+from solver.structure.joint import build_case
+from solver.wear import course as course_module
+from solver.wear.course import CERTIFIED, INTERPOLATED, Course
+from solver.wear.integrate import Integrations, SlowTime
+from solver.wear.step import Adaptive
 from tests.solver.models import branch_states, march_wear, random_model, scene
 from tests.solver.worn_slider import (
     AREA,
@@ -22,11 +28,15 @@ from tests.solver.worn_slider import (
     OMEGA,
     WEAR,
     exact_depths,
+    exact_depths_of_motion,
     march,
     slider_start,
 )
 
+# --- the slider ---
 STEPS = (8000.0, 4000.0, 2000.0, 1000.0)
+
+
 GIVEN: tuple[Scheme, ...] = ("explicit", "implicit")
 SCHEMES: tuple[Scheme, ...] = (*GIVEN, "adaptive")
 FEW = SolverSettings(harmonics=3, samples=128)
@@ -107,7 +117,6 @@ def test_a_start_that_failed_is_a_history_of_nan_with_its_outcome():
 
 
 def test_only_the_product_of_wear_coefficient_and_cycles_matters():
-    """To adaptive steps; `test_properties` has it of steps of a given length."""
     slow = march(8000.0, "adaptive")
     fast = march(800.0, "adaptive", CYCLES / 10, wear=10 * WEAR)
     for name in ("wear_depth", "worn_volume", "mean_pressure", "slip_range", "response", "response_peak"):
@@ -141,3 +150,134 @@ def test_a_law_that_depends_on_the_depth_is_refused():
         march_model(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [4e4], law=law, wear_depth=0.0)
     with pytest.raises(ValueError, match="wear_depth: give a depth, m, for each of 1 pairs, not 2"):
         march_model(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [4e4], wear_depth=[0.0, 0.0])
+
+
+# --- where pairs slide or stick again ---
+
+
+def steps_and_volume(scene_name: str, start: StartState, settings: SolverSettings, cycles: float) -> tuple[int, float]:
+    """Number of steps and worn volume, m3, of an adaptive history without its reference solution."""
+    model = scene(scene_name, 13, **({"mesh": 1} if scene_name == "dovetail_sector" else {}))
+    case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
+    ended = Integrations(case, start).history(SlowTime(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles])))
+    depth = ended.course.read(np.array([cycles]))["wear_depth"]
+    return len(ended.course.ends), float((depth @ model.contact.area)[0])
+
+
+@pytest.mark.slow
+def test_a_pair_that_only_just_slips_goes_on_as_in_a_time_integration_of_every_cycle():
+    """With one slide for each step this pair sticks again."""
+    settings, omega = SolverSettings(9, 128), 2.0 * np.pi * 212.5
+    (start,) = branch_states(scene("dovetail_sector", 13, mesh=1), 0.5, 0.5, [omega], settings)
+    assert steps_and_volume("dovetail_sector", start, settings, 1e5)[1] == pytest.approx(2.026e-9, rel=4e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("mesh", "frequency", "volume"), [(1, 212.6, 1.810), (2, 211.5, 2.261)])
+def test_where_pairs_slide_or_stick_again_the_history_is_that_of_a_time_integration(mesh, frequency, volume):
+    """At 211.5 Hz the history of the whole way to the extrapolated end leads to another branch, 1.667 mm3."""
+    counts = np.array([0.0, 1e5])
+    history = march_model(scene("dovetail_sector", mesh=mesh), frequency, 0.5, 0.5, WEAR, counts)
+    apart = abs(1e9 * history.worn_volume[-1] / volume - 1.0)
+    assert apart < history.error_estimate < 0.03
+
+
+@pytest.mark.slow
+def test_the_slow_time_of_the_slider_is_of_second_order():
+    model, settings = scene("sdof_slider", 13), SolverSettings(13, 128)
+    (start,) = branch_states(model, 0.5, 10.0, [2.0 * np.pi * 160.0], settings)
+    given = [SolverSettings(13, 128, rtol=rtol) for rtol in (1e-2, 1e-3, 1e-6)]
+    (few, coarse), (many, fine), (_, finest) = (steps_and_volume("sdof_slider", start, one, 1e5) for one in given)
+    order = np.log(abs(coarse - finest) / abs(fine - finest)) / np.log(many / few)
+    assert order > 1.7
+
+
+@pytest.mark.parametrize(
+    ("wear", "cycles", "outputs", "rtol"), [(1e-13, 1e3, 2, 0.1), (WEAR, 5e3, 101, 1e-2), (WEAR, 1e5, 11, 5e-2)]
+)
+def test_the_error_of_a_history_covers_and_does_not_alarm(wear, cycles, outputs, rtol):
+    """Also for a count at the beginning of a long step, and where start state and steps have similar errors."""
+    counts = np.linspace(0.0, cycles, outputs)
+    history = march_model(scene("sdof_slider", 21), 160.0, 10.0, 0.5, wear, counts, settings=SolverSettings(rtol=rtol))
+    true = abs(float(history.wear_depth[-1, 0] / exact_depths_of_motion(np.array([0.0, cycles]), wear)[-1]) - 1.0)
+    assert history.outcome is Outcome.CONVERGED
+    assert true <= history.error_estimate <= 2.0 * rtol
+
+
+# --- between the ends of steps ---
+
+AREAS = np.array([1.0, 3.0])
+RESOLUTIONS = (Resolution((1, 2, 3), 64), Resolution((1, 2, 3, 4, 5), 128))
+
+
+def report(depth, value, resolution=RESOLUTIONS[0], **more):
+    """All numbers of a state but its depths are `value`."""
+    numbers = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), np.full(2, value))
+    numbers |= dict.fromkeys(("excitation_frequency", "excitation_frequency_error"), value)
+    numbers |= dict.fromkeys(("loop_displacement", "loop_force"), np.full((1, 128, 3), value))
+    numbers |= dict.fromkeys(("response_mean", "response_peak"), np.full(1, value))
+    numbers["response"] = np.full(1, value * 1j)
+    certificate = Certificate(*([value] * 8))
+    return StateReport(
+        wear_depth=np.array(depth, float), certificate=certificate, resolution=resolution, **numbers, **more
+    )
+
+
+def taken(counts, smooth=False, n_steps=3, **more):
+    """Steps of 10 cycles; the first pair wears as t^2, the second one nothing."""
+    course = Course(AREAS, smooth, np.array(counts or (), float), **more)
+    for n in range(n_steps + 1):
+        at = 10.0 * n
+        state = report([at**2, 0.0], float(n), RESOLUTIONS[n // 2 % 2])
+        course = course.after(at, state, np.array([2.0 * at, 0.0]), 0.5)
+    return course
+
+
+def test_between_the_ends_of_a_given_step_all_is_linear():
+    found = taken([0.0, 4.0, 10.0, 25.0]).read(np.array([0.0, 4.0, 10.0, 25.0]))
+    assert found["wear_depth"][:, 0] == pytest.approx([0.0, 40.0, 100.0, 650.0])
+    assert found["wear_rate"] == pytest.approx([0.0, 8.0, 20.0, 50.0])
+    for name in INTERPOLATED:
+        values = np.abs(found[name].reshape(4, -1))
+        assert values == pytest.approx(np.repeat([[0.0], [0.4], [1.0], [2.5]], values.shape[1], axis=1)), name
+    # what holds at both ends of a step holds between
+    for name in CERTIFIED:
+        assert found[name].tolist() == [0.0, 1.0, 1.0, 3.0], name
+    # and what has no value between those of both ends is that of the later one
+    assert found["harmonics_used"].tolist() == [3, 3, 3, 5]
+    assert found["samples_used"].tolist() == [64, 64, 64, 128]
+    # local errors add up from step to step, and along a step
+    assert found["local"].tolist() == [0.5, 0.7, 1.0, 1.75]
+
+
+def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume():
+    found = taken([5.0, 14.0], smooth=True).read(np.array([5.0, 14.0]))
+    # t^2 is a cubic
+    assert found["wear_depth"] == pytest.approx(np.array([[25.0, 0.0], [196.0, 0.0]]))
+    shares = np.array([0.25, 1.0 + 96.0 / 300.0])
+    assert found["response_peak"][:, 0] == pytest.approx(shares)
+    assert found["wear_rate"] == pytest.approx(20.0 * shares)
+
+
+def test_a_cubic_never_falls_however_steep_its_ends_are():
+    course = Course(AREAS, smooth=True).after(0.0, report([0.0, 0.0], 0.0), np.array([100.0, 0.0]), 0.0)
+    course = course.after(10.0, report([1.0, 1.0], 1.0), np.array([0.0, 100.0]), 0.0)
+    depth = course.read(np.linspace(0.0, 10.0, 101))["wear_depth"]
+    assert (np.diff(depth, axis=0) >= 0.0).all()
+    assert depth[-1].tolist() == [1.0, 1.0]
+
+
+def test_of_many_steps_those_that_go_far_and_those_that_are_read_are_kept(monkeypatch):
+    asked = [5.0, 15.0, 1005.0]
+    whole = taken(None, n_steps=200)
+    monkeypatch.setattr(course_module, "KEPT_STEPS", 20)
+    course = taken(asked, n_steps=200)
+    assert len(course.nodes) <= 26
+    assert course.dense.counts[[0, -1]].tolist() == [0.0, 2000.0]
+    assert course.ends == tuple(np.arange(201) * 10.0)
+    counts = np.linspace(0.0, 2000.0, 11)
+    one, other = (each.read(counts)["wear_depth"] for each in (course, whole))
+    assert np.abs(one - other).max() < 0.02 * other.max()
+    one, other = (each.read(np.array(asked)) for each in (course, whole))
+    for name, values in one.items():
+        assert np.array_equal(values, other[name]), name

@@ -5,19 +5,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver import (
-    Outcome,
-    SolverSettings,
-    balance_of,
-    frequency_response,
-    response_curve,
-)
+from solver import Outcome, SolverSettings, balance_of, frequency_response, response_curve
 from solver.stability.floquet import Multipliers
 from tests.event_driven import close_orbit
 from tests.references import vibro_impact_orbit
 from tests.solver.models import OMEGA, cyclic_model, random_model, scene
 from tests.solver.reconstruction import harmonic_structure
-from tests.solver.test_natural import GRAZING, WALL_OMEGA
+from tests.solver.test_continuation import GRAZING, WALL_OMEGA
 
 SETTINGS = SolverSettings(harmonics=19, samples=256)
 WALL = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)  # mass, damping, stiffness, force, wall and gap of the vibro-impact scene
@@ -30,14 +24,17 @@ def wall_curve():
 
 
 @lru_cache
-def slipping():
+def slipping(kind):
     """A random structure whose pairs stick, slip and open."""
-    model = random_model(3, ("3d", "one_tangent", "constant_load"))
-    return balance_of(model, OMEGA / (2.0 * np.pi), 150.0, 0.4, settings=SolverSettings(harmonics=3, samples=64))
+    force, model = 150.0, random_model(3, ("3d", "one_tangent", "constant_load"))
+    if kind == "travelling wave":
+        force, model = 40.0, cyclic_model(3, ("3d", "3d"), 7, 5)
+    settings = SolverSettings(harmonics=3, samples=64)
+    return balance_of(model, OMEGA / (2.0 * np.pi), force, 0.4, settings=settings), model
 
 
 def test_the_jacobian_is_the_derivative_of_the_residual():
-    balance = slipping()
+    balance, _ = slipping("random")
     exact = balance.jacobian(balance.state)
     step = 1e-5 * np.abs(balance.state).mean() * np.random.default_rng(0).normal(size=balance.size)
     ahead, back = (balance.residual(balance.state + sign * step) for sign in (1.0, -1.0))
@@ -46,17 +43,11 @@ def test_the_jacobian_is_the_derivative_of_the_residual():
 
 @pytest.mark.parametrize("kind", ["random", "travelling wave"])
 def test_all_coefficients_obey_the_equation_of_motion(kind):
-    if kind == "random":
-        balance, model = slipping(), random_model(3, ("3d", "one_tangent", "constant_load"))
-    else:
-        model = cyclic_model(3, ("3d", "3d"), 7, 5)
-        balance = balance_of(model, OMEGA / (2.0 * np.pi), 40.0, 0.4, settings=SolverSettings(harmonics=3, samples=64))
+    balance, model = slipping(kind)
     motion, dofs = balance.motion(), model.contact.dofs
     for place, order in enumerate(motion.orders.tolist()):
         linear = harmonic_structure(model, order)
         mass, damping, stiffness, harmonic = linear.mass, linear.damping, linear.stiffness, linear.load_harmonic
-        if order == 0:
-            stiffness = stiffness.real
         rate = 2j * np.pi * order * motion.frequency
         load = {0: linear.load_static, 1: motion.excitation_amplitude * harmonic}.get(order, 0.0 * linear.load_static)
         force = np.zeros(len(mass), complex)
@@ -76,24 +67,16 @@ def test_all_coefficients_obey_the_equation_of_motion(kind):
     assert (motion.contact_force_t[:, 0] >= 0.0).all()
 
 
-def exact_orbit(curve, index):
-    """The exact motion next to a point of the curve."""
-    motion = curve.balance(index).motion()
-    omega = 2.0 * np.pi * motion.frequency
-    system = vibro_impact_orbit(*WALL, omega, sweep="down").system
-    y = np.array([motion.displacement_t[1, 0], motion.velocity_t[1, 0]])
-    found = close_orbit(system, "closed" if y[0] > WALL[-1] else "open", y)
-    assert found is not None
-    return found
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("unstable", [False, True])
 def test_motions_and_multipliers_are_the_exact_ones_also_of_an_unstable_branch(unstable):
     curve = wall_curve()
     upper, lower = np.flatnonzero(curve.is_fold)
     index = (upper + lower) // 2 if unstable else 0
-    orbit = exact_orbit(curve, index)
+    motion = curve.balance(index).motion()
+    system = vibro_impact_orbit(*WALL, 2.0 * np.pi * motion.frequency, sweep="down").system
+    y = np.array([motion.displacement_t[1, 0], motion.velocity_t[1, 0]])
+    orbit = close_orbit(system, "closed" if y[0] > WALL[-1] else "open", y)
     assert abs(curve.response[index, 0]) == pytest.approx(abs(orbit.harmonic(0)), rel=5e-3)
     np.testing.assert_allclose(curve.multipliers[index], orbit.multipliers(), atol=0.03)
     assert curve.stability[index] == ("fold" if unstable else "stable")
@@ -136,17 +119,14 @@ def test_over_the_amplitude_the_curve_folds_where_the_mass_grazes_the_wall():
 
 
 @pytest.mark.slow
-def test_both_parameters_lead_to_the_same_states():
+def test_a_curve_ends_at_the_state_of_a_sweep_and_knows_its_errors():
     slider, settings = scene("sdof_slider", damping=2.0), SolverSettings(harmonics=5, samples=64)
-    by_frequency = response_curve(slider, (149.5, 150.0), 10.0, 0.5, settings=settings)
-    by_amplitude = response_curve(slider, 150.0, (9.8, 10.0), 0.5, settings=settings, errors=False)
+    curve = response_curve(slider, (149.5, 150.0), 10.0, 0.5, settings=settings)
     swept = frequency_response(slider, 150.0, 10.0, 0.5, settings=settings)
-    for curve in (by_frequency, by_amplitude):
-        assert curve.outcome is Outcome.CONVERGED
-        assert curve.response[-1] == pytest.approx(swept.response[0], rel=1e-6)
-        assert set(curve.stability) == {"stable"}
-    assert (by_frequency.response_error < 0.02).all()
-    assert np.isnan(by_amplitude.response_error).all()
+    assert curve.outcome is Outcome.CONVERGED
+    assert curve.response[-1] == pytest.approx(swept.response[0], rel=1e-6)
+    assert set(curve.stability) == {"stable"}
+    assert (curve.response_error < 0.02).all()
 
 
 @pytest.mark.slow
@@ -162,10 +142,8 @@ def test_a_joint_that_bounces_doubles_its_period():
 
 def test_multipliers_name_the_kind_of_stability():
     for values, odd, kind in (
-        ([0.9], False, "stable"),
         ([0.9], True, "fold"),
         ([1.2], False, "fold"),
-        ([-1.2], False, "period doubling"),
         ([1j, 0.2], False, "stable"),
         ([1.1j, -1.1j], False, "Neimark-Sacker"),
         ([], False, "unknown"),

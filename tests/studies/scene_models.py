@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from solver.model import ContactInterface, LinearModel, Matrix, ReducedModel
+from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.scene_file import write_scene
 
 Change = Callable[[h5py.File], None]
@@ -23,17 +23,9 @@ def linear_model(n: int, *, hermitian: bool, seed: int) -> LinearModel:
 
     mass = np.zeros((n, n), dtype=complex if hermitian else float)
     mass[1:, 1:] = definite(n - 1)
-    response: Matrix = random.normal(size=(2, n))
-    if hermitian:
-        response = np.asarray(response + 1j * random.normal(size=(2, n)), dtype=np.complex128)
-    return LinearModel(
-        mass=mass,
-        damping=0.01 * definite(n),
-        stiffness=1e6 * definite(n),
-        load_static=random.normal(size=n),
-        load_harmonic=random.normal(size=n) + 1j * random.normal(size=n),
-        response=response,
-    )
+    response = random.normal(size=(2, n)) + (1j * random.normal(size=(2, n)) if hermitian else 0)
+    load = random.normal(size=n), random.normal(size=n) + 1j * random.normal(size=n)
+    return LinearModel(mass, 0.01 * definite(n), 1e6 * definite(n), *load, response)
 
 
 def general_model(linear: dict[int, LinearModel], n_sectors: int = 0, nodal_diameter: int = 0) -> ReducedModel:
@@ -59,12 +51,18 @@ def sector() -> ReducedModel:
     return general_model(models, n_sectors=6, nodal_diameter=2)
 
 
-def changed(tmp_path: Path, model: ReducedModel, change: Change) -> Path:
-    path = tmp_path / "scene.h5"
-    write_scene(model, path)
+def changed(path: Path, *changes: Change) -> Path:
+    """The scene file, after changes."""
     with h5py.File(path, "r+") as file:
-        change(file)
+        for change in changes:
+            change(file)
     return path
+
+
+def written(folder: Path, model: ReducedModel, *changes: Change) -> Path:
+    """The scene file of a model, changed."""
+    write_scene(model, folder / "scene.h5")
+    return changed(folder / "scene.h5", *changes)
 
 
 def put(key: str, values: object, **options: object) -> Change:
@@ -91,5 +89,16 @@ def drop(*keys: str) -> Change:
     def change(file: h5py.File) -> None:
         for key in keys:
             del file[key]
+
+    return change
+
+
+def attribute(name: str, value: object) -> Change:
+    """Replace an attribute of the file, or remove it (None)."""
+
+    def change(file: h5py.File) -> None:
+        file.attrs.pop(name, None)
+        if value is not None:
+            file.attrs[name] = value
 
     return change

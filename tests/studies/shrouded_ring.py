@@ -1,4 +1,4 @@
-"""All sectors of a ring with all their contacts, without cyclic symmetry. A helper of the tests."""
+"""A small shrouded sector, and all sectors of a ring with all their contacts, without cyclic symmetry."""
 
 from dataclasses import replace
 
@@ -8,6 +8,13 @@ from studies.finite_element import surfaces
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
 from studies.finite_element.reduced_joint import build_fe_scene
 from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
+from studies.scenes import shrouded_sector
+
+
+def stubby(n_sectors: int) -> shrouded_sector.Parameters:
+    """A sector at rest with few elements."""
+    size = {"blade_thickness": 0.01, "rim_radius": 0.15, "blade_length": 0.08}
+    return shrouded_sector.Parameters(n_sectors=n_sectors, shroud_angle=20, rotation_speed=0.0, **size)
 
 
 def whole_ring(model: MeshModel, joint: JointDefinition) -> tuple[MeshModel, JointDefinition]:
@@ -46,6 +53,5 @@ def reduced_ring(model: MeshModel, joint: JointDefinition, nodal_diameter: int, 
     linear = whole.linear[0]
     phases = np.exp(2j * np.pi * nodal_diameter * np.arange(n) / n)
     return replace(
-        whole,
-        linear={0: replace(linear, load_harmonic=phases @ linear.response, damping=damping * linear.stiffness)},
+        whole, linear={0: replace(linear, load_harmonic=phases @ linear.response, damping=damping * linear.stiffness)}
     )

@@ -9,15 +9,10 @@ from studies.finite_element.solid_mesh import SolidMesh, assemble_mass, centrifu
 from studies.scenes.dovetail_sector import Parameters, build, define_sector
 from tests.studies.static_contact import solve_static_contact
 
-# Glued, nodal diameter 0, Hz: 20-node elements without, 8-node ones with the effects of 3000 rpm.
+# Glued, nodal diameter 0, Hz, of 20-node elements.
 AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])
 N_PAIRS = 48
 N_RELATIVE = 3 * N_PAIRS
-
-
-@pytest.fixture(scope="module")
-def default():
-    return build(Parameters(), 5)
 
 
 @pytest.fixture(scope="module")
@@ -29,13 +24,12 @@ def frequencies(linear, n_relative=N_RELATIVE):
     return np.sqrt(np.diag(linear.stiffness).real[n_relative:]) / (2.0 * np.pi)
 
 
-@pytest.mark.slow
 def test_frequencies_of_the_glued_sector_at_rest(at_rest):
     assert np.abs(frequencies(at_rest.linear[0])[:6] / AT_REST - 1.0).max() < 0.03
 
 
-def test_contact_pairs(default):
-    contact = default.contact
+def test_contact_pairs(at_rest):
+    contact = at_rest.contact
     assert np.array_equal(contact.dofs, np.arange(N_RELATIVE).reshape(N_PAIRS, 3))
     assert contact.surface == ("intrados",) * 24 + ("extrados",) * 24
     assert contact.area.reshape(2, 24).sum(axis=1) == pytest.approx([280e-6, 280e-6], rel=1e-9, abs=0)
@@ -48,18 +42,10 @@ def test_contact_pairs(default):
     assert intrados[:, -1, 0] == pytest.approx(0.245)
 
 
-def blade_alone(parameters):
-    """Mesh of the blade, with the nodes of the disk, which move nothing; and the rotation."""
-    model, _ = define_sector(parameters)
-    blade = tuple(group for group in model.mesh.groups if group.part == "blade")
-    return SolidMesh(model.coordinates, model.numbers, blade), model.rotation
-
-
 def test_axial_sliding_is_the_only_motion_that_closed_flanks_leave_free(at_rest):
     linear, dofs = at_rest.linear[0], at_rest.contact.dofs
     kept = np.setdiff1d(np.arange(len(linear.mass)), dofs[:, 0])
-    stiffness = linear.stiffness[np.ix_(kept, kept)]
-    values, vectors = linalg.eigh(stiffness, linear.mass[np.ix_(kept, kept)])
+    values, vectors = linalg.eigh(linear.stiffness[np.ix_(kept, kept)], linear.mass[np.ix_(kept, kept)])
     assert abs(values[0]) < 1e-6 * values[1]
     sliding = np.zeros(len(linear.mass))
     sliding[kept] = vectors[:, 0]
@@ -69,9 +55,11 @@ def test_axial_sliding_is_the_only_motion_that_closed_flanks_leave_free(at_rest)
 
 
 def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
-    parameters = Parameters(stress_stiffening=False)
-    mesh, rotation = blade_alone(parameters)
-    pull = centrifugal_load(assemble_mass(mesh), mesh.coordinates, rotation).reshape(-1, 3).sum(axis=0)[0]
+    model, _ = define_sector(Parameters(stress_stiffening=False))
+    # the blade with the nodes of the disk, which move nothing
+    blade = tuple(group for group in model.mesh.groups if group.part == "blade")
+    mass = assemble_mass(SolidMesh(model.coordinates, model.numbers, blade))
+    pull = centrifugal_load(mass, model.coordinates, model.rotation).reshape(-1, 3).sum(axis=0)[0]
     for friction_coefficient in (0.5, 1e-6):
         force = solve_static_contact(at_rest, friction_coefficient).reshape(2, 24, 3).sum(axis=1)
         assert np.all(force[:, 0] > 0.0)
@@ -79,21 +67,19 @@ def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
 
 
 def test_stiffening_grows_with_the_square_of_speed_and_softening_shows():
-    squares = [
-        frequencies(build(Parameters(mesh=1, rotation_speed=rpm), 0).linear[0], 48)[0] ** 2
-        for rpm in (1e-3, 2000.0, 4000.0)
-    ]
+    speeds = (1e-3, 2000.0, 4000.0)
+    models = (build(Parameters(mesh=1, rotation_speed=rpm), 0) for rpm in speeds)
+    squares = [frequencies(model.linear[0], 48)[0] ** 2 for model in models]
     assert (squares[2] - squares[0]) / (squares[1] - squares[0]) == pytest.approx(4.0, rel=0.02)
 
 
-@pytest.mark.parametrize(("nodal_diameter", "n_sectors"), [(1, 47), (16, 47), (23, 47), (23, 46)])
+@pytest.mark.parametrize(("nodal_diameter", "n_sectors"), [(1, 47), (23, 47), (23, 46)])
 def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter, n_sectors):
     """Half the number of the sectors is a real one, as 0 is."""
     model = build(Parameters(mesh=1, nodal_diameter=nodal_diameter, n_sectors=n_sectors), 5)
     assert tuple(model.linear) == needed_nodal_diameters(nodal_diameter, n_sectors, 5)
     assert n_sectors == 47 or tuple(model.linear) == (0, 23)
-    assert model.n_sectors == n_sectors
-    assert model.nodal_diameter == nodal_diameter
+    assert (model.n_sectors, model.nodal_diameter) == (n_sectors, nodal_diameter)
     for k, linear in model.linear.items():
         for matrix in (linear.mass, linear.damping, linear.stiffness):
             assert np.iscomplexobj(matrix) == (k not in (0, n_sectors / 2))
@@ -119,9 +105,3 @@ def test_loss_factor_is_exact_at_the_first_frequency(at_rest):
     linear = at_rest.linear[0]
     omega = 2.0 * np.pi * frequencies(linear)[0]
     assert np.allclose(omega * linear.damping, 1e-3 * linear.stiffness, rtol=1e-9, atol=1e-6)
-    modes = slice(N_RELATIVE, None)
-    dynamic = (linear.stiffness - omega**2 * linear.mass + 1j * omega * linear.damping)[modes, modes]
-    tip = (linear.response[:, modes] @ np.linalg.solve(dynamic, linear.load_harmonic[modes]))[0]
-    shape = linear.response[0, N_RELATIVE]
-    assert abs(tip) == pytest.approx(shape**2 / (1e-3 * omega**2), rel=1e-3)
-    assert 0.01 < abs(tip) < 0.1

@@ -1,38 +1,35 @@
-"""Scene files: bitwise round trip and other writers' habits."""
+"""Scene files: bitwise round trip, other writers' habits, and wrong files, named by their dataset."""
 
-from dataclasses import fields, replace
+from dataclasses import astuple, replace
 
 import h5py
 import numpy as np
 import pytest
 
-from solver.model import ContactInterface, LinearModel
+from solver.model import LinearModel
 from studies.model_check import check_model
+from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
-from studies.scene_file import read_scene, scene_datasets, write_scene
-from tests.studies.scene_models import changed, drop, plain, put, sector
+from studies.scene_file import read_mesh, read_scene, scene_datasets, write_scene
+from tests.studies.scene_models import (
+    attribute,
+    changed,
+    drop,
+    general_model,
+    linear_model,
+    plain,
+    poke,
+    put,
+    sector,
+    written,
+)
 
 
-def assert_same_bits(one, other):
-    assert (one.response_names, one.n_sectors, one.nodal_diameter) == (
-        other.response_names,
-        other.n_sectors,
-        other.nodal_diameter,
-    )
-    assert one.contact.surface == other.contact.surface
-    assert set(one.linear) == set(other.linear)
-    pairs: list[tuple[object, object, str]] = [
-        (one.contact, other.contact, name.name) for name in fields(ContactInterface) if name.name != "surface"
-    ]
-    pairs += [(one.linear[k], other.linear[k], name.name) for k in one.linear for name in fields(LinearModel)]
-    for left, right, name in pairs:
-        first, second = getattr(left, name), getattr(right, name)
-        if name in ("friction_coefficient", "edge") and first is None:
-            assert second is None
-            continue
-        assert first.dtype == second.dtype, name
-        assert first.shape == second.shape, name
-        assert first.tobytes() == second.tobytes(), name
+def bits(model):
+    """All that a model holds, in a form that is equal only to the last bit."""
+    values = [model.response_names, model.n_sectors, model.nodal_diameter, *astuple(model.contact), *model.linear]
+    values += [each for linear in model.linear.values() for each in astuple(linear)]
+    return [(v.dtype, v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values]
 
 
 def with_pairs(**values):
@@ -40,32 +37,27 @@ def with_pairs(**values):
     return replace(model, contact=replace(model.contact, **values))
 
 
-MODELS = (
-    plain(),
-    sector(),
-    with_pairs(friction_coefficient=np.array([0.0, 0.1 + 0.2, 1.5])),
-    with_pairs(edge=np.array([False, True, True])),
-)
+MODELS = {
+    "plain": plain(),
+    "sector": sector(),
+    "rough": with_pairs(friction_coefficient=np.array([0.0, 0.1 + 0.2, 1.5])),
+    "open ended": with_pairs(edge=np.array([False, True, True])),
+}
 
 
-@pytest.mark.parametrize("model", MODELS, ids=["plain", "sector", "rough", "open ended"])
-def test_round_trip_is_bitwise(tmp_path, model):
-    write_scene(model, tmp_path / "scene.h5")
-    assert_same_bits(read_scene(tmp_path / "scene.h5", 5), model)
+@pytest.mark.parametrize("name", MODELS)
+def test_round_trip_is_bitwise(tmp_path, name):
+    assert bits(read_scene(written(tmp_path, MODELS[name]), 5)) == bits(MODELS[name])
     assert [path.name for path in tmp_path.iterdir()] == ["scene.h5"]
 
 
 def test_optional_datasets_have_defaults(tmp_path):
-    def change(file):
-        drop("damping", "contact/gap", "contact/position", "contact/surface", "contact/normal_load")(file)
-        file["contact/dofs"][1, 0] = 6
-
-    model = read_scene(changed(tmp_path, plain(), change))
-    assert not model.linear[0].damping.any()
-    assert not model.contact.gap.any()
-    assert not model.contact.normal_load.any()
-    assert np.isnan(model.contact.position).all()
-    assert model.contact.surface == ("", "", "")
+    optional = drop("damping", "contact/gap", "contact/position", "contact/surface", "contact/normal_load")
+    model = read_scene(written(tmp_path, plain(), optional, poke("contact/dofs", (1, 0), 6)))
+    contact = model.contact
+    assert not any(values.any() for values in (model.linear[0].damping, contact.gap, contact.normal_load))
+    assert np.isnan(contact.position).all()
+    assert contact.surface == ("", "", "")
 
 
 def by_hand(path, model, turned=False):
@@ -77,86 +69,158 @@ def by_hand(path, model, turned=False):
             file.create_dataset(key, data=values.T if turned else values, dtype=kind)
 
 
-def of_three_pairs(response="matrix"):
-    model = plain()
-    contact = replace(model.contact, dofs=np.arange(9).reshape(3, 3))
-    generator = np.random.default_rng(0)
-    stiffness = generator.normal(size=(9, 9))
-    stiffness = stiffness @ stiffness.T + np.eye(9)
-    rows = np.eye(9)[: 9 if response == "square" else 2]
-    linear = LinearModel(np.eye(9), np.eye(9), stiffness, np.ones(9), np.ones(9, dtype=complex), rows)
-    names = tuple(f"u{n}" for n in range(len(rows)))
-    return replace(model, contact=contact, linear={0: linear}, response_names=names)
-
-
-def as_indices(path):
-    with h5py.File(path, "r+") as file:
-        put("response/dofs", np.array([0, 1]))(file)
-
-
 def test_three_pairs_written_columns_first_are_refused(tmp_path):
-    path = tmp_path / "scene.h5"
-    by_hand(path, of_three_pairs(), turned=True)
+    path, root = tmp_path / "scene.h5", np.random.default_rng(0).normal(size=(9, 9))
+    matrices = np.eye(9), np.eye(9), root @ root.T + np.eye(9)
+    linear = LinearModel(*matrices, np.ones(9), np.ones(9, dtype=complex), np.eye(9)[:2])
+    model = replace(with_pairs(dofs=np.arange(9).reshape(3, 3)), linear={0: linear}, response_names=("u0", "u1"))
+    by_hand(path, model, turned=True)
     with pytest.raises(SceneError, match=r"response/dofs: shape \(9, 2\); give shape \(2, 9\): MATLAB and Fortran"):
         read_scene(path)
     for turned in (True, False):
-        by_hand(path, of_three_pairs(), turned=turned)
-        as_indices(path)
+        by_hand(path, model, turned=turned)
+        changed(path, put("response/dofs", np.array([0, 1])))
         with pytest.raises(SceneError, match=r'contact/dofs: 3 pairs, and nothing shows .* attribute rows = "pairs"'):
             read_scene(path)
-    with h5py.File(path, "r+") as file:
-        file["contact/dofs"].attrs["rows"] = "pairs"
+    changed(path, lambda file: file["contact/dofs"].attrs.update(rows="pairs"))
     assert read_scene(path).contact.dofs.tolist() == np.arange(9).reshape(3, 3).tolist()
-    by_hand(path, of_three_pairs())  # two responses of nine displacements show the order
+    by_hand(path, model)  # two responses of nine displacements show the order
     read_scene(path)
 
 
 def test_responses_can_be_indices_and_damping_coefficients(tmp_path):
-    def change(file):
-        put("response/dofs", np.array([6, 2], dtype=np.int32))(file)
-        put("damping", np.array([3.0, 1e-5]))(file)
-
-    linear, own = read_scene(changed(tmp_path, plain(), change)).linear[0], plain().linear[0]
+    changes = put("response/dofs", np.array([6, 2], dtype=np.int32)), put("damping", np.array([3.0, 1e-5]))
+    linear, own = read_scene(written(tmp_path, plain(), *changes)).linear[0], plain().linear[0]
     assert linear.response.tolist() == np.eye(7)[[6, 2]].tolist()
     assert np.array_equal(linear.damping, 3.0 * own.mass + 1e-5 * own.stiffness)
 
 
 def test_other_types_of_numbers_are_read(tmp_path):
-    def change(file):
-        put("contact/dofs", np.array([[0, 1, 2], [-1, 3, 4], [5, -1, -1]], dtype=np.float64))(file)
-        put("mass", np.eye(7, dtype=np.float32))(file)
-        put("damping", np.eye(7, dtype=np.int16))(file)
-        put("load/harmonic", np.arange(7, dtype=np.uint8))(file)
-        put("stiffness", file["stiffness"][()].astype(complex))(file)
-        put("load/static", np.arange(7.0), dtype=">f8")(file)
-
-    linear = read_scene(changed(tmp_path, plain(), change)).linear[0]
-    assert linear.mass.dtype == linear.damping.dtype == linear.load_static.dtype == np.float64
-    assert linear.load_harmonic.dtype == np.complex128
-    assert linear.load_harmonic.tolist() == list(range(7))
-    # Zero imaginary parts at nodal diameter 0 say nothing.
-    assert linear.stiffness.dtype == np.float64
-    assert linear.stiffness.tobytes() == plain().linear[0].stiffness.tobytes()
-
-
-def test_complex_numbers_of_octave_are_read(tmp_path):
-    values = plain().linear[0].load_harmonic
+    own = plain().linear[0]
+    # complex numbers as Octave has them
     compound = np.empty(7, dtype=[("real", "f8"), ("imag", "f8")])
-    compound["real"], compound["imag"] = values.real, values.imag
-    model = read_scene(changed(tmp_path, plain(), put("load/harmonic", compound)))
-    assert model.linear[0].load_harmonic.tobytes() == values.tobytes()
+    compound["real"], compound["imag"] = own.load_harmonic.real, own.load_harmonic.imag
+    changes = (
+        put("contact/dofs", np.array([[0, 1, 2], [-1, 3, 4], [5, -1, -1]], dtype=np.float64)),
+        put("mass", np.eye(7, dtype=np.float32)),
+        put("damping", np.eye(7, dtype=np.int16)),
+        put("load/harmonic", compound),
+        # zero imaginary parts at nodal diameter 0 say nothing
+        put("stiffness", own.stiffness.astype(complex)),
+        put("load/static", np.arange(7.0), dtype=">f8"),
+    )
+    linear = read_scene(written(tmp_path, plain(), *changes)).linear[0]
+    assert linear.mass.dtype == linear.damping.dtype == linear.load_static.dtype == np.float64
+    for name in ("load_harmonic", "stiffness"):
+        found, expected = getattr(linear, name), getattr(own, name)
+        assert (found.dtype, found.tobytes()) == (expected.dtype, expected.tobytes())
 
 
 def test_what_is_unusual_but_possible_passes():
     model = plain()
-    # A rigid body motion with mass that contact pairs can hold.
-    free = model.linear[0].stiffness.copy()
+    stiffness, motion = model.linear[0].stiffness, np.zeros(7)
+    # a rigid body motion with mass that contact pairs can hold
+    motion[:2] = np.sqrt(0.5)
+    keep = np.eye(7) - np.outer(motion, motion)
+    free = keep @ stiffness @ keep
+    check_model(replace(model, linear={0: replace(model.linear[0], stiffness=(free + free.T) / 2)}))
+    # round-off in a symmetric matrix, and displacements in very different units
+    scale = np.diag(10.0 ** np.arange(-6, 8, 2))
+    noisy = scale @ stiffness @ scale * (1 + 1e-13 * np.random.default_rng(0).normal(size=(7, 7)))
+    check_model(replace(model, linear={0: replace(model.linear[0], stiffness=noisy, mass=np.zeros((7, 7)))}))
+
+
+def asymmetric(file):
+    file["stiffness"][0, 1] *= 1 + 1e-6
+
+
+def not_hermitian(file):
+    file["nd/2/stiffness"][0, 1] = np.conj(file["nd/2/stiffness"][0, 1])
+
+
+def rank_deficient(file):
+    """The motion (1, 1, 0, ...) gets neither stiffness nor mass."""
     motion = np.zeros(7)
     motion[:2] = np.sqrt(0.5)
     keep = np.eye(7) - np.outer(motion, motion)
-    free = keep @ free @ keep
-    check_model(replace(model, linear={0: replace(model.linear[0], stiffness=(free + free.T) / 2)}))
-    # Round-off in a symmetric matrix, and displacements in very different units.
-    scale = np.diag(10.0 ** np.arange(-6, 8, 2))
-    noisy = scale @ model.linear[0].stiffness @ scale * (1 + 1e-13 * np.random.default_rng(0).normal(size=(7, 7)))
-    check_model(replace(model, linear={0: replace(model.linear[0], stiffness=noisy, mass=np.zeros((7, 7)))}))
+    for key in ("stiffness", "mass"):
+        matrix = keep @ file[key][()] @ keep
+        file[key][...] = (matrix + matrix.T) / 2
+
+
+def soft(file):
+    del file["mass"]
+    file["mass"] = h5py.SoftLink("/stiffness")
+
+
+NODES = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]])
+MESH = SurfaceMesh(NODES, np.array([[0, 1, 2, 3], [1, 4, 5, 2]]), ("blade", "disk"))
+FRICTION = "contact/friction_coefficient"
+COMPLEX = linear_model(8, hermitian=True, seed=4).stiffness
+WRONG = [
+    (plain, drop("stiffness"), "stiffness"),
+    (plain, drop("response/names"), "response/names"),
+    (plain, drop("contact/normal_load"), "contact/normal_load"),
+    (plain, put("inertia", np.eye(7)), "inertia"),
+    (plain, put("stiffness", np.eye(7)[:, :6]), "stiffness"),
+    (plain, put("load/static", np.ones(7, dtype=complex)), "load/static"),
+    (plain, put("mass", h5py.Empty("f8")), "mass"),
+    (plain, poke("stiffness", (2, 3), np.nan), "stiffness"),
+    (plain, asymmetric, "stiffness"),
+    (plain, poke("mass", (6, 6), -5.0), "mass"),
+    (plain, rank_deficient, "stiffness"),
+    (plain, poke("contact/area", 1, -1e-4), "contact/area"),
+    (plain, put(FRICTION, np.array([0.5, 0.5, -0.1])), FRICTION),
+    (plain, put("contact/edge", np.array([0, 1, 2])), "contact/edge"),
+    (plain, poke("contact/dofs", (0, 1), 4), "contact/dofs"),
+    (plain, poke("contact/dofs", (2, 0), -1), "contact/dofs"),
+    (plain, put("contact/surface", ["a", "b"]), "contact/surface"),
+    (plain, put("contact/surface", np.array([b"\xff\xfe", b"a", b"b"])), "contact/surface"),
+    (plain, put("response/names", ["a", "b", "c"]), "response/dofs"),
+    (plain, put("response/dofs", np.array([0, 7])), "response/dofs"),
+    (plain, soft, "mass"),
+    (plain, attribute("nodal_diameter", 1), "nodal_diameter"),
+    (sector, not_hermitian, "nd/2/stiffness"),
+    (sector, drop("nd/2"), "nd/2"),
+    (sector, put("nd/2/response/names", ["tip", "other"]), "nd/2/response/names"),
+    (sector, put("nd/0/stiffness", COMPLEX), "nd/0/stiffness"),
+    (sector, lambda file: file.copy("nd/2", "nd/4"), "nd/4"),
+    (sector, attribute("n_sectors", None), "n_sectors"),
+    (sector, attribute("nodal_diameter", 1), "nd/1"),
+    (MESH, drop("mesh/y"), "mesh/y"),
+    (MESH, poke("mesh/x", 1, np.nan), "mesh/x"),
+    (MESH, put("mesh/quad", np.zeros((2, 3), dtype=int)), "mesh/quad"),
+    (MESH, put("mesh/part", ["blade"]), "mesh/part"),
+]
+
+
+@pytest.mark.parametrize(("build", "change", "key"), WRONG)
+def test_a_wrong_file_is_named_by_its_dataset(tmp_path, build, change, key):
+    path, model, mesh = tmp_path / "scene.h5", plain() if build is MESH else build(), MESH if build is MESH else None
+    write_scene(model, path, mesh)
+    changed(path, change)
+    with pytest.raises(SceneError) as caught:
+        (read_scene if mesh is None else read_mesh)(path)
+    assert caught.value.key == key
+    assert "\n" not in str(caught.value)
+
+
+def test_the_harmonics_say_which_nodal_diameters_are_needed(tmp_path):
+    # nodal diameter 1 of 6 sectors: harmonics see 0, 1, 2, 3, 2, 1, 0, ...
+    linear = linear_model(7, hermitian=True, seed=3)
+    models = {0: linear_model(7, hermitian=False, seed=2), 1: linear, 2: linear}
+    path = written(tmp_path, general_model(models, n_sectors=6, nodal_diameter=1))
+    read_scene(path, 2)
+    with pytest.raises(SceneError) as caught:
+        read_scene(path, 3)
+    assert caught.value.key == "nd/3"
+
+
+def test_a_file_that_is_no_hdf5_or_damaged_is_said_so(tmp_path):
+    path = written(tmp_path, plain())
+    content = path.read_bytes()
+    for wrong in (b"", b"[study]\nname = 1\n", content[: len(content) // 2]):
+        path.write_bytes(wrong)
+        with pytest.raises(SceneError, match=r"scene\.h5") as caught:
+            read_scene(path)
+        assert caught.value.key == "model"

@@ -1,11 +1,11 @@
 """The one factory of results: datasets in memory, of any axes and pairs, made from the tables of variables.
 
-`build_file` has numbers that all differ, `make_result` smooth ones, `sample_file` samples whose volumes follow from
-what they draw, `mesh_file` scenes that differ in their pairs. `made_result` is of a study; `build_dataset` with
-`write_dataset` is the plain twin of the writer.
+`build_file` has numbers that all differ, `make_result` smooth ones, `sample_file` samples, `mesh_file` scenes that
+differ in their pairs. `made_result` is of a study; `build_dataset`, `write_dataset` are the plain twin of the writer.
 """
 
 import math
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import norm, qmc
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.coordinates import COORDINATES
 from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates, scene_arrays
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
+from studyrunner.scatter.draws import ScatteredPairs, drawn
+from studyrunner.scatter.section import ScatterSection
 from studyrunner.scene.answers import SceneVariable
 from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.scene.scene_set import pair_arrays
@@ -39,6 +40,7 @@ AXES: Mapping[str, Sequence[object]] = {
 }
 STUDY = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\nnodal_diameter = 0\n[solver]\nrtol = 0.01\n'
 UNKNOWN = ("jump_cycle", "fold_frequency", "cycles_to_target", "cycles_to_target_error")
+N_PHASES = 16
 
 
 # --- of any axes ---
@@ -67,13 +69,13 @@ def build_file(
     found: dict[str, Any] = dict(axes)
     found |= {"cycle": np.array(cycles, dtype=float), "contact": np.arange(len(positions)), "response": list(responses)}
     if loops:
-        found |= {"phase": 2.0 * np.pi * np.arange(16) / 16, "component": list(LOOP_COMPONENTS)}
+        found |= {"phase": 2.0 * np.pi * np.arange(N_PHASES) / N_PHASES, "component": list(LOOP_COMPONENTS)}
     asked = {name: ASKED[name] for name in variables} | (LOOPS if loops else {}) | KEPT
     dataset = _empty(axes, {name: len(values) for name, values in found.items()}, asked)
     for name, variable in dataset.variables.items():
         if name not in ("outcome", "message"):
-            numbers = variable.values.dtype.kind == "f"
-            variable.values[...] = random.uniform(1e-7, 1e-6, variable.shape) if numbers else 1
+            is_real = variable.values.dtype.kind == "f"
+            variable.values[...] = random.uniform(1e-7, 1e-6, variable.shape) if is_real else 1
     dataset["last_cycle"].values[...] = cycles[-1]
     dataset["outcome"].values[...] = Outcome.CONVERGED
     for name in LOOPS if loops else ():
@@ -88,7 +90,7 @@ def build_file(
     return dataset.assign_coords(coords).assign_attrs({"title": "A study", "study": STUDY, **of_file})
 
 
-def fail(dataset: xr.Dataset, flat: int, outcome: int, last: float = -math.inf) -> None:
+def fail(dataset: xr.Dataset, flat: int, outcome: int, last: float = -math.inf, message: str = "") -> None:
     """Ends a point with an outcome, in place. flat: its number, the last axis fastest. last: count that it came to."""
     place = np.unravel_index(flat, dataset["outcome"].shape)
     for name, variable in dataset.data_vars.items():
@@ -100,6 +102,8 @@ def fail(dataset: xr.Dataset, flat: int, outcome: int, last: float = -math.inf) 
         elif math.isinf(last) or name == "last_cycle":
             variable.values[place] = gap if math.isinf(last) else last
     dataset["outcome"].values[place] = outcome
+    if message:
+        dataset["message"].values[place] = message
 
 
 def as_result(dataset: xr.Dataset, path: Path) -> Result:
@@ -143,24 +147,25 @@ def make_result(
     scheme: Sequence[str] = ("implicit", "explicit"),
     sweep: Sequence[str] = ("up",),
     cycles: Sequence[float] = (0.0, 1000.0, 5000.0, 20000.0),
+    responses: Sequence[str] = ("tip",),
+    loops: Sequence[int] = (),
     pairs: str = "grid",
     failed: Sequence[int] = (),
-    failing: int = int(Outcome.BRANCH_LOST),
     wears: bool = True,
     without: Sequence[str] = (),
 ) -> Result:
     """A result of two surfaces, left and right, with 3 x 2 pairs each; 0 is the first cycle count.
 
-    It wears most at the third frequency, and a little more with the explicit scheme. pairs: "grid", "scattered", or
-    "nowhere" (no positions). failed: numbers of points with the outcome `failing`.
+    It wears most at the third frequency, and a little more with the explicit scheme. responses: each half of the one
+    before. loops: pairs with ellipses in both tangents, whose normal force is open for a part. pairs: "grid",
+    "scattered", or "nowhere" (no positions). failed: numbers of points that have lost their branch.
     """
     axes = {"frequency": frequency, "wear_coefficient": wear_coefficient, "excitation_amplitude": (0.5,)}
     axes |= {"step": (1000.0,), "scheme": scheme, "sweep": sweep}
     names = ("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "response_phase")
     names += ("response_error", "wear_rate_error", "energy_error", "worn_volume_error")
-    dataset = build_file(
-        axes, cycles, positions=_positions(pairs), surfaces=["left"] * 6 + ["right"] * 6, variables=names
-    )
+    of_pairs = {"positions": _positions(pairs), "surfaces": ["left"] * 6 + ["right"] * 6, "loops": loops}
+    dataset = build_file(axes, cycles, responses=responses, variables=names, **of_pairs)
     grid = np.meshgrid(*(np.arange(len(values)) for values in axes.values()), indexing="ij")
     peak = 1.0 / (1.0 + 0.5 * (grid[0] - 2) ** 2)
     size = peak * (1.0 + 0.1 * grid[4] + 0.01 * grid[5]) * (1.0 + grid[1]) * (wears and len(cycles) > 1)
@@ -174,86 +179,34 @@ def make_result(
         "wear_rate": 1e-15 * size[..., None] * (1.0 - 0.5 * share),
         "wear_depth": depth,
         "mean_pressure": 1e7 * (1.0 + depth / 1e-5) * weights[::-1],
-        "response_amplitude": amplitude[..., None],
-        "response_phase": np.full((*amplitude.shape, 1), -0.5),
+        "response_amplitude": amplitude[..., None] * 0.5 ** np.arange(len(responses)),
+        "response_phase": -0.5,
         "response_error": 1e-3 * level,
         "wear_rate_error": 2e-3 * level,
         "energy_error": 3e-4 * level,
         "error_estimate": 0.02 * peak,
         "worn_volume_error": 0.02 * peak[..., None] * share,
-        "step_limit": np.full(peak.shape, 5000.0),
-        "branch": np.zeros(peak.shape),
+        "step_limit": 5000.0,
+        "branch": 0,
         "run_time": 1.0 + peak,
-        **{name: np.full(peak.shape, np.nan) for name in UNKNOWN},
+        **dict.fromkeys(UNKNOWN, np.nan),
     }
     for name, values in data.items():
         dataset[name].values[...] = values
+    if loops:
+        phase, count = dataset["phase"].values, 1.0 + np.arange(float(len(cycles)))[:, None, None, None]
+        motion = np.stack([np.sin(phase), np.cos(phase), 0.5 * np.sin(phase)], axis=-1)
+        force = np.stack([np.maximum(np.cos(phase), 0.0), np.sin(phase), np.cos(phase)], axis=-1)
+        larger = 1.0 + np.array(loops, dtype=float)[:, None, None]
+        dataset["loop_displacement"].values[..., list(loops), :, :] = 1e-6 * count * larger * motion
+        dataset["loop_force"].values[..., list(loops), :, :] = 10.0 * force / count
     dataset["contact_area"].values[...] = 2e-6
     for flat in failed:
-        fail(dataset, flat, failing)
-    kept = dataset[[*data, "outcome", "last_cycle"]].drop_vars(without)
+        fail(dataset, flat, int(Outcome.BRANCH_LOST))
+    there = [*data, "outcome", "message", "last_cycle", *(LOOPS if loops else ())]
     study = '[study]\nname = "s"\n[scene]\nnodal_diameter = 0\n[solver]\nrtol = 0.01\n[slow_time]\ncycles = 1\n'
-    return Result(Path("made.nc"), kept.assign_attrs(title="Made up", study=study))
-
-
-def with_variables(result: Result, **variables: xr.DataArray) -> Result:
-    """The same file with further variables, or others in their place."""
-    return Result(result.path, result.dataset.assign(variables))
-
-
-def with_endings(result: Result, endings: Mapping[int, tuple[int, float]], messages: Mapping[int, str]) -> Result:
-    """The same file with other endings of points, by number: outcome, and the cycle count that they came to."""
-    dataset = result.dataset.copy(deep=True)
-    texts = np.full(dataset["outcome"].shape, "", dtype=object)
-    for flat, text in messages.items():
-        texts.flat[flat] = text
-    dataset["message"] = (dataset["outcome"].dims, texts)
-    for flat, (outcome, last) in endings.items():
-        fail(dataset, flat, outcome, last)
-    return Result(result.path, dataset)
-
-
-def with_two_responses(result: Result) -> Result:
-    """The same file with a second response, half as large."""
-    names = ["response_amplitude", "response_phase"]
-    half = result.dataset[names].assign_coords(response=["root"]) * 0.5
-    both = xr.concat([result.dataset[names], half], dim="response", join="outer")
-    kept = result.dataset.drop_vars([*names, "response"])
-    return Result(result.path, kept.assign_coords(response=["tip", "root"]).assign(both.data_vars))
-
-
-def with_loops(result: Result, contacts: Sequence[int] = (0, 11), n_phases: int = 16) -> Result:
-    """The same file with loops of these pairs: ellipses in both tangents, the normal force open for a part."""
-    dataset, phase = result.dataset, 2.0 * np.pi * np.arange(n_phases) / n_phases
-    dims = (*dataset["wear_depth"].dims, "phase", "component")
-    shape = (*dataset["wear_depth"].shape, n_phases, 3)
-    moved, pushed = np.full(shape, math.nan), np.full(shape, math.nan)
-    for contact, cycle in ((each, cycle) for each in contacts for cycle in range(dataset.sizes["cycle"])):
-        motion = 1e-6 * (1 + contact) * np.stack([np.sin(phase), np.cos(phase), 0.5 * np.sin(phase)], axis=-1)
-        force = 10.0 * np.stack([np.maximum(np.cos(phase), 0.0), np.sin(phase), np.cos(phase)], axis=-1)
-        moved[..., cycle, contact, :, :] = motion * (1 + cycle)
-        pushed[..., cycle, contact, :, :] = force / (1 + cycle)
-    for values in (moved, pushed):
-        values[dataset["outcome"].values != 0] = math.nan
-    loops = dataset.assign(loop_displacement=(dims, moved, {"units": "m"}), loop_force=(dims, pushed, {"units": "N"}))
-    return Result(result.path, loops.assign_coords(phase=phase, component=list(LOOP_COMPONENTS)))
-
-
-def with_sector(result: Result, *, mesh: bool = True, frequencies: bool = True) -> Result:
-    """The same file with a mesh of a cube of two parts and natural frequencies of three modes."""
-    dataset = result.dataset
-    if mesh:
-        nodes = np.array([[x, y, z] for x in (0.2, 0.3) for y in (-0.05, 0.05) for z in (-0.02, 0.02)])
-        quads = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
-        values = (*nodes.T, np.array(quads, dtype=np.int32), np.array(["disk"] * 3 + ["blade"] * 3))
-        entries = SCENE["mesh"].items()
-        of_mesh = {name: (entry.dimensions, each) for (name, entry), each in zip(entries, values, strict=True)}
-        dataset = dataset.assign(of_mesh)
-    if frequencies:
-        modes = np.array([[200.0, 400.0, 900.0], [201.0, 500.0, 950.0], [202.0, 520.0, 980.0]])
-        dataset = dataset.assign(natural_frequency=(("nodal_diameter", "mode"), modes))
-        dataset = dataset.assign_coords(nodal_diameter=np.arange(3))
-    return Result(result.path, dataset)
+    kept = dataset[there].drop_vars(without).assign_attrs(title="Made up", study=study)
+    return Result(Path("made.nc"), kept)
 
 
 def _positions(pairs: str) -> NDArray[np.float64]:
@@ -267,37 +220,42 @@ def _positions(pairs: str) -> NDArray[np.float64]:
 
 # --- samples, and scenes that differ ---
 
-N_SAMPLES = 64
-SAMPLE_CYCLES = (0.0, 100.0, 200.0)
+SAMPLE_CYCLES = (0.0, 5e4, 1e5)
 SCATTER = """[study]
 name = "s"
 [scatter]
-samples = {samples}
-friction_coefficient = {{normal = {{std = 0.03}}}}
-wear_coefficient = {{lognormal = {{factor = 1.5}}}}
-gap = {{normal = {{std = 1e-7}}, of = "each pair"}}
+samples = 128
+method = "sobol"
+seed = 1
+friction_coefficient = {normal = {mean = 0.5, std = 0.03}}
+wear_coefficient = {lognormal = {factor = 1.5}}
+gap = {normal = {std = 1e-7}, of = "each pair"}
 """
 
 
-def sample_file(n_samples: int = N_SAMPLES, factor: float = 1.5, jump: float = 0.0) -> xr.Dataset:
-    """Samples whose volume is proportional to the wear coefficient and the cycles, 1 mm3 at its median in the end.
+def sample_file(scatter: str = SCATTER, jump: float = 0.0) -> xr.Dataset:
+    """Samples with worn volumes k_w mu (1 + mean gap / 10 um) N / 1000, m3, twice that at the second frequency.
 
-    factor: by which one standard deviation multiplies the wear coefficient. jump: relative height of a step of the
-    volume where the friction coefficient is below its median.
+    Pair 1 is worn ten times as deep as the others. jump: of k_w mu where mu > 0.51, 1/Pa.
     """
-    axes = {"frequency": (190.0, 191.0), "scheme": ("adaptive",), "sample": range(n_samples)}
-    dataset = build_file(axes, SAMPLE_CYCLES, variables=OF_SAMPLES)
-    friction, wear = (norm.ppf(column) for column in qmc.Sobol(2, seed=1).random(n_samples).T)
-    volume = 1e-9 * factor**wear * np.where(friction < np.median(friction), 1.0 + jump, 1.0)
-    dataset["worn_volume"].values[...] = volume[:, None] * np.array(SAMPLE_CYCLES) / SAMPLE_CYCLES[-1]
-    dataset["worn_volume_error"].values[...] = 0.01
-    dataset["error_estimate"].values[...] = 0.01
-    gap = np.random.default_rng(1).normal(size=(n_samples, dataset.sizes["contact"])) * 1e-7
+    pairs = flank_positions()
+    section = ScatterSection.model_validate(tomllib.loads(scatter)["scatter"])
+    own = {"friction_coefficient": 0.5, "wear_coefficient": 1e-11, "gap": np.zeros(len(pairs))}
+    draws = drawn(section, own, ScatteredPairs(("flank",) * len(pairs), pairs))
+    friction, wear, gap = (draws[name].apply(values) for name, values in own.items())
+    dataset = build_file({"frequency": (211.5, 212.0), "sample": range(len(wear))}, SAMPLE_CYCLES, variables=OF_SAMPLES)
+    rate = 1e-3 * (wear * friction * (1.0 + 1e5 * gap.mean(axis=1)) + jump * (friction > 0.51))
+    volume = np.array([1.0, 2.0])[:, None, None] * rate[:, None] * np.array(SAMPLE_CYCLES)
+    share = np.where(np.arange(len(pairs)) == 1, 1.0, 0.1)
+    data = {"worn_volume": volume, "wear_depth_max": 1e4 * volume, "wear_depth_last": 1e4 * volume[..., -1:] * share}
+    data |= {"worn_volume_error": 0.01, "error_estimate": 0.01, "wear_depth_max_error": 1e2 * volume}
+    for name, values in data.items():
+        dataset[name].values[...] = values
     return dataset.assign_coords(
-        sample_friction_coefficient=("sample", 0.5 + 0.03 * friction, {"units": "1", "long_name": "friction"}),
-        sample_wear_coefficient=("sample", 1e-11 * factor**wear, {"units": "1/Pa"}),
+        sample_friction_coefficient=("sample", friction, {"units": "1", "long_name": "friction"}),
+        sample_wear_coefficient=("sample", wear, {"units": "1/Pa"}),
         sample_gap=(("sample", "contact"), gap, {"units": "m"}),
-    ).assign_attrs(study=SCATTER.format(samples=n_samples))
+    ).assign_attrs(study=scatter)
 
 
 def mesh_file() -> xr.Dataset:

@@ -1,47 +1,41 @@
-"""Study, scene and result files that are damaged, too large or of another kind: status 2 and one line."""
+"""Study, scene and result files that are damaged, or of another kind: status 2 and one line with the file."""
 
+import contextlib
+import os
 import shutil
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+import xarray as xr
 
+from studyrunner.api import open_result
 from studyrunner.cli import main
 from studyrunner.report import cli as report
+from studyrunner.result.opening import check_dataset, check_numbers
+from studyrunner.result.view import open_for_report
+from studyrunner.user_error import UserError
 from tests.studies.scene_models import poke, put
+from tests.studyrunner.results import build_file, sample_file
 
-STUDY = """
-[study]
-name = "s"
-[scene]
-model = "scene.h5"
-friction_coefficient = 0.5
-[axes]
-frequency = [150.0]
-[slow_time]
-cycles = 0
-outputs = 1
-"""
+STUDY = '[study]\nname = "s"\n[scene]\nmodel = "scene.h5"\nfriction_coefficient = 0.5\n[axes]\nfrequency = [150.0]\n'
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """The slider's scene file, and a result of it."""
+    """The slider's scene file, a study of it, and a result."""
     folder = tmp_path_factory.mktemp("made")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
+    with contextlib.chdir(folder):
         assert main(["sdof_slider", "--write-scene", "scene.h5"]) == 0
         Path("study").write_text(STUDY, encoding="utf-8")
-        assert main(["study", "-o", "result"]) == 0
-        Path("result.progress").unlink()
+        build_file(loops=(0,)).to_netcdf("out.nc")
     return folder
 
 
 @pytest.fixture
 def folder(made, tmp_path, monkeypatch):
-    for name in ("scene.h5", "study", "result"):
-        shutil.copy(made / name, tmp_path / name)
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -54,40 +48,168 @@ def refused(capsys):
         assert captured.out == ""
         (line,) = captured.err.splitlines()
         assert line.isprintable()
+        assert len(line) < 1000
         return line
 
     return run
 
 
-@pytest.mark.parametrize("share", [0.3, 0.9])
-@pytest.mark.parametrize("place", ["scene.h5", "result"])
-def test_a_truncated_file(share, place, folder, refused):
-    content = (folder / place).read_bytes()
-    (folder / place).write_bytes(content[: int(share * len(content))])
-    assert f"{place}: " in refused(["result" if place == "result" else "study", "--plan"])
-    if place == "result":
-        assert "result: " in refused(["result"], report.main)
+def cut(share):
+    return lambda path: os.truncate(path, int(share * path.stat().st_size))
 
 
-def test_a_result_that_is_none(folder, refused):
-    (folder / "result").write_bytes(b"CDF\x01" + bytes(100))
-    assert "is no NetCDF file (NetCDF-4)" in refused(["result"], report.main)
-    assert "there is none of this name" in refused(["none.nc"], report.main)
+def written(content):
+    return lambda path: path.write_bytes(content)
+
+
+def dataset(*variables):
+    return lambda path: xr.Dataset(*variables).to_netcdf(path)
+
+
+NO_FILES = {
+    "nothing": (Path.unlink, "there is none of this name"),
+    "less than a third": (cut(0.3), "give"),
+    "without its end": (cut(0.9), "give"),
+    "a text": (written(b"no NetCDF at all"), "is no NetCDF file"),
+    "an empty one": (written(b""), "is no NetCDF file"),
+    "NetCDF-3": (written(b"CDF\x01" + bytes(100)), "is no NetCDF file"),
+    "other data": (dataset({"a": ("x", [1.0])}), "holds no outcome and no cycle and no contact"),
+    "no point": (
+        dataset({"outcome": ("frequency", np.zeros(0, np.int8))}, {"cycle": [0.0], "contact": [0]}),
+        "frequency = 0 values",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", NO_FILES)
+def test_what_is_no_result_file(case, folder, refused):
+    change, remedy = NO_FILES[case]
+    change(folder / "out.nc")
+    line = refused(["out.nc"], report.main)
+    assert line.startswith("study-report: out.nc")
+    assert remedy in line
+    with pytest.raises(UserError, match=r"out\.nc"):
+        open_result("out.nc")
+    if remedy == "give":
+        # else it may be a study file
+        assert "out.nc: " in refused(["out.nc", "--plan"])
+
+
+def attribute(name, value, variable=""):
+    def change(file):
+        (file[variable] if variable else file).attrs[name] = value
+
+    return change
+
+
+def study(text):
+    def change(file):
+        del file.attrs["study"]
+        file.attrs.create("study", text, dtype=h5py.string_dtype("utf-8"))
+
+    return change
+
+
+WRONG_RESULTS = {
+    "a frequency that is none": poke("frequency", 0, np.nan),
+    "study that is nested deeply": study("a = " + "[" * 50_000),
+    "number of a dimension as text": attribute("_Netcdf4Dimid", "first", "frequency"),
+    "scale as text": attribute("scale_factor", "x", "worn_volume"),
+    "flags as text": attribute("flag_values", "0 1", "outcome"),
+    "cycles that do not rise": poke("cycle", 1, 1e9),
+    "a worn volume of 1e308": poke("worn_volume", ..., 1e308),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_RESULTS)
+def test_a_result_with_wrong_contents(case, folder, refused):
+    with h5py.File("out.nc", "r+") as file:
+        WRONG_RESULTS[case](file)
+    assert refused(["out.nc"], report.main).startswith("study-report: out.nc: ")
+    assert not (folder / "out-report").exists()
+    with pytest.raises(UserError, match="give"):
+        check_numbers(open_for_report("out.nc").dataset, "out.nc")
+
+
+@pytest.mark.parametrize("text", ["1.5.2", "nan"])
+def test_choices_are_numbers_or_auto(text, folder, refused):
+    build_file(axes={"frequency": (190.0, 191.0), "harmonics": ("auto", "3", text)}).to_netcdf("words.nc")
+    assert refused(["words.nc"], report.main).startswith("study-report: words.nc: harmonics")
+
+
+@pytest.mark.slow
+def test_numbers_that_are_damaged_where_they_are_large(folder, refused):
+    """What is not read beforehand shows its damage while it is drawn."""
+    axes = {"frequency": np.linspace(190.0, 200.0, 200), "scheme": ("implicit", "explicit")}
+    made = build_file(axes, cycles=range(160))
+    made.to_netcdf("large.nc", encoding={"wear_depth": {"zlib": True, "chunksizes": made["wear_depth"].shape}})
+    with h5py.File("large.nc") as file:
+        place = file["wear_depth"].id.get_chunk_info(0)
+        assert file["wear_depth"].size * 8 > 2**23
+    with Path("large.nc").open("rb+") as damaged:
+        damaged.seek(place.byte_offset + 100)
+        damaged.write(bytes(100))
+    assert "large.nc: the file = damaged" in refused(["large.nc", "--no-compute"], report.main)
 
 
 @pytest.mark.parametrize(
-    ("change", "sentence"),
+    ("dimensions", "content", "is_right"),
+    [
+        (("frequency", "sample", "contact"), np.nan, True),
+        (("contact", "sample"), 1.0, False),
+        (("frequency", "contact"), 1.0, False),
+        (("sample",), "text", False),
+        (("sample",), np.nan, False),
+    ],
+)
+def test_drawn_values_are_along_any_axes_in_order(dimensions, content, is_right):
+    made = sample_file().isel(sample=slice(4))
+    drawn = np.full([made.sizes[name] for name in dimensions], content)
+    dataset = made.assign_coords(sample_gap=(dimensions, drawn, {"units": "m"}))
+    with contextlib.nullcontext() if is_right else pytest.raises(UserError, match="sample_gap"):
+        xr.testing.assert_equal(check_dataset(dataset, "s.nc").sample_gap.variable, dataset.sample_gap.variable)
+
+
+def linked(file):
+    study(STUDY)(file)
+    file.create_group("scene")["mass2"] = h5py.ExternalLink("other.h5", "/")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda file: file.attrs.__delitem__("study"), "study"),
+        (study("[study"), "valid TOML"),
+        (study(STUDY), "scene.model"),
+        (linked, "mass2"),
+    ],
+)
+def test_a_result_that_is_run_again(change, words, folder, refused):
+    Path("scene.h5").unlink()
+    with h5py.File("out.nc", "r+") as file:
+        change(file)
+    assert words in refused(["out.nc", "-o", "again.nc"])
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_a_truncated_scene(share, folder, refused):
+    cut(share)(folder / "scene.h5")
+    assert "scene.h5: " in refused(["study", "--plan"])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
     [
         (poke("stiffness", (0, 0), np.nan), "stiffness"),
         (put("response/names", ["\x1b[31mred", "\x1b[31mred"]), r"\x1b[31mred"),
     ],
 )
-def test_a_scene_that_is_none(change, sentence, folder, refused):
+def test_a_scene_that_is_none(change, words, folder, refused):
     with h5py.File("scene.h5", "r+") as file:
         change(file)
     line = refused(["study"])
     assert line.startswith("run-study: scene.h5: ")
-    assert sentence in line
+    assert words in line
 
 
 def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
@@ -95,6 +217,6 @@ def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
     Path(name).write_text("[study", encoding="utf-8")
     assert r"\x1b[2J\udcff.toml" in refused([name])
     assert "[2J" in refused(["study", "--set", "axes.step=\x1b[2J"])
-    (folder / "study").write_text(STUDY.replace('name = "s"', 'name = "s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
+    Path("study").write_text(STUDY.replace('"s"', '"s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
     assert main(["study", "--plan"]) == 0
     assert "\x1b" not in capsys.readouterr().out

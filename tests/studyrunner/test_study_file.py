@@ -1,33 +1,40 @@
-"""Study files: defaults, axes, overrides and the effective study that goes into the result."""
+"""Study files: defaults, axes, overrides, the effective study that goes into the result; the pages on them."""
 
-import os
+import re
+import shutil
 from pathlib import Path
 
-import h5py
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from studyrunner.cli import main
+from studyrunner.study.keys import key_list
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study_file import format_study, read_study
+from studyrunner.study.toml_text import format_toml, read_toml
+from studyrunner.user_error import UserError
 from studyrunner.variables import USUAL
+from tests.studies.fe_models.decks import SECTOR
+from tests.studyrunner.small_studies import FOLLOWED, MISSIONS, MODES, SAMPLES, SLIDER, TO_THE_END, write_depths
 
-SMALLEST = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\n[axes]\nfrequency = 100\n'
-
-
-def write(folder, text):
-    path = folder / "study.toml"
-    path.write_text(text, encoding="utf-8")
-    return str(path)
+ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.usefixtures("folder")
 
 
-def test_a_byte_order_mark_is_no_text(tmp_path):
-    path = tmp_path / "study.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + SMALLEST.replace("\n", "\r\n").encode())
-    assert read_study(str(path)).study.name == "s"
+def read(text, *overrides):
+    Path("s.toml").write_text(text, encoding="utf-8")
+    return read_study("s.toml", overrides)
 
 
-def test_every_default_is_filled_in(tmp_path):
-    study = read_study(write(tmp_path, SMALLEST))
+# --- what is read ---
+
+
+def test_every_default_is_filled_in():
+    smallest = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\n[axes]\nfrequency = 100\n'
+    # a byte order mark is no text
+    Path("s.toml").write_bytes(b"\xef\xbb\xbf" + smallest.replace("\n", "\r\n").encode())
+    study = read_study("s.toml")
     assert study.dimensions == {
         "frequency": (100.0,),
         "wear_coefficient": (1.1e-11,),
@@ -40,30 +47,23 @@ def test_every_default_is_filled_in(tmp_path):
     assert (study.solver.time_limit, study.solver.shortcuts) == (None, True)
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5
-    assert "loop_force" not in study.outputs.variables
-    assert study.outputs.variables == USUAL
-    assert study.outputs.loops == ()
-
-
-def test_one_word_stands_for_the_default_variables():
-    study = read_study("dovetail", ["outputs.variables=['natural_frequency', 'default']"])
-    assert study.outputs.variables == (*USUAL, "mesh", "natural_frequency")
+    assert (study.outputs.variables, study.outputs.loops) == (USUAL, ())
+    more = read_study("dovetail", ["outputs.variables=['natural_frequency', 'default']"])
+    assert more.outputs.variables == (*USUAL, "mesh", "natural_frequency")
 
 
 @pytest.mark.parametrize(
     ("given", "written"),
     [
         ("{start = 212, stop = 213, num = 6}", "212.0 212.2 212.4 212.6 212.8 213.0"),
-        ("{start = 212.3, stop = 212.7, num = 5}", "212.3 212.4 212.5 212.6 212.7"),
         ("{start = 0.3, stop = 0.1, num = 3}", "0.3 0.2 0.1"),
         ("{start = 1e-300, stop = 4e-300, num = 4}", "1e-300 2e-300 3e-300 4e-300"),
         ("{start = 1, stop = 2, num = 4}", "1.0 1.3333333333333333 1.6666666666666667 2.0"),
         ("{start = 7.7, stop = 9, num = 1}", "7.7"),
     ],
 )
-def test_values_of_a_range_are_those_that_a_person_writes(tmp_path, given, written):
-    study = read_study(write(tmp_path, SMALLEST.replace("frequency = 100", f"frequency = {given}")))
-    assert " ".join(map(repr, study.axes.frequency)) == written
+def test_values_of_a_range_are_those_that_a_person_writes(given, written):
+    assert " ".join(map(repr, read(SLIDER, f"axes.frequency={given}").axes.frequency)) == written
 
 
 @pytest.mark.parametrize(
@@ -79,62 +79,144 @@ def test_several_values_of_a_solver_key_are_an_axis(key, values):
     assert format_study(here) == format_study(there)
 
 
-@pytest.mark.parametrize("harmonics", ["solver.harmonics=3", "axes.harmonics=[1, 3]", "axes.harmonics=['auto', 3]"])
-def test_effective_study_reads_back_the_same(harmonics, tmp_path):
-    overrides = [harmonics, "axes.rtol=[0.1, 0.2]", "study.title='a \\ \"title\" with é'", "slow_time.outputs=[0, 10]"]
-    study = read_study("dovetail", overrides)
-    again = read_study(write(tmp_path, format_study(study)))
-    assert again.model_dump() == study.model_dump()
-    assert format_study(again) == format_study(study)
-
-
-LONG = ("--set", "slow_time.cycles=1e6", "--set", "slow_time.outputs=200000")
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "s.toml").write_text(SMALLEST, encoding="utf-8")
-    with h5py.File(tmp_path / "s.nc", "w") as earlier:
-        earlier.attrs["study"] = SMALLEST
-    return tmp_path
-
-
-def line_of(arguments, capsys):
-    """The one line that bad input ends with; nothing else is said, nothing is written."""
-    before = {path: path.stat().st_mtime_ns for path in Path.cwd().iterdir()}
-    assert main(arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    said = captured.err.splitlines()
-    assert len(said) == 1
-    assert {path: path.stat().st_mtime_ns for path in Path.cwd().iterdir()} == before
-    return said[0]
+# --- the effective study ---
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("text", "overrides"),
     [
-        (["missing.toml"], ("missing.toml", "no such file")),
-        (["unheard_of"], ("unheard_of", "dovetail")),
-        (["."], (".", "folder")),
-        (["s.toml", "--from", "deck.inp"], ("command line", "--from", "--new NAME")),
-        (["s.toml", "--bogus"], ("command line", "--bogus", "--help")),
-        (["s.toml", "--set", "axes.step=[1,"], ("command line", "axes.step", "[1,", "TOML")),
-        (["s.toml", "--set", "study.name.first=a"], ("command line", "study.name.first", "name holds a value")),
-        (["s.toml", *LONG, "--set", "outputs.loops=[0]"], ("outputs.loops = [0]", "1.3 GB")),
-        (["s.toml", "-o", "nowhere/out.nc"], ("command line", "nowhere/out.nc", "folder that exists")),
-        (["s.toml", "-o", "\udcff.nc"], ("command line", r"\udcff.nc", "give a name in UTF-8")),
-        (["s.toml", "-o", "s.toml"], ("command line", "s.toml", "read by the run")),
-        (["s.toml", "--write-scene", "nowhere/out.h5"], ("command line", "--write-scene", "folder that exists")),
+        (
+            SLIDER,
+            [
+                "solver.harmonics=3",
+                "axes.rtol=[0.1, 0.2]",
+                "study.title='\\ \"title\" with é'",
+                "slow_time.outputs=[0]",
+            ],
+        ),
+        (SLIDER, ["axes.samples=[64, 'auto']", "wear.law=threshold", "axes.threshold=[0, 5]"]),
+        (SLIDER, ["wear.surfaces={support=0.5}", "scatter={samples=8, surfaces={support={lognormal={factor=1.5}}}}"]),
+        (SLIDER, ["scene.worn={result='worn.nc', cycle=[0, 1000]}"]),
+        (SAMPLES, ["axes.stiffness=[1.7e5, 1.6e5]", "axes.friction_coefficient=[0.4, 0.6]"]),
+        (MODES, ["scene.worn={depth=[[1e-6], [0.0]], cycle=[1e4, 0]}", "axes.mode=[1, 3]"]),
+        (MISSIONS, ["mission.cruise.seconds=20", "mission.2.cycles=500"]),
+        (FOLLOWED, []),
+        (TO_THE_END, ["axes.scheme=final"]),
+        # each load has a width of its own
+        (SLIDER, ["scene={model='cylinder_on_flat', stroke=1e-5}", "slow_time.cycles=10", "axes.P=[1e5, 2e5]"]),
     ],
 )
-def test_command_line(arguments, words, folder, capsys):
-    line = line_of(arguments, capsys)
-    for word in words:
-        assert word in line
+def test_the_effective_study_is_the_same_study(text, overrides):
+    write_depths("worn.nc", 150.0, [0.0, 1000.0], 1)
+    study = read(text, *overrides)
+    Path("worn.nc").unlink()
+    written = format_study(study)
+    again = read(written)
+    assert format_study(again) == written
+    assert (again.dimensions, again.follow) == (study.dimensions, study.follow)
+    assert [each.scene for each in again.variants] == [each.scene for each in study.variants]
 
 
-def test_write_protected_output(folder, capsys, monkeypatch):
-    monkeypatch.setattr(os, "access", lambda *_: False)
-    assert "write-protected" in line_of(["s.toml"], capsys)
+def test_a_title_does_not_reach_the_terminal_raw(capsys):
+    Path("s.toml").write_text(SLIDER.replace('name = "s"', 'name = "s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
+    assert main(["s.toml", "--plan"]) == 0
+    assert "\x1b" not in capsys.readouterr().out
+
+
+VALUES = (
+    *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
+    *("{}", "[[1]]", '""', '"auto"', '"\\u001b[2J"', "'../../x'", "[1, 'a']", "{start = 1, stop = 2, num = 1e9}", "="),
+    *('"default"', "[" * 60 + "]" * 60, "1e9", '"adaptive"', "[nan]", "{start = nan, stop = 2, num = 3}", "\x00", "]"),
+    *('"peak"', "[1.0, 2.0]", "{normal = {std = 0.1}}", "[{name = 1}]", "#", "\ud800"),
+)
+TEXTS = [SLIDER, MODES, FOLLOWED, SAMPLES, MISSIONS]
+CHANGES = st.one_of(
+    st.tuples(st.just("value"), st.integers(0, 99), st.sampled_from(VALUES)),
+    st.tuples(st.just("value"), st.integers(0, 99), st.sampled_from(VALUES)),
+    st.tuples(st.just("insert"), st.integers(0, 99), st.sampled_from(sorted({*"\n".join(TEXTS).splitlines()}))),
+    st.tuples(st.just("text"), st.integers(0, 99), st.text(max_size=9)),
+    st.tuples(st.just("remove"), st.integers(0, 99), st.just("")),
+)
+
+
+@pytest.mark.slow
+@settings(suppress_health_check=list(HealthCheck))
+@given(st.sampled_from(TEXTS), st.lists(CHANGES, min_size=1, max_size=4))
+def test_any_text_is_a_study_that_can_be_written_or_mistakes(text, changes):
+    lines = text.splitlines()
+    for way, number, new in changes:
+        place = number % max(1, len(lines))
+        if way == "value" and lines and "=" in lines[place]:
+            lines[place] = f"{lines[place].partition('=')[0]}= {new}"
+        elif way == "remove":
+            del lines[place : place + 1]
+        else:
+            lines.insert(place, new)
+    Path("any.toml").write_bytes("\n".join(lines).encode("utf-8", "surrogatepass"))
+    said = ""
+    try:
+        study = read_study("any.toml")
+    except UserError as error:
+        said = str(error)
+    assert all(line.isprintable() and len(line) < 2000 for line in said.splitlines())
+    if not said:
+        Path("any.toml").write_text(format_study(study), encoding="utf-8")
+        assert format_study(read_study("any.toml")) == format_study(study)
+
+
+# --- the pages ---
+
+PAGES = [path for path in ROOT.rglob("*.md") if ".venv" not in path.parts and "```toml" in path.read_text("utf-8")]
+EXAMPLES = [
+    pytest.param(text, id=f"{page.stem}-{number}", marks=[pytest.mark.slow] * ("[study]" in text))
+    for page in sorted(PAGES)
+    for number, text in enumerate(re.findall(r"^```toml\n(.*?)^```$", page.read_text("utf-8"), re.M | re.S))
+]
+
+
+@pytest.mark.parametrize("text", EXAMPLES)
+def test_every_example_is_a_study(text, capsys):
+    # what the examples name: a result, a scene file, decks, reduced matrices
+    write_depths("dovetail.nc", 211.5, [0.0, 1e4, 5e4, 1e5], 24)
+    assert main(["sdof_slider", "--write-scene", "my_root.h5"]) == 0
+    for deck in (SECTOR, ROOT / "studies" / "blade_root.inp"):
+        shutil.copy(deck, deck.name.removeprefix("calculix_"))
+    for name in ("nodes.csv", "blade.pch", "stress.csv"):
+        Path(name).touch()
+    table = read_toml(text.encode(), "page")
+    complete = {"study", "scene"} <= table.keys() and table.keys() & {"axes", "mission"}
+    given = {"study": {"name": "s"}, "scene": {"model": "dovetail_sector"}, "axes": {}}
+    whole = table if complete else {**given, **table}
+    whole["scene"].setdefault("model", "dovetail_sector")
+    if not complete and "modal_amplitude" not in whole["axes"]:
+        whole["axes"].setdefault("frequency", 211.5)
+    if whole["scene"]["model"] == "sector.inp":
+        # the names of the page are those of any deck
+        whole["scene"].pop("friction_coefficient")
+    assert read(format_toml(whole)).dimensions
+    if complete:
+        Path("s.toml").write_text(text, encoding="utf-8")
+        assert main(["s.toml", "--plan"]) == 0
+        assert "points" in capsys.readouterr().out
+
+
+def test_the_list_of_keys_is_that_of_the_program():
+    page = (ROOT / "studyrunner" / "STUDY_FILE.md").read_text("utf-8")
+    assert key_list() in page, "python -m studyrunner.study.keys"
+
+
+def test_a_new_study_is_planned_and_its_comments_are_its_defaults(folder):
+    assert main(["--new", "wear"]) == 0
+    text = Path("wear.toml").read_text("utf-8")
+    study = read_study("wear.toml")
+    assert study.study.name == "wear"
+    body, _, scatter = text.partition("# [scatter]")
+    shown = re.sub(r"^# (\w+ = )", r"\1", body, flags=re.M)
+    assert len(read_toml(shown.encode(), "")["solver"]) == 5
+    assert format_study(read(shown)) == format_study(study)
+    assert read(body + ("[scatter]" + scatter).replace("\n# ", "\n")).dimensions["sample"] == tuple(range(16))
+    shutil.copy(SECTOR, "sector.inp")
+    assert main(["--new", "root", "--from", "sector.inp"]) == 0
+    assert read_study("root.toml").axes.frequency_ratio == (0.99, 1.0)
+    for name in ("wear", "root"):
+        assert main([f"{name}.toml", "--plan"]) == 0

@@ -3,25 +3,11 @@
 Each writer takes matrices and forces by name, and node and dof of the rows (n, 2), and writes job.*.
 """
 
-import shutil
-import subprocess
 from functools import partial
-from pathlib import Path
 
 import h5py
 import numpy as np
-import pytest
 from scipy import io, sparse
-
-needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
-
-
-def run_ccx(folder: Path, text: str, name: str = "sector") -> Path:
-    """Runs a deck and returns the name that its files have in common."""
-    (folder / f"{name}.inp").write_text(text)
-    done = subprocess.run(["ccx", name], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
-    assert "Job finished" in done.stdout, done.stdout[-500:]
-    return folder / name
 
 
 def chain(nodes: tuple[int, ...] = (1, 2, 10)):

@@ -7,14 +7,8 @@ import pytest
 
 from studies.finite_element.reduced_joint import glued_frequencies
 from studies.scene_error import SceneError
-from tests.studies.fe_models.constrained_decks import (
-    BLOCKS,
-    SECTORS,
-    frequencies,
-    of_calculix,
-    prepared_deck,
-    run_tied,
-)
+from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
+from tests.studies.fe_models.solid_meshes import needs_ccx
 
 REFERENCE = "*NODE\n900, 45., 5., 0.\n"
 STATIC = "*STEP\n*STATIC\n*DLOAD\nEALL1, CENTRIF, 1e7, -100., 0., 0., 0., 0., 1.\n*END STEP\n"
@@ -39,21 +33,21 @@ BOTH_READ = {
 }
 
 
-@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@needs_ccx
 @pytest.mark.parametrize("name", BOTH_READ)
 def test_as_calculix(name, tmp_path):
     text = BLOCKS + BOTH_READ[name]
     np.testing.assert_allclose(frequencies(tmp_path, text), of_calculix(tmp_path, text), rtol=1e-6)
 
 
-@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@needs_ccx
 def test_prestress_of_a_constrained_structure_as_calculix(tmp_path):
     text = BLOCKS + BOTH_READ["rigid line"] + STATIC
     expected = of_calculix(tmp_path, text, "*STEP, PERTURBATION\n*FREQUENCY\n4\n*END STEP\n")
     np.testing.assert_allclose(frequencies(tmp_path, text), expected, rtol=1e-6)
 
 
-@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@needs_ccx
 @pytest.mark.parametrize("name", ["rigid end with nodes in contact", "cylindrical directions"])
 def test_constraints_on_matrices_of_calculix(name, tmp_path):
     """They are written without constraints, which the deck still has."""
@@ -122,7 +116,7 @@ def test_forces_of_the_deck_and_gravity(tmp_path):
     np.testing.assert_allclose(moved[0], moved[1], atol=1e-9 * abs(moved[0]).max())
 
 
-@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@needs_ccx
 @pytest.mark.parametrize("dofs", ["2, 3", "1"])
 def test_cylindrical_directions_on_cut_faces_as_calculix(dofs, tmp_path):
     """The bore slides along its radius, or about the axis, in a sector at nodal diameter 3."""
@@ -155,26 +149,3 @@ def test_moving_nodes_that_are_held_obliquely(tmp_path):
     for nodes in ("105, 110, 115", "115"):
         with pytest.raises(SceneError, match=r"node 1\d5 of SUP is held in a direction in which the other"):
             prepared_deck(tmp_path, text.replace("105, 110, 115, 20, 25, 30", nodes))
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        (
-            "*EQUATION\n2\n5,1,1.,15,1,-1.\n2\n5,1,1.,10,1,-1.\n",
-            r"\*EQUATION: displacement 1 of node 5 depends on others by",
-        ),
-        ("*EQUATION\n2\n1,1,1.,15,1,-1.\n", r"\*EQUATION: displacement 1 of node 1 depends on others and is held"),
-        (
-            "*EQUATION\n2\n105,1,1.,15,1,-1.\n2\n20,1,1.,15,1,-1.\n",
-            r"\*EQUATION: node 105 depends on others and moves in a contact pair",
-        ),
-        ("*TRANSFORM, NSET=XM, TYPE=C\n40,0,0,40,0,1\n*BOUNDARY\nXM,1\n", r"\*TRANSFORM: node 5 is on the axis"),
-        ("*BOUNDARY\nXM, 1, 1, 0.1\n", r"\*BOUNDARY moves XM by 0.1"),
-        ("*STEP\n*STATIC\n*DLOAD\nELOW, BX, 1.\n*END STEP\n", r"\*DLOAD of type BX is not read"),
-    ],
-)
-def test_conflicts_are_refused(text, sentence, tmp_path):
-    with pytest.raises(SceneError, match=sentence) as wrong:
-        prepared_deck(tmp_path, BLOCKS + text)
-    assert "deck.inp, line " in str(wrong.value)

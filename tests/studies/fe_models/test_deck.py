@@ -1,11 +1,16 @@
-"""Decks come out as they are written."""
+"""Decks come out as they are written: meshes, sets, instances, contact, loads; and what of a deck is skipped."""
+
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import studies
 from studies.fe_models.deck.contents import ContactPair, Material, SolidSection, Tie
-from studies.fe_models.deck.read import read_deck
-from tests.studies.fe_models.decks import CUBES, PART, write
+from studies.fe_models.deck.read import HARMLESS, KEYWORDS, read_deck
+from studies.scene_error import SceneError
+from tests.studies.fe_models.decks import BLOCKS, CUBES, PART, prepared_deck, write
 
 
 def line_of(text):
@@ -113,20 +118,177 @@ def test_included_files(tmp_path):
         assert deck.skipped == (f"rest.inp, line {line}: *NODE PRINT",)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        CUBES.lower(),
-        CUBES.replace("\n", "\r\n"),
-        CUBES.replace(", ", ",  "),
-        CUBES.replace(", ", ",\t"),
-        "\xef\xbb\xbf" + CUBES,
-    ],
-    ids=["small", "Windows", "blanks", "tabs", "byte order mark"],
-)
-def test_case_line_ends_and_blanks_do_not_matter(tmp_path, cubes, text):
-    deck = read_deck(write(tmp_path, text))
+OTHERS = {
+    "small": CUBES.lower(),
+    "Windows": CUBES.replace("\n", "\r\n"),
+    "tabs": CUBES.replace(", ", ",\t "),
+    "byte order mark": "\xef\xbb\xbf" + CUBES,
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_case_line_ends_and_blanks_do_not_matter(tmp_path, cubes, name):
+    deck = read_deck(write(tmp_path, OTHERS[name]))
     np.testing.assert_array_equal(deck.coordinates, cubes.coordinates)
     assert deck.node_sets.keys() == cubes.node_sets.keys()
     assert deck.contact_pairs == cubes.contact_pairs
     assert len(deck.centrifugal) == len(deck.skipped) == 1
+
+
+GRID = "*NODE, NSET=N\n" + "".join(
+    f"{1 + i + 3 * j + 9 * k}, {i}, {2 * j}, {0.5 * k}\n" for k in range(3) for j in range(3) for i in range(3)
+)
+CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+CELLS = "*ELEMENT, TYPE=C3D8, ELSET=E\n" + "".join(
+    f"{1 + i + 2 * j + 4 * k}, " + ", ".join(str(1 + i + a + 3 * (j + b) + 9 * (k + c)) for a, b, c in CORNERS) + "\n"
+    for k in range(2)
+    for j in range(2)
+    for i in range(2)
+)
+MADE_NODES = """\
+*NODE
+1, 0, 0, 0
+3, 2, 0, 0
+7, 0, 4, 0
+9, 2, 4, 0
+*NGEN, NSET=R1
+1, 3
+*NGEN, NSET=R3
+9, 7, -1
+*NFILL, NSET=L1
+R1, R3, 2, 3
+*NCOPY, CHANGE NUMBER=18, OLD SET=L1, NEW SET=L3, SHIFT
+0, 0, 1.
+*NFILL, NSET=N
+L1, L3, 2, 9
+*ELEMENT, TYPE=C3D8, ELSET=E
+1, 1, 2, 5, 4, 10, 11, 14, 13
+"""
+ALL_OF_THEM = "*ELGEN, ELSET=E\n1, 2, 1, 1, 2, 3, 2, 2, 9, 4\n"
+COPIED = "*ELGEN, ELSET=E\n1, 2, 1, 1, 2, 3, 2\n*ELCOPY, ELEMENT SHIFT=4, OLD SET=E, SHIFT NODES=9, NEW SET=E\n"
+
+
+@pytest.mark.parametrize("made", [ALL_OF_THEM, COPIED], ids=["ELGEN", "ELCOPY"])
+def test_nodes_and_elements_of_others(made, tmp_path):
+    whole, deck = (read_deck(write(tmp_path, text)) for text in (GRID + CELLS, MADE_NODES + made))
+    assert deck.node_numbers.tolist() == whole.node_numbers.tolist()
+    np.testing.assert_allclose(deck.coordinates, whole.coordinates, atol=1e-12)
+    np.testing.assert_array_equal(deck.blocks[0].nodes, whole.blocks[0].nodes)
+    assert deck.element_sets["E"].tolist() == [*range(1, 9)]
+    assert deck.node_sets["N"].tolist() == [*range(1, 28)]
+
+
+def test_coordinates_of_a_system(tmp_path):
+    """Origin, first axis, plane of the first two; by the first two points about z; shifted alone."""
+    text = "*SYSTEM\n40, 10, 0, 39, 10, 0\n40, 9, 0\n*NODE\n1, 20, 10, 5\n"
+    text += "*SYSTEM\n1, 1, 1, 1, 2, 1\n*NODE\n2, 3, 0, 0\n"
+    text += "*SYSTEM\n1, 2, 3\n*NODE\n3, 1, 1, 1\n*SYSTEM\n*NODE\n4, 7, 8, 9\n"
+    deck = read_deck(write(tmp_path, text))
+    np.testing.assert_allclose(deck.coordinates, [[20, 0, 5], [1, 4, 1], [2, 3, 4], [7, 8, 9]], atol=1e-12)
+
+
+def test_two_instances(tmp_path):
+    """Each has its numbers and names: a line may say whose; a name that several have needs that before it."""
+    part = f"*PART, NAME=P\n{GRID}{CELLS}*SURFACE, NAME=TOP\nE, S2\n*END PART\n"
+    placed = "*INSTANCE, NAME=I1, PART=P\n*END INSTANCE\n*INSTANCE, NAME=I2, PART=P, NSET=ALL2\n0, 0, 1.\n"
+    placed += "0, 0, 0, 0, 0, 1, 90.\n*END INSTANCE\n"
+    sets = "*NSET, NSET=X, INSTANCE=I2\nN\n*NSET, NSET=Y\nI1.3, I2.3\n*NSET, NSET=Z, INSTANCE=I1, GENERATE\n1, 1000\n"
+    head = f"{part}*ASSEMBLY, NAME=A\n{placed}{sets}*NODE\n1, 9, 9, 9\n*NSET, NSET=RP\n1\n*END ASSEMBLY\n"
+    deck = read_deck(write(tmp_path, head))
+    assert deck.notes == ("Node 1 of I2 is node 101.", "Node 1 of the assembly is node 201.")
+    sets = {name: members.tolist() for name, members in deck.node_sets.items()}
+    assert sets["Y"] == [3, 103]
+    assert sets["RP"] == [201]
+    assert sets["X"] == sets["ALL2"] == sets["I2.N"] == [*range(101, 128)]
+    assert sets["Z"] == sets["I1.N"] == [*range(1, 28)]
+    assert sorted(deck.surfaces) == ["I1.TOP", "I2.TOP"]
+    np.testing.assert_allclose(deck.coordinates[28], [0, 1, 1], atol=1e-12)  # 1, 0, 0: shifted, then turned
+    with pytest.raises(SceneError, match=r"2 instances have TOP, at \*CONTACT PAIR; write I1.TOP or I2.TOP"):
+        read_deck(write(tmp_path, head + "*CONTACT PAIR, INTERACTION=I\nTOP, I1.TOP\n"))
+    with pytest.raises(SceneError, match=r"deck.inp has no nodes: no \*PART has an \*INSTANCE"):
+        read_deck(write(tmp_path, part))
+
+
+def test_materials_at_a_temperature(tmp_path):
+    """Interpolated at the temperature that all nodes have; without one, or with another in a step, refused."""
+    rows = "210000., 0.3, 20.\n150000., 0.3, 620."
+    text = BLOCKS.replace("210000., 0.3", rows)
+    at = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\n"
+    deck = read_deck(write(tmp_path, f"{text}{at}ALLN, 320.\n"))
+    assert (deck.materials["STEEL"].young, deck.materials["STEEL"].problem) == (180000.0, "")
+    refused = (
+        "",
+        f"{at}XE, 320.\n",
+        f"{at}ALLN, 320.\nXE, 20.\n",
+        f"{at}ALLN, 320.\n*STEP\n*STATIC\n*TEMPERATURE\nALLN, 50.\n",
+    )
+    for more in refused:
+        with pytest.raises(SceneError, match=r"line \d+: \*ELASTIC at several temperatures, of which none is given"):
+            prepared_deck(tmp_path, text + more)
+    with pytest.raises(SceneError, match=r"\*TEMPERATURE strains materials with \*EXPANSION"):
+        read_deck(write(tmp_path, text.replace("*DENSITY", "*EXPANSION\n1e-5\n*DENSITY") + refused[-1]))
+
+
+def test_glued_contact_pairs(tmp_path):
+    """TIED pairs are no contact; where there is no other one, nothing wears."""
+    halves = BLOCKS.replace(
+        "*SURFACE, NAME=SUP\nEUP, S1", "*SURFACE, NAME=SUP\n101, S1\n105, S1\n*SURFACE, NAME=REST\n103, S1\n107, S1"
+    )
+    tied = "*SURFACE INTERACTION, NAME=T\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TIED\n"
+    tied += "*CONTACT PAIR, INTERACTION=T\nREST, SLOW\n"
+    prepared, loaded = prepared_deck(tmp_path, halves + tied)
+    assert [tie.name for tie in loaded.joint.ties] == ["REST-SLOW"]
+    assert prepared.pairs.n_contact == 6
+    alone = BLOCKS.replace("*FRICTION\n0.4", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TIED\n1e7")
+    with pytest.raises(SceneError, match=r"line \d+: \*SURFACE BEHAVIOR, .*=TIED: all contact pairs are"):
+        prepared_deck(tmp_path, alone)
+    assert prepared_deck(tmp_path, alone, contact=(("SUP", "SLOW"),), friction_coefficient=0.3)[0].pairs.n_contact == 15
+
+
+@pytest.mark.parametrize(
+    ("text", "gap"),
+    [
+        ("*CLEARANCE, MASTER=SLOW, SLAVE=SUP, VALUE=0.01\n", 1e-5),
+        ("*CLEARANCE, MASTER=SLOW, SLAVE=SUP, VALUE=-0.02\n", -2e-5),
+        ("*STEP\n*STATIC\n*CONTACT INTERFERENCE, SHRINK\nSUP, SLOW\n*END STEP\n", -1e-4),
+    ],
+)
+def test_clearance_and_interference_are_gaps(text, gap, tmp_path):
+    """Positive where surfaces are apart; an interference is the overlap of the mesh. The study has to agree."""
+    moved = re.sub(r"^(1[0-3]\d, .*), 5$", r"\1, 4.9", BLOCKS, flags=re.MULTILINE)
+    assert moved.count(", 4.9") == 15
+    prepared, _ = prepared_deck(tmp_path, moved + text, gaps=True)
+    np.testing.assert_allclose(prepared.pairs.gap, gap, atol=1e-12)
+    with pytest.raises(SceneError, match=r"gaps: deck.inp, line \d+: \*C.*, and the study lets the surfaces touch"):
+        prepared_deck(tmp_path, moved + text)
+
+
+def test_removed_elements_and_pairs(tmp_path):
+    """What a static step takes away is no part of the model; what one takes away that writes matrices is."""
+    gone = "*ELSET, ELSET=GONE\n104, 108\n*STEP\n*STATIC\n*MODEL CHANGE, TYPE=ELEMENT, REMOVE\nGONE\n*END STEP\n"
+    fewer = re.sub(r"^10[48], 1\d\d, 1\d\d, .*\n", "", BLOCKS, flags=re.MULTILINE)
+    deck = read_deck(write(tmp_path, BLOCKS + gone))
+    expected = read_deck(write(tmp_path, fewer))
+    assert [text.partition(": ")[2] for text in deck.removed] == ["*MODEL CHANGE takes elements away."]
+    np.testing.assert_array_equal(deck.blocks[0].nodes, expected.blocks[0].nodes)
+    assert deck.surfaces["SUP"].elements.tolist() == expected.surfaces["SUP"].elements.tolist()
+    pair = "*STEP\n*STATIC\n*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nSUP, SLOW\n*END STEP\n"
+    assert not read_deck(write(tmp_path, BLOCKS + pair)).contact_pairs
+    written = pair.replace("*STATIC", "*FREQUENCY, SOLVER=MATRIXSTORAGE")
+    assert len(read_deck(write(tmp_path, BLOCKS + written)).contact_pairs) == 1
+
+
+def lists_of_keywords():
+    """What the page says of keywords: which are read with which parameters, and which are skipped."""
+    rows = ["| read | parameters that are acted upon | parameters that are skipped |", "|---|---|---|"]
+    procedures = [name for name, each in KEYWORDS.items() if "*" in each.parameters]
+    for name, each in sorted(KEYWORDS.items()):
+        if name not in procedures:
+            own = [" ".join(sorted(names)) for names in (each.parameters, each.harmless)]
+            rows.append(f"| `{name}` | {own[0]} | {own[1]} |")
+    rows += ["", "Procedures, with any parameters: " + ", ".join(f"`{name}`" for name in procedures) + ".", ""]
+    return "\n".join([*rows, "Skipped: " + ", ".join(f"`{name}`" for name in sorted(HARMLESS)) + "."])
+
+
+def test_the_page_has_the_lists():
+    assert lists_of_keywords() in (Path(studies.__path__[0]) / "fe_models/README.md").read_text()

@@ -18,7 +18,7 @@ from studies.finite_element.joint_model import (
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.finite_element.solid_mesh import Rotation, assemble_mass, assemble_stiffness, spin_softening
-from studies.finite_element.surfaces import surface_of_faces
+from studies.finite_element.surfaces import surface_of_faces, surface_of_nodes
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, wedge_shape
@@ -216,6 +216,42 @@ def test_more_modes_than_a_singular_mass_has(kind, monkeypatch):
     monkeypatch.setattr(reduction, "_SMALL", 0)
     fewer = build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=2, n_modes=3), 1)
     assert np.allclose(fewer.summary.glued_frequencies[2], frequencies[:3], rtol=1e-10)
+
+
+def test_reduced_frequencies_come_down_to_the_exact_ones():
+    """Two bricks, one on the other, whose pairs cannot open but slide freely."""
+    lower, a = block("C3D8I", (3, 2, 2), lambda points: points * [0.3, 0.2, 0.1])
+    upper, b = block("C3D8I", (3, 2, 2), lambda points: points * [0.3, 0.2, 0.15] + [0.0, 0.0, 0.1])
+    mesh = joined(lower, upper)
+    bottom, top = np.flatnonzero(a[:, 2] == 1.0), lower.n_nodes + np.flatnonzero(b[:, 2] == 0.0)
+    held = np.zeros((mesh.n_nodes, 3), dtype=bool)
+    held[np.flatnonzero(a[:, 2] == 0.0)] = True
+    tip = SetMotion(top, Z)
+    faces = (surface_of_nodes(mesh, name, nodes) for name, nodes in (("TOP", top), ("BOTTOM", bottom)))
+    joint = JointDefinition((ContactSurfaces(*faces),), held, tip, {"tip": tip})
+    stiffness, mass = (each(mesh).toarray() for each in (assemble_stiffness, assemble_mass))
+    # The moving nodes close the joint along -z: they follow those below.
+    both = np.eye(3 * mesh.n_nodes)
+    both[3 * bottom + 2] += both[3 * top + 2]
+    kept = ~held.ravel()
+    kept[3 * top + 2] = False
+    basis = both[kept].T
+
+    def lowest(stiffness, mass):
+        return linalg.eigh(stiffness, mass, eigvals_only=True)[:8]
+
+    exact = lowest(*(basis.T @ form @ basis for form in (stiffness, mass)))
+    errors = []
+    for n_modes in (20, 80):
+        model = build_fe_scene(MeshModel(mesh), joint, ReductionOptions(n_modes=n_modes), 0).model
+        linear, open_ = model.linear[0], model.contact.dofs[:, 0]
+        own = lowest(*(np.delete(np.delete(form, open_, 0), open_, 1) for form in (linear.stiffness, linear.mass)))
+        # The upper brick slides in two directions and turns: three rigid modes.
+        assert np.abs(own[:3]).max() < 1e-9 * own[3]
+        assert np.all(own[3:] > exact[3:] * (1.0 - 1e-9))
+        errors.append(np.sqrt(own[3:] / exact[3:]) - 1.0)
+    assert errors[0].max() < 0.01
+    assert errors[1].max() < 0.001
 
 
 def test_retainer_acts_on_the_mean_relative_displacement():

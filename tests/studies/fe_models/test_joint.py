@@ -8,12 +8,7 @@ from studies.finite_element.closest_points import closest_points
 from studies.finite_element.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
-from studies.finite_element.surfaces import (
-    loops_of_faces,
-    pressure_forces,
-    surface_of_faces,
-    surface_of_nodes,
-)
+from studies.finite_element.surfaces import loops_of_faces, pressure_forces, surface_of_faces, surface_of_nodes
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where
 from tests.studies.fe_models.solid_meshes import block, joined

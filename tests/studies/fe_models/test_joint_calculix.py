@@ -1,7 +1,5 @@
 """Glued frequencies of whole models against CalculiX, which reads the same meshes. Needs its command `ccx`."""
 
-import re
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -19,78 +17,62 @@ from studies.finite_element.reduced_joint import build_fe_scene, glued_frequenci
 from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
 from studies.scenes import shrouded_sector
+from tests.studies.fe_models.decks import listed_frequencies
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
-from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, node_set, run_ccx
+from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, needs_ccx, node_set, run_ccx
+from tests.studies.shrouded_ring import stubby
 
-pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+pytestmark = needs_ccx
 
 N_MODES = 4
 
 
-def read_frequencies(table, n_modes):
-    """The lowest n_modes different natural frequencies, Hz, of a step with cyclic symmetry.
-
-    CalculiX finds each twice, as the real and the imaginary part of a rotating wave, nodal diameter 0 included: a step
-    has to ask for 2 n_modes.
-    """
-    number = r"(-?\d\.\d+E[+-]\d+)"
-    rows = re.findall(rf"^ +\d+ +\d+ +{number} +{number} +{number} +{number} *$", table, re.MULTILINE)
-    values = np.sort([float(row[2]) for row in rows])
-    different = values[np.append(True, np.diff(values) > 1e-5 * values[1:])]
-    return np.asarray(different[:n_modes])
-
-
-def surface_lines(name, elements, faces):
-    return [f"*SURFACE, NAME={name}", *(f"{e}, S{f}" for e, f in zip(elements, faces, strict=True))]
+def cyclic_lines(mesh, held, left, right):
+    """A sector whose cut faces belong together, with nodes that are held; all by the rows of their nodes."""
+    sets = {"F": np.setdiff1d(held, left), "L": left, "R": right}
+    return [
+        *[*deck_lines(mesh), *(line for name, rows in sets.items() for line in node_set(name, mesh.numbers[rows]))],
+        *["*SURFACE, NAME=LS, TYPE=NODE", "L", "*SURFACE, NAME=RS, TYPE=NODE", "R"],
+        *["*TIE, CYCLIC SYMMETRY, NAME=CYC, POSITION TOLERANCE=1.E-5", "LS, RS"],
+        *[f"*CYCLIC SYMMETRY MODEL, N={N_SECTORS}, NGRAPH=1, TIE=CYC", "0., 0., 0., 0., 0., 1."],
+        *["*BOUNDARY", "F, 1, 3"],
+    ]
 
 
 def sector_lines(sector):
     """The sector with its root tied, the blade the dependent side, and the bore held."""
-    mesh = sector.mesh
     cut = sector.joint().cut
-    inner = np.setdiff1d(sector.bore, cut.left)
-    return [
-        *deck_lines(mesh),
-        *node_set("F", mesh.numbers[inner]),
-        *node_set("L", mesh.numbers[cut.left]),
-        *node_set("R", mesh.numbers[cut.right]),
-        *surface_lines("BLADES", *sector.blade_faces),
-        *surface_lines("DISKS", *sector.disk_faces),
-        *["*SURFACE, NAME=LS, TYPE=NODE", "L", "*SURFACE, NAME=RS, TYPE=NODE", "R"],
-        *["*TIE, NAME=GLUE, POSITION TOLERANCE=1.E-5", "BLADES, DISKS"],
-        *["*TIE, CYCLIC SYMMETRY, NAME=CYC, POSITION TOLERANCE=1.E-5", "LS, RS"],
-        f"*CYCLIC SYMMETRY MODEL, N={N_SECTORS}, NGRAPH=1, TIE=CYC",
-        "0., 0., 0., 0., 0., 1.",
-        *["*BOUNDARY", "F, 1, 3"],
-    ]
+    lines = cyclic_lines(sector.mesh, sector.bore, cut.left, cut.right)
+    for name, faces in (("BLADES", sector.blade_faces), ("DISKS", sector.disk_faces)):
+        lines += [f"*SURFACE, NAME={name}", *(f"{e}, S{f}" for e, f in zip(*faces, strict=True))]
+    return [*lines, "*TIE, NAME=GLUE, POSITION TOLERANCE=1.E-5", "BLADES, DISKS"]
 
 
 def static_step(sector):
     return ["*STEP", "*STATIC", *centrifugal(sector.mesh, OMEGA_SQUARED), "*END STEP"]
 
 
-def calculix_frequencies(folder, sector, nodal_diameters, prestress):
-    """Natural frequencies (n, N_MODES), Hz, that CalculiX finds at each nodal diameter."""
+def calculix_frequencies(folder, lines, nodal_diameters, step="*STEP"):
+    """Natural frequencies (n, N_MODES), Hz, that CalculiX finds at each nodal diameter.
+
+    CalculiX finds each twice, as the real and the imaginary part of a rotating wave, nodal diameter 0 included.
+    """
     found = []
-    lines = sector_lines(sector) + (static_step(sector) if prestress else [])
     for k in nodal_diameters:
         select = f"*SELECT CYCLIC SYMMETRY MODES, NMIN={k}, NMAX={k}"
-        step = ["*STEP, PERTURBATION" if prestress else "*STEP", "*FREQUENCY", str(3 * N_MODES), select, "*END STEP"]
-        name = f"nd{k}"
-        run_ccx(folder, [*lines, *step], name)
-        found.append(read_frequencies((folder / f"{name}.dat").read_text(), N_MODES))
+        job = run_ccx(folder, [*lines, step, "*FREQUENCY", str(3 * N_MODES), select, "*END STEP"], f"nd{k}")
+        values = np.sort(listed_frequencies(job))
+        found.append(values[np.append(True, np.diff(values) > 1e-5 * values[1:])][:N_MODES])
     return np.array(found)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("disk_kind", "blade_kind", "disk", "blade"), [("C3D20R", "C3D20R", (2, 6, 4), (3, 4, 5))])
-def test_meshes_that_do_not_match(disk_kind, blade_kind, disk, blade, tmp_path):
-    sector = Sector(disk_kind, blade_kind, disk, blade)
+def test_meshes_that_do_not_match(tmp_path):
+    sector = Sector("C3D20R", "C3D20R", (2, 6, 4), (3, 4, 5))
     prepared = prepare_model(sector.model(prestress=False), sector.joint())
     assert not np.isclose(prepared.pairs.opposite.data, 1.0).all()
-    expected = calculix_frequencies(tmp_path, sector, (0, 2), prestress=False)
+    expected = calculix_frequencies(tmp_path, sector_lines(sector), (0, 2))
     own = np.array([glued_frequencies(prepared, k, N_MODES) for k in (0, 2)])
-
     assert np.abs(own / expected - 1.0).max() < 1e-3
 
 
@@ -98,15 +80,15 @@ def test_meshes_that_do_not_match(disk_kind, blade_kind, disk, blade, tmp_path):
 def test_matrices_of_calculix(kind, tmp_path):
     """Prestress and spin softening come in the matrices, and frequencies agree with those that CalculiX finds."""
     sector = Sector(kind, kind, (1, 4, 2), (2, 2, 2))
-    lines = [*sector_lines(sector), *static_step(sector), "*STEP, PERTURBATION", "*BOUNDARY, OP=NEW", *EXPORT]
-    run_ccx(tmp_path, lines)
+    lines = [*sector_lines(sector), *static_step(sector)]
+    run_ccx(tmp_path, [*lines, "*STEP, PERTURBATION", "*BOUNDARY, OP=NEW", *EXPORT])
     rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
     given = read_matrices(tmp_path / "job")
     ordered = order_by_nodes(given, find_units("SI"), sector.mesh.numbers, sector.mesh.coordinates)
     assert not ordered.missing.any()
     model = replace(ordered.model, rotation=rotation)
     scene = build_fe_scene(model, sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
-    expected = calculix_frequencies(tmp_path, sector, (0, 3, 6), prestress=True)
+    expected = calculix_frequencies(tmp_path, lines, (0, 3, 6), "*STEP, PERTURBATION")
     own = np.array([scene.summary.glued_frequencies[k] for k in (0, 3, 6)])
     assert np.abs(own / expected - 1.0).max() < 2e-5
     # the mesh says the same
@@ -117,25 +99,16 @@ def test_matrices_of_calculix(kind, tmp_path):
             assert np.abs(ours - theirs).max() <= 1e-7 * np.abs(theirs).max()
 
 
-SHROUDED = shrouded_sector.Parameters(
-    n_sectors=12, shroud_angle=20, blade_thickness=0.01, rim_radius=0.15, blade_length=0.08, rotation_speed=0.0
-)
-
-
-def shrouded_lines(model, joint):
-    """The sector with BORE, LEAD and TRAIL, and the nodes of its cut faces."""
-    numbers, (contact,) = model.mesh.numbers, joint.contacts
-    sets = {"BORE": np.flatnonzero(joint.held[:, 0]), "LEAD": contact.first.nodes, "TRAIL": contact.second.nodes}
-    sets |= {"L": joint.cut.left, "R": joint.cut.right}
-    return deck_lines(model.mesh) + [line for name, rows in sets.items() for line in node_set(name, numbers[rows])]
-
-
 def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
     """The same matrices as the bundled scene; its shrouds, one sector apart, are no cut faces. The order of the names
     does not matter.
     """
-    model, joint = shrouded_sector.define_sector(SHROUDED)
-    (tmp_path / "s.inp").write_text("\n".join(shrouded_lines(model, joint)) + "\n", encoding="ascii")
+    model, joint = shrouded_sector.define_sector(stubby(N_SECTORS))
+    (contact,), lines = joint.contacts, deck_lines(model.mesh)
+    sets = {"BORE": np.flatnonzero(joint.held[:, 0]), "LEAD": contact.first.nodes, "TRAIL": contact.second.nodes}
+    for name, rows in sets.items():
+        lines += node_set(name, model.mesh.numbers[rows])
+    (tmp_path / "s.inp").write_text("\n".join(lines) + "\n", encoding="ascii")
     given = {"units": "SI", "friction_coefficient": 0.3, "n_sectors": 12, "axis": {"direction": [0, 0, 1]}}
     given |= {"clamp": ["BORE"], "load": {"set": "LEAD", "direction": [0, 1, 0]}}
     expected = [glued_frequencies(prepare_model(model, joint), k, N_MODES) for k in (0, 3, 6)]
@@ -157,23 +130,13 @@ def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
 
 def test_stuck_shrouds_are_those_of_calculix(tmp_path):
     """With elements that are the same in both programs: incompatible modes of twisted elements are not."""
-    model, joint = shrouded_sector.define_sector(SHROUDED)
+    model, joint = shrouded_sector.define_sector(stubby(N_SECTORS))
     groups = tuple(replace(each, kind="C3D8") for each in model.mesh.groups)
     model = replace(model, mesh=replace(model.mesh, groups=groups))
-    (contact,), numbers = joint.contacts, model.mesh.numbers
+    (contact,) = joint.contacts
     left = np.concatenate([joint.cut.left, contact.second.nodes])
     right = np.concatenate([joint.cut.right, contact.first.nodes])
-    inner = np.setdiff1d(np.flatnonzero(joint.held[:, 0]), left)
-    lines = [
-        *[*deck_lines(model.mesh), *node_set("F", numbers[inner])],
-        *[*node_set("L", numbers[left]), *node_set("R", numbers[right])],
-        *["*SURFACE, NAME=LS, TYPE=NODE", "L", "*SURFACE, NAME=RS, TYPE=NODE", "R"],
-        *["*TIE, CYCLIC SYMMETRY, NAME=CYC, POSITION TOLERANCE=1.E-5", "LS, RS"],
-        *["*CYCLIC SYMMETRY MODEL, N=12, NGRAPH=1, TIE=CYC", "0., 0., 0., 0., 0., 1.", "*BOUNDARY", "F, 1, 3"],
-    ]
-    prepared = prepare_model(model, joint)
-    for k in (0, 1, 3, 5, 6):
-        select = f"*SELECT CYCLIC SYMMETRY MODES, NMIN={k}, NMAX={k}"
-        run_ccx(tmp_path, [*lines, "*STEP", "*FREQUENCY", "12", select, "*END STEP"], f"nd{k}")
-        expected = read_frequencies((tmp_path / f"nd{k}.dat").read_text(), N_MODES)
-        np.testing.assert_allclose(glued_frequencies(prepared, k, N_MODES), expected, rtol=2e-4)
+    prepared, diameters = prepare_model(model, joint), (0, 1, 3, 5, 6)
+    own = [glued_frequencies(prepared, k, N_MODES) for k in diameters]
+    lines = cyclic_lines(model.mesh, np.flatnonzero(joint.held[:, 0]), left, right)
+    np.testing.assert_allclose(own, calculix_frequencies(tmp_path, lines, diameters), rtol=2e-4)

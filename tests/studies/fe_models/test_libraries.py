@@ -9,61 +9,77 @@ import pytest
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.meshes import read_mesh_file
 from studies.scene_error import SceneError
-from tests.studies.fe_models.meshes import GMSH_22, GMSH_41
 
 needs_ansys = pytest.mark.skipif(importlib.util.find_spec("ansys") is None, reason="ansys-mapdl-reader is not there")
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
 
 
-def write(folder, text):
-    path = folder / "mesh.msh"
-    path.write_text(text)
-    return path
+def write(folder, text, name="mesh.msh"):
+    (folder / name).write_text(text)
+    return folder / name
 
 
-@needs_meshio
-def test_gmsh_22(tmp_path):
-    deck = read_mesh_file(write(tmp_path, GMSH_22))
-    assert deck.coordinates[6].tolist() == [1, 1, 1]
-    blocks = {block.kind: (block.numbers.tolist(), block.nodes.tolist()) for block in deck.blocks}
-    assert blocks == {"C3D8I": ([1], [[1, 2, 3, 4, 5, 6, 7, 8]]), "C3D4": ([2, 3], [[5, 6, 7, 9], [5, 7, 8, 9]])}
-    assert {name: nodes.tolist() for name, nodes in deck.node_sets.items()} == {
-        "UNDER": [1, 2, 3, 4],
-        "TOP": [5, 6, 7, 8],
-        "BLOCK": list(range(1, 10)),
-    }
-    assert {name: numbers.tolist() for name, numbers in deck.element_sets.items()} == {"BLOCK": [1, 2, 3]}
+GMSH_41 = """\
+$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+2
+2 1 "under"
+3 2 "Block"
+$EndPhysicalNames
+$Entities
+0 0 1 1
+1 0 0 0 1 1 0 1 1 0
+1 0 0 0 1 1 1 1 2 0
+$EndEntities
+$Nodes
+1 5 1 5
+3 1 0 5
+1
+2
+3
+4
+5
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+1 1 1
+$EndNodes
+$Elements
+2 3 1 3
+2 1 2 1
+1 1 2 3
+3 1 4 2
+2 1 2 3 4
+3 2 3 4 5
+$EndElements
+"""
 
 
 @needs_meshio
 def test_gmsh_41(tmp_path):
     deck = read_mesh_file(write(tmp_path, GMSH_41))
     assert [(block.kind, block.nodes.tolist()) for block in deck.blocks] == [("C3D4", [[1, 2, 3, 4], [2, 3, 4, 5]])]
-    assert deck.node_sets["UNDER"].tolist() == [1, 2, 3]
+    sets = {name: nodes.tolist() for name, nodes in deck.node_sets.items()}
+    assert sets == {"UNDER": [1, 2, 3], "BLOCK": [1, 2, 3, 4, 5]}
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
 
 
-def write_cdb(folder, commands="", types="ET,        1,185\n"):
+def write_cdb(folder, commands, types):
     """A cube with two components, as CDWRITE writes it."""
     corners = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     nodes = [f"{n:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13E}" for v in at) for n, at in enumerate(corners, 1)]
     element = "".join(f"{v:9d}" for v in (1, 1, 1, 1, 0, 0, 0, 0, 8, 0, 5, *range(1, 9)))
+    component = ("CMBLOCK,FOOT    ,NODE,        2", "(8i10)", f"{1:10d}{-4:10d}")
     lines = [
         *("/COM,ANSYS RELEASE 2023 R1", "/PREP7", "*IF,_CDRDOFF,EQ,1,THEN", "_CDRDOFF=", "*ENDIF", "DOF,DELETE"),
         *(types.rstrip("\n"), "NBLOCK,6,SOLID,        8,        8", "(3i9,6e21.13e3)", *nodes, "N,R5.3,LOC,       -1,"),
-        *("EBLOCK,19,SOLID,        1,        1", "(19i9)", element, "       -1"),
-        *(
-            "CMBLOCK,FOOT    ,NODE,        2",
-            "(8i10)",
-            f"{1:10d}{-4:10d}",
-            "TREF,  0.00000000    ",
-            "ACEL,  0.0,0.0,0.0",
-        ),
-        *("BFUNIF,TEMP,_TINY", "PSTRES,OFF", *commands.splitlines(), "FINISH"),
+        *("EBLOCK,19,SOLID,        1,        1", "(19i9)", element, "       -1", *component),
+        *("TREF,  0.00000000    ", "ACEL,  0.0,0.0,0.0", "BFUNIF,TEMP,_TINY", "PSTRES,OFF", commands, "FINISH"),
     ]
-    path = folder / "mesh.cdb"
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    return write(folder, "\n".join(lines) + "\n", "mesh.cdb")
 
 
 ETBLOCK = (
@@ -83,9 +99,7 @@ def test_cdb(tmp_path, types):
 
 
 def test_meshes_by_their_ending(tmp_path):
-    path = tmp_path / "mesh.inp"
-    path.write_text("*NODE\n1,0,0,0\n")
-    assert read_mesh_file(path).node_numbers.tolist() == [1]
+    assert read_mesh_file(write(tmp_path, "*NODE\n1,0,0,0\n", "mesh.inp")).node_numbers.tolist() == [1]
     with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):
         read_mesh_file(tmp_path / "mesh.med")
     with pytest.raises(SceneError, match=r"none.cdb: there is no such file"):
@@ -96,10 +110,8 @@ def test_meshes_by_their_ending(tmp_path):
 def test_missing_library(tmp_path, monkeypatch, library):
     monkeypatch.setitem(sys.modules, library, None)
     if library == "meshio":
-        with pytest.raises(
-            SceneError, match=r"msh needs the library meshio, .* install the library: pip install meshio"
-        ):
-            read_mesh_file(write(tmp_path, GMSH_22))
+        with pytest.raises(SceneError, match=r"msh needs the library meshio, .*: pip install meshio"):
+            read_mesh_file(write(tmp_path, GMSH_41))
         return
     monkeypatch.setitem(sys.modules, "ansys.mapdl", None)
     (tmp_path / "job.full").write_bytes(b"1")
@@ -137,15 +149,10 @@ def test_order_of_mid_side_nodes(tmp_path, kind):
     points = np.array([*corners, *(np.mean([corners[a], corners[b]], axis=0) for a, b in edges)])
     nodes = "\n".join(f"{n} {x} {y} {z}" for n, (x, y, z) in enumerate(points, 1))
     element = " ".join(map(str, range(1, len(points) + 1)))
-    text = (
-        f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(points)}\n{nodes}\n$EndNodes\n"
-        f"$Elements\n1\n1 {number} 2 1 1 {element}\n$EndElements\n"
-    )
-    deck = read_mesh_file(write(tmp_path, text))
+    head = f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(points)}\n{nodes}\n$EndNodes\n"
+    deck = read_mesh_file(write(tmp_path, f"{head}$Elements\n1\n1 {number} 2 1 1 {element}\n$EndElements\n"))
     (block,) = deck.blocks
     found = deck.coordinates[deck.rows_of_nodes(block.nodes[0])]
     assert block.kind == kind
-    n = len(corners)
-    np.testing.assert_array_equal(found[:n], corners)
-    for place, (a, b) in enumerate(expected):
-        np.testing.assert_array_equal(found[n + place], (found[a] + found[b]) / 2)
+    np.testing.assert_array_equal(found[: len(corners)], corners)
+    np.testing.assert_array_equal(found[len(corners) :], [(found[a] + found[b]) / 2 for a, b in expected])

@@ -9,17 +9,9 @@ import pytest
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.finite_element.solid_mesh import assemble_stiffness
 from studies.scene_error import SceneError
-from tests.studies.fe_models.matrix_files import (
-    REDUCED,
-    chain,
-    needs_ccx,
-    run_ccx,
-    write_calculix,
-    write_matrix_input,
-    write_punch,
-)
+from tests.studies.fe_models.matrix_files import REDUCED, chain, write_calculix, write_matrix_input, write_punch
 from tests.studies.fe_models.mutations import mutate
-from tests.studies.fe_models.solid_meshes import block, deck_lines
+from tests.studies.fe_models.solid_meshes import block, deck_lines, needs_ccx, run_ccx
 
 
 def check(read, named, rows, rtol):
@@ -111,7 +103,7 @@ def test_a_substructure_of_calculix(tmp_path):
     kept = mesh.numbers[[0, 5, 7]]
     lines = [*deck_lines(mesh), "*STEP", "*SUBSTRUCTURE GENERATE", "*RETAINED NODAL DOFS,SORTED=NO"]
     lines += [*(f"{node},1,3" for node in kept), "*SUBSTRUCTURE MATRIX OUTPUT,FILE NAME=sub,OUTPUT FILE=USER DEFINED"]
-    run_ccx(tmp_path, "\n".join([*lines, "*END STEP"]) + "\n", "job")
+    run_ccx(tmp_path, [*lines, "*END STEP"])
     with pytest.raises(SceneError, match=r"sub.mtx: no mass in the file"):
         read_matrices(tmp_path / "sub")
     triangle = "\n".join(f"{float(row == column)!r}," for column in range(9) for row in range(column + 1))

@@ -7,16 +7,22 @@ import pytest
 from scipy.linalg import eigh
 
 from solver import build_model
+from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
 from studies.fe_models.from_files.check import describe_model
 from studies.fe_models.from_files.model import find_files, load_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
+from studies.finite_element.pairing import local_frames
+from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scene_file import read_scene, write_scene
+from studies.scenes import shrouded_sector
 from tests.studies.fe_models.matrix_files import REDUCED
-from tests.studies.fe_models.reduced import D, N, Sector
+from tests.studies.shrouded_ring import stubby
 
+N, D, N_MODES = 6, 2, 12
+PARAMETERS = stubby(N)
 TIP = {"set": "TIP", "direction": [0, np.cos(np.radians(20)), -np.sin(np.radians(20))]}
 GIVEN = {
     "units": "SI", "matrices": "job", "contact": [["LEADING", "TRAILING"]], "next_sector": True, "load": TIP,
@@ -25,9 +31,108 @@ GIVEN = {
 }  # fmt: skip
 
 
+def symmetric(matrix):
+    return 0.5 * (matrix + matrix.conj().T)
+
+
+class Sector:
+    """A shrouded sector as a company shares it: Craig-Bampton matrices that keep shrouds, tip and cut faces.
+
+    rows (n, 2): node and dof, 0 of a mode. named: stiffness, mass, damping (n, n) and load (n,), constant forces.
+    weights (2, n): of the mean displacement of the tip, and of a quantity in MPa.
+    """
+
+    def __init__(self):
+        model, self.joint = shrouded_sector.define_sector(PARAMETERS)
+        self.mesh, contact, cut = model.mesh, self.joint.contacts[0], self.joint.cut
+        loose = ~self.joint.held.any(axis=1)
+        self.left, self.right = cut.left[loose[cut.left]], cut.right[loose[cut.right]]
+        self.first, self.second = contact.first, contact.second
+        tip = self.joint.load.nodes
+        self.nodes = np.unique(np.concatenate([self.left, self.right, self.first.nodes, self.second.nodes, tip]))
+        kept = (3 * self.nodes[:, None] + np.arange(3)).ravel()
+        inner = np.setdiff1d(np.flatnonzero(np.repeat(loose, 3)), kept)
+        stiffness, mass = (each.toarray() for each in (assemble_stiffness(self.mesh), assemble_mass(self.mesh)))
+        static = -np.linalg.solve(stiffness[np.ix_(inner, inner)], stiffness[np.ix_(inner, kept)])
+        modes = eigh(stiffness[np.ix_(inner, inner)], mass[np.ix_(inner, inner)], subset_by_index=(0, N_MODES - 1))[1]
+        shapes = np.zeros((len(stiffness), len(kept) + N_MODES))
+        shapes[kept, : len(kept)] = np.eye(len(kept))
+        shapes[inner] = np.hstack([static, modes])
+        stiffness, mass = (symmetric(shapes.T @ each @ shapes) for each in (stiffness, mass))
+        forces = np.zeros((self.mesh.n_nodes, 3))
+        forces[tip, 0] = 300.0
+        self.named = {"stiffness": stiffness, "mass": mass, "damping": 2e-6 * stiffness + 3.0 * mass}
+        self.named["load"] = shapes.T @ forces.ravel()
+        labels = np.stack([np.repeat(self.mesh.numbers[self.nodes], 3), np.tile([1, 2, 3], len(self.nodes))], axis=1)
+        self.rows = np.concatenate([labels, [[9001 + n, 0] for n in range(N_MODES)]])
+        mean = np.append(self.joint.load.row(self.mesh.n_nodes)[kept], np.zeros(N_MODES))
+        self.weights = np.stack([mean, np.random.default_rng(3).normal(size=len(self.rows)) * 1e5])
+
+    def table(self):
+        """The table of the nodes."""
+        area, normals = self.first.areas_and_normals(self.mesh.coordinates)
+        groups = {"LEFT": self.left, "RIGHT": self.right, "TIP": self.joint.load.nodes}
+        groups |= {"LEADING": self.first.nodes, "TRAILING": self.second.nodes}
+        lines = ["node,x,y,z,sets,area,normal_x,normal_y,normal_z,gap"]
+        for node in self.nodes:
+            sets = " ".join(name for name, members in groups.items() if node in members)
+            where = np.flatnonzero(self.first.nodes == node)
+            more = [area[where[0]], *normals[where[0]], -PARAMETERS.interference] if len(where) else [""] * 5
+            place = [repr(float(x)) for x in self.mesh.coordinates[node]]
+            lines.append(",".join(map(str, [self.mesh.numbers[node], *place, sets, *more])))
+        return "\n".join(lines) + "\n"
+
+    def recovery_table(self):
+        """Weights of the quantity in MPa with the labels of their rows, in another order."""
+        rows = zip(self.rows, self.weights[1].tolist(), strict=True)
+        lines = [f"{node},{dof},{weight!r}" for (node, dof), weight in rows]
+        return "\n".join(["node,dof,root [MPa]", *reversed(lines)]) + "\n"
+
+    def scene(self):
+        """The scene for three harmonics: `u_right = exp(2 pi i k / N) R u_left`, relative displacements first."""
+        axis, place = self.joint.cut.axis, {node: 3 * n for n, node in enumerate(self.nodes)}
+        area, normals = self.first.areas_and_normals(self.mesh.coordinates)
+        position = self.mesh.coordinates[self.first.nodes]
+        frames, turn = local_frames(normals, axis.axis), axis.pitch(1)
+        there = axis.turned(self.mesh.coordinates[self.second.nodes], 1)
+        opposite = [self.second.nodes[np.linalg.norm(there - at, axis=1).argmin()] for at in position]
+        follow = {*self.right, *self.first.nodes}
+        n_relative, others = 3 * len(self.first.nodes), [node for node in self.nodes if node not in follow]
+        start = {node: n_relative + 3 * n for n, node in enumerate(others)}
+        linear = {}
+        for k in needed_nodal_diameters(D, N, 3):
+            phase = np.exp(2j * np.pi * k / N)
+            shapes = np.zeros((len(self.rows), n_relative + 3 * len(others) + N_MODES), dtype=complex)
+            for node in others:
+                shapes[place[node] : place[node] + 3, start[node] : start[node] + 3] = np.eye(3)
+            for left, right in zip(self.left, self.right, strict=True):
+                shapes[place[right] : place[right] + 3, start[left] : start[left] + 3] = phase * turn
+            for pair, (node, other) in enumerate(zip(self.first.nodes, opposite, strict=True)):
+                rows = slice(place[node], place[node] + 3)
+                shapes[rows, 3 * pair : 3 * pair + 3] = frames[pair].T
+                shapes[rows, start[other] : start[other] + 3] = phase * turn
+            shapes[-N_MODES:, -N_MODES:] = np.eye(N_MODES)
+            shapes = shapes if k not in (0, N / 2) else shapes.real
+            parts = (self.named[name] for name in ("mass", "damping", "stiffness"))
+            forms = (symmetric(shapes.conj().T @ part @ shapes) for part in parts)
+            static = (shapes.T @ self.named["load"]).real * (k == 0)
+            harmonic = (shapes.conj().T @ self.weights[0]).astype(complex) * (k == D)
+            linear[k] = LinearModel(*forms, static, harmonic, self.weights @ shapes)
+        n = len(area)
+        gap, labels = np.full(n, -PARAMETERS.interference), ("LEADING-TRAILING",) * n
+        dofs = np.arange(n_relative).reshape(-1, 3)
+        contact = ContactInterface(dofs, area, gap, np.zeros(n), position, labels)
+        return ReducedModel(linear, contact, ("tip", "root [MPa]"), N, D)
+
+
 @cache
 def sector():
     return Sector()
+
+
+@cache
+def expected_scene():
+    return sector().scene()
 
 
 def write(folder, kind="mat"):
@@ -57,18 +162,16 @@ def seen(model, k, omega):
 
 @pytest.mark.parametrize("kind", REDUCED)
 def test_each_format_gives_the_complex_matrices_of_each_nodal_diameter(tmp_path, kind):
-    expected = sector().scene
+    expected = expected_scene()
     # a user element has no forces
-    forces = [{"set": "TIP", "direction": [1, 0, 0], "force": sector().load.sum()}]
+    forces = [{"set": "TIP", "direction": [1, 0, 0], "force": sector().named["load"].sum()}]
     found = model_of(write(tmp_path, kind), preload=forces if kind == "user element" else ())
     tolerance = 1e-4 if kind.startswith("punch") else 1e-9  # a punch file has ten digits
     assert set(found.linear) == set(expected.linear)
     assert found.response_names == expected.response_names
     np.testing.assert_allclose(found.contact.gap, expected.contact.gap, rtol=1e-12)
-    for each in (found, expected):
-        np.testing.assert_allclose(
-            stuck_frequencies(each).frequencies, stuck_frequencies(expected).frequencies, rtol=tolerance
-        )
+    stuck = (stuck_frequencies(each).frequencies for each in (found, expected))
+    np.testing.assert_allclose(*stuck, rtol=tolerance)
     for k in expected.linear:
         for omega in (0.0, 3e3, 2e4):
             ours, theirs = seen(found, k, omega), seen(expected, k, omega)
@@ -93,37 +196,38 @@ def test_mistakes_are_named(tmp_path, changes, sentence):
         model_of(write(tmp_path), **changes)
 
 
-def test_tables_that_do_not_fit_are_named(tmp_path):
-    nodes = write(tmp_path) / "nodes.csv"
-    nodes.write_text(sector().table() + "7777,0.3,0.0,0.0,,,,,,\n")
-    with pytest.raises(SceneError, match=r"matrices: 1 nodes of nodes.csv have no row in job.mat, as node 7777"):
-        model_of(tmp_path)
-    nodes.write_text(sector().table().replace(",sets", ",set"))
-    with pytest.raises(SceneError, match=r"model: nodes.csv has no column sets"):
-        model_of(tmp_path)
-    nodes.write_text(sector().table())
-    (tmp_path / "stress.csv").write_text("node,dof,root [MPa]\n1,7,1.0\n")
-    with pytest.raises(SceneError, match=r"recovery: stress.csv: node 1 with dof 7 is no row"):
-        model_of(tmp_path)
-    (tmp_path / "stress.csv").write_text(sector().recovery_table().replace("root [MPa]", "tip"))
-    with pytest.raises(SceneError, match=r"recovery: stress.csv: a response has the name tip as well"):
+@pytest.mark.parametrize(
+    ("file", "old", "new", "sentence"),
+    [
+        ("nodes.csv", "$", "7777,0.3,0.0,0.0,,,,,,\n", r"matrices: 1 nodes of nodes.csv have no row in job.mat"),
+        ("nodes.csv", ",sets", ",set", r"model: nodes.csv has no column sets"),
+        ("stress.csv", "$", "1,7,1.0\n", r"recovery: stress.csv: node 1 with dof 7 is no row"),
+        ("stress.csv", "root [MPa]", "tip", r"recovery: stress.csv: a response has the name tip as well"),
+    ],
+)
+def test_tables_that_do_not_fit_are_named(tmp_path, file, old, new, sentence):
+    path = write(tmp_path) / file
+    text = path.read_text()
+    path.write_text(text + new if old == "$" else text.replace(old, new))
+    with pytest.raises(SceneError, match=sentence):
         model_of(tmp_path)
 
 
 def test_a_scene_file_and_a_model_in_python_are_the_same(tmp_path):
     """Of the matrices at each nodal diameter: groups `nd/<k>`, and tables of `build_model`."""
-    scene = sector().scene
+    scene = expected_scene()
     write_scene(scene, tmp_path / "scene.h5")
-    given = {name: {k: getattr(each, name) for k, each in scene.linear.items()} for name in ("mass", "damping")}
-    stiffness = {k: each.stiffness for k, each in scene.linear.items()}
+    mass, damping, stiffness, response = (
+        {k: getattr(each, name) for k, each in scene.linear.items()}
+        for name in ("mass", "damping", "stiffness", "response")
+    )
     more = {
         "load_harmonic": scene.linear[D].load_harmonic, "load_static": scene.linear[0].load_static,
-        "response": {k: each.response for k, each in scene.linear.items()}, "gap": scene.contact.gap,
-        "response_names": scene.response_names, "n_sectors": N, "nodal_diameter": D,
+        "response": response, "gap": scene.contact.gap, "response_names": scene.response_names,
+        "n_sectors": N, "nodal_diameter": D,
     }  # fmt: skip
     place = scene.contact.dofs, scene.contact.area
-    model = build_model(given["mass"], given["damping"], stiffness, *place, **more)
-    for found in (model, read_scene(tmp_path / "scene.h5", 3)):
+    for found in (build_model(mass, damping, stiffness, *place, **more), read_scene(tmp_path / "scene.h5", 3)):
         assert (found.n_sectors, found.nodal_diameter) == (N, D)
         for k, each in scene.linear.items():
             for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
@@ -134,7 +238,7 @@ def test_a_scene_file_and_a_model_in_python_are_the_same(tmp_path):
         ({**stiffness, 0: stiffness[D]}, "stiffness: give real numbers"),
     ):
         with pytest.raises(ValueError, match=sentence):
-            build_model(given["mass"], given["damping"], wrong, *place, **more)
+            build_model(mass, damping, wrong, *place, **more)
 
 
 def test_masses_in_a_plane(tmp_path):
@@ -150,9 +254,8 @@ def test_masses_in_a_plane(tmp_path):
     tip = {"set": "TIP", "direction": [1, 0, 0]}
     loaded, parameters = load(tmp_path, **changes, load=tip, response={"tip": tip}, recovery=None)
     scene = reduce_model(loaded, parameters, 3)
-    model = scene.model
-    assert model.contact.dofs.tolist() == [[0, 1, -1]]
-    linear = model.linear[0]
+    assert scene.model.contact.dofs.tolist() == [[0, 1, -1]]
+    linear = scene.model.linear[0]
     np.testing.assert_allclose(linear.load_static, [50.0, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-9)
     found, expected = (eigh(*each, eigvals_only=True) for each in ((linear.stiffness, linear.mass), (stiffness, mass)))
     np.testing.assert_allclose(found, expected, rtol=1e-9)

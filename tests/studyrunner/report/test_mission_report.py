@@ -15,73 +15,61 @@ from studyrunner.report.drawing import Drawing
 from studyrunner.report.page.data import build_page_data
 from studyrunner.result.view import open_for_report
 from tests.studyrunner.faked_blocks import STUDY, FakedBlocks
+from tests.studyrunner.report.cases import numbers_of
 
 pytestmark = pytest.mark.slow
 
 ONE = {"axes.frequency": 160, "axes.sweep": "up", "axes.wear_coefficient": 1e-11}
 SCATTER = {"samples": 8, "friction_coefficient": {"normal": {"std": 0.03}}, "normal_load": {"normal": {"std": 0.5}}}
+STUDIES = {"one": ONE, "grid": {"axes.sweep": "up"}, "scatter": {**ONE, "scatter": SCATTER}, "failed": ONE}
+BLOCKS = ["run-up", "cruise", "heavy"]
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """A folder with results of one point, of a grid in which a block fails for some, and of samples."""
+    """A folder with results of one point, of a grid, of samples, and of one whose second block fails."""
     folder = tmp_path_factory.mktemp("missions")
-    study = folder / "missions.toml"
-    study.write_text(STUDY, encoding="utf-8")
+    (folder / "missions.toml").write_text(STUDY, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         blocks = FakedBlocks(patch)
-        for name, overrides in {
-            "one": ONE,
-            "grid": {"axes.sweep": "up"},
-            "scatter": {**ONE, "scatter": SCATTER},
-        }.items():
-            run_study(study, folder / f"{name}.nc", overrides=overrides, progress=False).close()
-        blocks.fails["cruise"] = Outcome.START_FAILED
-        run_study(study, folder / "failed.nc", overrides=ONE, progress=False).close()
+        for name, overrides in STUDIES.items():
+            if name == "failed":
+                blocks.fails["cruise"] = Outcome.START_FAILED
+            run_study(folder / "missions.toml", folder / f"{name}.nc", overrides=overrides, progress=False).close()
     return folder
 
 
-def items(result):
-    return {item.name: item for item in draw_report(result)}
+def items(path):
+    return {item.name: item for item in draw_report(open_for_report(path))}
 
 
-def test_the_report_tells_of_missions_and_blocks(results):
-    result = open_for_report(results / "grid.nc")
-    found = items(result)
+def test_the_report_has_blocks_and_counts_missions(results):
+    found = items(results / "grid.nc")
     drawn = {name for name, item in found.items() if isinstance(item, Drawing)}
     assert {"block_shares", "block_responses", "worn_volume", "worn_volume_map", "final_worn_volume", "trends"} <= drawn
     for item in found.values():
         text = item.caption if isinstance(item, Drawing) else item.title
         assert "cycle" not in text.replace("cycles of one mission", ""), text
-    table = found["blocks"]
-    assert [row[:3] for row in table.rows] == [
-        ("run-up", "150 to 170", "3200"),
-        ("cruise", "161", "1610"),
-        ("heavy", "155", "1000"),
-    ]
-    shares = found["block_shares"]
-    assert isinstance(shares, Drawing)
-    _, below = shares.figure.axes
-    with xr.open_dataset(results / "grid.nc") as dataset:
-        worst = dataset.isel(excitation_amplitude=0, sweep=0).sel(frequency=161.0, wear_coefficient=2e-11)
-        for line, name in zip(below.get_lines(), worst.block.values, strict=True):
-            assert line.get_label() == name
-            np.testing.assert_array_equal(line.get_xdata(), worst.mission)
-            np.testing.assert_allclose(line.get_ydata(), 1e9 * worst.block_worn_volume.sel(block=name))
+    rows = [("run-up", "150 to 170", "3200"), ("cruise", "161", "1610"), ("heavy", "155", "1000")]
+    assert [row[:3] for row in found["blocks"].rows] == rows
 
 
-def test_responses_of_the_blocks_are_drawn_at_begin_and_end_with_their_errors(results):
-    drawn = items(open_for_report(results / "one.nc"))["block_responses"]
-    assert isinstance(drawn, Drawing)
+def test_figures_of_blocks_have_the_numbers_of_the_file(results):
+    found = items(results / "one.nc")
     with xr.open_dataset(results / "one.nc") as dataset:
-        one = dataset.squeeze()
-        for panel, name in zip(drawn.figure.axes, ("response_amplitude_begin", "response_amplitude"), strict=True):
-            for place, (line, band) in enumerate(zip(panel.get_lines(), panel.collections, strict=True)):
-                values, error = 1e6 * one[name][:, place], one.response_error[:, place]
-                assert line.get_label() == one.block[place]
-                np.testing.assert_allclose(line.get_ydata(), values)
-                edges = np.unique(band.get_paths()[0].vertices[:, 1])
-                np.testing.assert_allclose(edges[[0, -1]], [(values * (1 - error)).min(), (values * (1 + error)).max()])
+        one = dataset.squeeze().load()
+    lines = {name: rows for name, rows in numbers_of(found["block_shares"]).items() if name.split("|")[1] in BLOCKS}
+    for rows, name in zip(lines.values(), BLOCKS, strict=True):
+        expected = [one.mission, 1e9 * one.block_worn_volume.sel(block=name)]
+        np.testing.assert_allclose(rows[-len(one.mission) :, :2].T, expected, rtol=1e-8)
+    panels = found["block_responses"].figure.axes
+    for panel, name in zip(panels, ("response_amplitude_begin", "response_amplitude"), strict=True):
+        for place, (line, band) in enumerate(zip(panel.get_lines(), panel.collections, strict=True)):
+            values, error = 1e6 * one[name][:, place], one.response_error[:, place]
+            assert line.get_label() == one.block[place]
+            np.testing.assert_allclose(line.get_ydata(), values)
+            edges = np.unique(band.get_paths()[0].vertices[:, 1])
+            np.testing.assert_allclose(edges[[0, -1]], [(values * (1 - error)).min(), (values * (1 + error)).max()])
 
 
 def test_the_page_holds_the_variables_of_the_blocks(results):
@@ -91,10 +79,9 @@ def test_the_page_holds_the_variables_of_the_blocks(results):
     for name in ("response_amplitude", "response_amplitude_begin", "response_error", "block_worn_volume"):
         values = np.frombuffer(base64.b64decode(entries[name]["data"]), dtype="<f4")
         np.testing.assert_array_equal(values, result.blocks[name].values.ravel().astype("f4"))
-    (blocks,) = [entry for entry in content["dims"] if entry["name"] == "block"]
-    assert blocks["values"] == ["run-up", "cruise", "heavy"]
-    (slow,) = [entry for entry in content["dims"] if entry["name"] == "cycle"]
-    assert slow["label"] == "missions"
+    dims = {entry["name"]: entry for entry in content["dims"]}
+    assert dims["block"]["values"] == BLOCKS
+    assert dims["cycle"]["label"] == "missions"
 
 
 @pytest.mark.parametrize("name", ["scatter", "failed"])
@@ -116,8 +103,7 @@ def test_samples_of_missions_have_statistics(results):
 def test_results_of_missions_are_joined(results):
     with xr.open_dataset(results / "grid.nc") as dataset:
         whole = dataset.load()
-    parts = [whole.isel(frequency=[place]) for place in (1, 0)]
-    joined = join_results(parts)
+    joined = join_results([whole.isel(frequency=[place]) for place in (1, 0)])
     for name in ("worn_volume", "block_worn_volume", "excitation_frequency", "outcome"):
         xr.testing.assert_equal(joined[name].sel(frequency=whole.frequency), whole[name])
-    assert joined.block.values.tolist() == ["run-up", "cruise", "heavy"]
+    assert joined.block.values.tolist() == BLOCKS

@@ -17,12 +17,16 @@ AXES = {
     "harmonics": (1, 3, 5, 9),
 }
 SIGN = {"explicit": 1.0, "implicit": -1.0, "adaptive": 0.0}
-WORN, MOVED = 1e-9, 2e-3
+WORN, MOVED = 1e-9 * np.array([0.0, 0.5, 1.0]), 2e-3
 
 
 def error_of(frequency, step, scheme, harmonics):
     """First order in the step, second in the harmonics; larger at the second frequency."""
     return (1.0 if frequency == 100.0 else 2.0) * (SIGN[scheme] * 1e-4 * step + 0.03 / harmonics**2)
+
+
+def error_at(frequency, setting):
+    return error_of(frequency, setting.step or 0.0, setting.scheme, setting.harmonics)
 
 
 def time_of(frequency, step, scheme, harmonics):
@@ -33,24 +37,17 @@ def time_of(frequency, step, scheme, harmonics):
 def finest_file(estimate, exact=False):
     """A file of these errors; estimate: of the error of each worn volume and response."""
     dataset = build_file(AXES, cycles=(0.0, 500.0, 1000.0))
-    shape = dataset["outcome"].shape
-    for place in np.ndindex(shape):
+    for place in np.ndindex(dataset["outcome"].shape):
         at = [values[index] for values, index in zip(AXES.values(), place, strict=True)]
-        wrong = 1.0 + error_of(*at)
-        dataset["worn_volume"].values[place] = WORN * wrong * np.array([0.0, 0.5, 1.0])
-        dataset["response_amplitude"].values[place] = MOVED * wrong
+        dataset["worn_volume"].values[place] = WORN * (1.0 + error_of(*at))
+        dataset["response_amplitude"].values[place] = MOVED * (1.0 + error_of(*at))
         dataset["run_time"].values[place] = time_of(*at)
     dataset["error_estimate"][:] = estimate
     dataset["response_error"][:] = estimate
     if exact:
-        course = WORN * np.array([0.0, 0.5, 1.0])
-        dataset["exact_worn_volume"] = dataset["worn_volume"].copy(data=np.broadcast_to(course, (*shape, 3)))
-        dataset["exact_response_amplitude"] = dataset["response_amplitude"].copy(data=np.full((*shape, 3, 1), MOVED))
+        for name, value in (("worn_volume", WORN), ("response_amplitude", [MOVED])):
+            dataset[f"exact_{name}"] = 0.0 * dataset[name] + value
     return Result(Path("settings.nc"), dataset)
-
-
-def values_of(setting):
-    return setting.step or 0.0, setting.scheme, setting.harmonics
 
 
 def test_errors_against_the_exact_answer_are_those_of_the_formula():
@@ -60,7 +57,7 @@ def test_errors_against_the_exact_answer_are_those_of_the_formula():
         assert point.reference is None
         assert len(point.settings) == (2 * 4 + 1) * 4  # the adaptive scheme uses no step
         for row, setting in enumerate(point.settings):
-            expected = abs(error_of(frequency, *values_of(setting)))
+            expected = abs(error_at(frequency, setting))
             assert point.errors["volume"][row] == pytest.approx(expected, rel=1e-9, abs=1e-14)
             assert point.errors["response"][row] == pytest.approx(expected, rel=1e-9, abs=1e-14)
 
@@ -72,7 +69,7 @@ def test_the_finest_setting_is_the_reference_and_what_it_does_not_resolve_is_not
         own = 1.0 + size * 0.03 / 81
         for row, setting in enumerate(point.settings):
             if row != point.reference:
-                expected = abs(1.0 + error_of(100.0 * size, *values_of(setting)) - own) / own
+                expected = abs(1.0 + error_at(100.0 * size, setting) - own) / own
                 assert point.errors["volume"][row] == pytest.approx(expected, rel=1e-9, abs=1e-14)
                 assert point.is_clear("volume")[row] == (expected >= 3.0 * 2e-4)
 
@@ -90,14 +87,9 @@ def test_of_the_finest_the_one_with_the_least_error_is_the_reference_but_no_expl
 def test_the_front_is_that_of_all_pairs_compared():
     (point, _) = compare_settings(finest_file(math.nan, exact=True))
     time, error = point.time, point.errors["volume"]
-    undominated = {
-        row
-        for row in range(len(time))
-        if not any((time[i] <= time[row] and error[i] < error[row]) for i in range(len(time)))
-    }
-    assert {(time[row], error[row]) for row in point.front("volume")} == {
-        (time[row], error[row]) for row in undominated
-    }
+    both = list(zip(time, error, strict=True))
+    undominated = {(t, e) for t, e in both if not any(quicker <= t and better < e for quicker, better in both)}
+    assert {(time[row], error[row]) for row in point.front("volume")} == undominated
 
 
 def test_what_failed_is_never_compared():

@@ -1,58 +1,40 @@
-"""The result file as the report reads it: opening, shown point, choice of combinations, units."""
+"""The result file as the report reads it: shown point, combinations, units, and how well volumes are known."""
+
+import re
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from studyrunner.api import open_result
+from studyrunner.report.cli import main
+from studyrunner.report.page.page import write_page
 from studyrunner.report.selection import choose
+from studyrunner.result.certainty import certainty_of, describe_ended
 from studyrunner.result.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
-from tests.studyrunner.results import make_result
-
-NO_POINT = xr.Dataset({"outcome": ("frequency", np.zeros(0, np.int8))}, {"cycle": [0.0], "contact": [0]})
-
-
-@pytest.mark.parametrize(
-    ("content", "remedy"),
-    [
-        (None, "there is none of this name"),
-        (b"no NetCDF at all", "is no NetCDF file"),
-        (b"", "is no NetCDF file"),
-        (xr.Dataset({"a": ("x", [1.0])}), "holds no outcome and no cycle and no contact"),
-        (NO_POINT, "frequency = 0 values"),
-    ],
-)
-@pytest.mark.parametrize("opening", [open_for_report, open_result])
-def test_what_is_no_result_file_is_refused_in_one_line(tmp_path, opening, content, remedy):
-    path = tmp_path / "file.nc"
-    if isinstance(content, bytes):
-        path.write_bytes(content)
-    elif content is not None:
-        content.to_netcdf(path)
-    with pytest.raises(UserError) as caught:
-        opening(path)
-    assert remedy in str(caught.value)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
+from tests.studyrunner.report.cases import draw_figure
+from tests.studyrunner.results import build_file, fail, make_result
 
 
-def test_the_shown_point_wears_most_of_those_to_be_trusted():
+def test_the_shown_point_wears_most_of_those_to_be_trusted_or_is_chosen(tmp_path):
     result = make_result()
-    # The explicit scheme wears more everywhere, but is not shown.
-    volume = result.dataset["worn_volume"].isel(cycle=-1)
-    assert int(volume.argmax(...)["scheme"]) == 1
+    # the explicit scheme wears more everywhere, but is not shown
+    assert int(result.dataset["worn_volume"].isel(cycle=-1).argmax(...)["scheme"]) == 1
     assert result.shown_point() == dict.fromkeys(result.axes, 0) | {"frequency": 2, "scheme": 0}
+    build_file().to_netcdf(tmp_path / "out.nc")
+    chosen = open_for_report(tmp_path / "out.nc", {"frequency": "193", "scheme": "explicit"})
+    assert (chosen.shown_point()["frequency"], chosen.shown_point()["scheme"]) == (3, 1)
+    chosen.dataset.close()
+    for wrong in ({"frequency": "1"}, {"mu": "1"}):
+        with pytest.raises(UserError, match=next(iter(wrong))):
+            open_for_report(tmp_path / "out.nc", wrong)
 
 
 def test_combinations_within_the_limit_are_all_chosen():
     choice = choose(make_result(sweep=["up", "down"]), ["frequency"], 4)
-    assert choice.labels == (
-        "implicit scheme, sweep up",
-        "implicit scheme, sweep down",
-        "explicit scheme, sweep up",
-        "explicit scheme, sweep down",
+    assert choice.labels == tuple(
+        f"{scheme} scheme, sweep {sweep}" for scheme in ("implicit", "explicit") for sweep in ("up", "down")
     )
     assert choice.sentence == ""
     assert all("frequency" not in point for point in choice.points)
@@ -78,12 +60,73 @@ def test_prefixes_fit_the_values(units, largest, shown):
 
 
 def test_numbers_in_words():
-    assert show_number(100000.0) == "100\N{NO-BREAK SPACE}000"
     assert show_number(1234.5678) == "1234.57"
     assert show_number(23412.87, 4) == "23\N{NO-BREAK SPACE}410"
     assert show_number(2.1234567e11 + 0.5, 4) == "2.123e+11"
-    assert show_cycles(23412.87) == "23\N{NO-BREAK SPACE}410 cycles"
-    assert show_cycles(123456.0) == "123\N{NO-BREAK SPACE}456 cycles"
-    assert show_cycles(1) == "1 cycle"
-    assert show_cycles(0) == "0 cycles"
+    assert [show_cycles(count) for count in (123456.0, 1, 0)] == [
+        "123\N{NO-BREAK SPACE}456 cycles",
+        "1 cycle",
+        "0 cycles",
+    ]
     assert " ".join(map(show_power, (1.0, 0.1, 1e-12, 1e4, 2e-3, 0.0))) == "1 10⁻¹ 10⁻¹² 10⁴ 0.002 "
+
+
+def test_certainty_and_the_points_that_ended_otherwise_stand_on_the_page(tmp_path):
+    """One point ended early, one is above rtol, one sensitive and one has no state; others are known to rtol or not."""
+    result = make_result(failed=[7])
+    fail(result.dataset, 2, 3, 6000.0, "it broke off")
+    fail(result.dataset, 4, 6, 20_000.0, "the wear rate is known to 2.6 % only")
+    fail(result.dataset, 5, 15, 20_000.0)
+    known = certainty_of(result)
+    assert (known.n_points, known.n_known, known.n_less, known.n_short) == (8, 2, 4, 2)
+    assert (known.worst, known.where) == (0.02, "202 Hz, implicit scheme")
+    write_page(result, [], tmp_path / "index.html")
+    html = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert known.sentence.replace('"', "&quot;") in html
+    for number, word in ((6, "2.6 % only"), (3, "it broke off")):
+        assert next(each for each in describe_ended(result, number) if each.endswith(word)) in html
+    # both schemes have one error: a text stands once, with its points
+    many = make_result(frequency=range(100, 120))
+    for point in range(40):
+        fail(many.dataset, point, 6, 20_000.0)
+    *lines, left = describe_ended(many, 6)
+    assert len(lines) == 10
+    assert all(";" in line for line in lines)
+    assert re.fullmatch(r"and \d+ more points", left)
+
+
+def test_an_inaccurate_state_is_no_volume_above_rtol():
+    """Known to rtol is what its error says, whatever the outcome."""
+    result = make_result()
+    fail(result.dataset, 0, 6, 20_000.0, "the response is known to 3 % only")
+    assert float(result.errors.flat[0]) < 0.01
+    assert not result.above.flat[0]
+    known = certainty_of(result)
+    assert (known.n_known, known.n_less) == (2, 6)
+
+
+def test_a_point_at_its_target_is_drawn_where_it_ended():
+    """It is computed to the end, with no values at later counts."""
+    result = make_result()
+    for point in range(8):
+        fail(result.dataset, point, 0, 6000.0)
+    assert result.last_kept(result.shown_point()) == 2
+    assert "5000 cycles" in draw_figure(result, "worn_profile").caption.replace("\N{NO-BREAK SPACE}", " ")
+
+
+@pytest.mark.slow
+def test_a_result_of_version_0_4_is_opened_and_reported(tmp_path):
+    """It holds fewer variables, and its outcomes have no sentences."""
+    made = build_file(loops=(0, 1), failed=(3,))
+    since = ("last_cycle", "error_estimate", "worn_volume_error", "largest_wear_depth", "wear_depth_error", "message")
+    since += ("response_error", "wear_rate_error", "cycles_to_target", "cycles_to_target_error")
+    old = made.drop_vars([name for name in since if name in made])
+    words = made["outcome"].attrs["flag_meanings"].split()[:14]
+    old["outcome"].attrs = {"flag_values": np.arange(14, dtype=np.int8), "flag_meanings": " ".join(words)}
+    old.attrs["study"] += "[outputs]\nloops = [0, 1]\n"
+    old.to_netcdf(tmp_path / "old.nc")
+    assert main([str(tmp_path / "old.nc"), "-o", str(tmp_path / "report")]) == 0
+    with open_result(tmp_path / "old.nc") as opened:
+        assert opened.fretwear.outcomes().values.ravel()[3] == "march_failed"
+        assert opened["loop_contact"].values.tolist() == [0, 1]
+        assert "error not known" in str(opened.fretwear.summary())

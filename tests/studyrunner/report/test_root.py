@@ -1,33 +1,49 @@
-"""The root in three dimensions: which faces are in contact, the worn shape, views, patches, figures."""
+"""The root in three dimensions: faces in contact, the worn shape, figures, and VTU files with the same numbers."""
 
 import math
+from xml.etree import ElementTree
 
 import matplotlib as mpl
+import meshio
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 
+from studyrunner.report.cli import BAD_INPUT, main
+from studyrunner.report.root import vtu
 from studyrunner.report.root.surface import face_normals, read_root
 from studyrunner.report.root.views import find_views
-from tests.studyrunner.report.figure_numbers import draw_figure
-from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs, volume
-from tests.studyrunner.results import as_result
+from tests.studyrunner.report.cases import dovetail, dovetail_file, draw_figure
+from tests.studyrunner.results import as_result, build_file
 
 
 @pytest.fixture(scope="module")
-def dovetail(tmp_path_factory):
-    return as_result(dovetail_file(), tmp_path_factory.mktemp("root") / "dovetail.nc")
+def result(tmp_path_factory):
+    dataset = dovetail_file().assign_attrs(title="wear --> after -- a title")
+    return as_result(dataset, tmp_path_factory.mktemp("root") / "dovetail.nc")
 
 
 @pytest.fixture(scope="module")
-def surface(dovetail):
-    found = read_root(dovetail)
+def surface(result):
+    found = read_root(result)
     assert found is not None
     return found
 
 
+def volume(nodes, quads):
+    """Volume inside closed faces, m3, by the divergence theorem: a sixth of the sum of triple products of triangles.
+
+    Quadrilaterals are the mean of their two splits, which is exact to second order in what bends them.
+    """
+    total = 0.0
+    for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3)):
+        a, b, c = (nodes[quads[:, corner]] for corner in corners)
+        total += float(np.einsum("ij,ij->", a, np.cross(b, c))) / 12.0
+    return total
+
+
 def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(surface):
-    pairs = dovetail_pairs()
+    pairs, _ = dovetail()
     assert surface.bodies == ("disk", "blade")
     assert surface.flanks == ("intrados", "extrados")
     areas = np.linalg.norm(face_normals(surface.nodes, surface.faces), axis=1)
@@ -49,14 +65,14 @@ def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(
 @pytest.mark.parametrize("body", [0, 1])
 def test_the_worn_shape_loses_the_worn_volume(surface, body):
     """To first order a depth h of the pairs takes sum(h alpha) off a body: alpha is the integral of shape functions."""
-    pairs = dovetail_pairs()
-    depth = np.random.default_rng(3).uniform(0.5, 1.0, len(pairs.area)) * 1e-9
+    area = dovetail()[0].area
+    depth = np.random.default_rng(3).uniform(0.5, 1.0, len(area)) * 1e-9
     own = surface.faces[surface.body == body]
     before = volume(surface.nodes, own)
     assert before > 0.0
     lost = (before - volume(surface.worn(depth, 50.0), own)) / 50.0
     # neighbours of the flanks are not perpendicular to them everywhere: second order
-    assert lost == pytest.approx(float(depth @ pairs.area), rel=1e-4)
+    assert lost == pytest.approx(float(depth @ area), rel=1e-4)
 
 
 @pytest.mark.parametrize("deepest", [1e-9, 3e-7, 1.07e-5, 2e-3, 0.2])
@@ -67,16 +83,17 @@ def test_the_exaggeration_is_a_round_number_that_shows_the_depth(surface, deepes
     assert 0.4 * surface.well_seen <= factor * deepest <= surface.well_seen * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("wrong", ["no mesh", "no faces", "elsewhere"])
-def test_without_a_mesh_at_the_pairs_there_is_no_root(tmp_path, wrong):
-    dataset = dovetail_file()
-    if wrong == "no faces":
-        dataset = dataset.isel(mesh_quad_index=slice(0, 0))
-    elif wrong == "no mesh":
-        dataset = dataset.drop_vars("mesh_quad")
-    else:
-        dataset["mesh_x"] = dataset["mesh_x"] + 1.0
-    assert read_root(as_result(dataset, tmp_path / "file.nc")) is None
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda dataset: dataset.drop_vars("mesh_quad"),
+        lambda dataset: dataset.isel(mesh_quad_index=slice(0, 0)),
+        lambda dataset: dataset.assign(mesh_x=dataset["mesh_x"] + 1.0),
+    ],
+    ids=["no mesh", "no faces", "elsewhere"],
+)
+def test_without_a_mesh_at_the_pairs_there_is_no_root(tmp_path, change):
+    assert read_root(as_result(change(dovetail_file()), tmp_path / "file.nc")) is None
 
 
 @pytest.mark.slow
@@ -89,41 +106,97 @@ def test_the_faces_near_the_contact_are_kept(tmp_path):
     assert surface.near_contact(len(surface.faces)) is surface
 
 
-def test_the_figures_of_the_dovetail(dovetail):
-    worn, numbers = draw_figure(dovetail, "worn_root"), draw_figure(dovetail, "pair_numbers")
-    assert draw_figure(dovetail, "whole_disk").figure.axes
-    depth = dovetail.at("wear_depth", dovetail.shown_point(), -1).values
-    root = read_root(dovetail)
+def test_the_figures_of_the_dovetail(result, surface):
+    worn, numbers = draw_figure(result, "worn_root"), draw_figure(result, "pair_numbers")
+    assert draw_figure(result, "whole_disk").figure.axes
+    depth = result.at("wear_depth", result.shown_point(), -1).values
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
-    assert f"{root.exaggeration(float(depth.max())):g} times exaggerated" in worn.caption.replace("\u00a0", "")
+    assert f"{surface.exaggeration(float(depth.max())):g} times" in worn.caption.replace("\u00a0", "")
     written = [text.get_text() for panel in numbers.figure.axes for text in panel.texts]
     assert sorted(map(int, written)) == list(range(16))
 
 
-def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(dovetail):
+def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(result, surface):
     """Shares of red, green and blue: the light on a face, which differs, makes all of them larger or smaller."""
 
     def shares(colours):
         return np.asarray(colours[..., :3] / colours[..., :3].sum(axis=-1, keepdims=True))
 
-    def of_faces(name, surface):
+    def of_faces(name, flank):
         """Of a variable of pairs: a face has four of them at its corners."""
-        pairs = shown.fretwear.flank(name, surface).values
+        pairs = shown.fretwear.flank(name, flank).values
         return np.asarray(0.25 * (pairs[1:, 1:] + pairs[1:, :-1] + pairs[:-1, 1:] + pairs[:-1, :-1])).ravel()
 
-    result, root = dovetail, read_root(dovetail)
-    views = {view.title: view.frame for view in find_views(root)}
+    views = {view.title: view.frame for view in find_views(surface)}
     shown = result.dataset.isel(result.shown_point()).isel(cycle=-1)
     panels = draw_figure(result, "worn_root").figure.axes[1:3]
-    for panel, surface in zip(panels, shown.fretwear.surfaces, strict=True):
-        assert surface in panel.get_title()
+    for panel, flank in zip(panels, shown.fretwear.surfaces, strict=True):
+        assert flank in panel.get_title()
         faces = next(item for item in panel.collections if isinstance(item, PolyCollection))
         drawn = shares(np.asarray(faces.get_facecolors()))
-        wanted = shares(mpl.colormaps["cividis"](of_faces("wear_depth", surface) / float(shown.wear_depth.max())))
-        centres = np.stack([of_faces(f"contact_{axis}", surface) for axis in "xyz"], axis=1)
+        wanted = shares(mpl.colormaps["cividis"](of_faces("wear_depth", flank) / float(shown.wear_depth.max())))
+        centres = np.stack([of_faces(f"contact_{axis}", flank) for axis in "xyz"], axis=1)
         right, up, _ = views[panel.get_title()]
         for colour, centre in zip(wanted, centres, strict=True):
             alike = np.flatnonzero(np.abs(drawn - colour).max(axis=1) < 1e-3)
             places = np.array([faces.get_paths()[each].vertices[:4].mean(axis=0) for each in alike])
             # in mm; the worn shape is moved by some of them, and faces are 13 mm long
             assert np.linalg.norm(places - 1e3 * np.array([centre @ right, centre @ up]), axis=1).min() < 5.0
+
+
+# --- for ParaView ---
+
+
+@pytest.fixture(scope="module")
+def folder(result, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("vtu")
+    (folder / "vtu").mkdir()
+    (folder / "vtu" / "root_9999.vtu").touch()  # of an older, longer series
+    assert vtu.find_writer(result)(folder) == 5
+    return folder
+
+
+def test_the_series_names_a_file_for_each_cycle_count(folder, result):
+    sets = ElementTree.parse(folder / "root.pvd").findall("Collection/DataSet")
+    assert [float(each.attrib["timestep"]) for each in sets] == result.cycles.tolist()
+    named = [each.attrib["file"] for each in sets]
+    assert sorted(named) == sorted(f"vtu/{path.name}" for path in (folder / "vtu").iterdir())
+
+
+@pytest.mark.parametrize("cycle", [0, 4])
+def test_the_files_hold_the_numbers_of_the_pairs(folder, result, cycle):
+    dataset, (pairs, surface_mesh) = result.dataset, dovetail()
+    mesh = meshio.read(folder / "vtu" / f"root_{cycle:04d}.vtu")
+    np.testing.assert_array_equal(mesh.points, surface_mesh.nodes)
+    np.testing.assert_array_equal(mesh.cells_dict["quad"], surface_mesh.quads)
+    there = np.isfinite(mesh.point_data["wear_depth (m)"])
+    assert there.sum() == 2 * len(pairs.area)
+    way = np.linalg.norm(mesh.points[there][:, None] - pairs.position, axis=2)
+    assert way.min(axis=1).max() < 1e-12
+    pair = way.argmin(axis=1)
+    for name in vtu.FIELDS:
+        units = dataset[name].attrs["units"]
+        field = mesh.point_data[name if units == "1" else f"{name} ({units})"]
+        np.testing.assert_array_equal(field[there], result.at(name, result.shown_point(), cycle).values[pair])
+    depth, moved = mesh.point_data["wear_depth (m)"][there], mesh.point_data["worn_displacement (m)"]
+    # into the blade on one side of the joint, into the disk on the other
+    along = np.einsum("ij,ij->i", moved[there], pairs.frames[pair, 0])
+    np.testing.assert_allclose(np.sort(along), np.sort(np.where(along > 0.0, depth, -depth)), rtol=1e-9)
+    assert (along > 0.0).sum() == len(pairs.area)
+    assert (moved[~there] == 0.0).all()
+    body, surface = (np.concatenate(mesh.cell_data[name]) for name in ("body", "contact_surface"))
+    assert set(body) == {0, 1}
+    assert (np.bincount(surface + 1)[1:] == 2 * 3).all()
+
+
+@pytest.mark.parametrize(("library", "said"), [(False, "pip install meshio"), (True, "no positions")])
+def test_what_stands_in_the_way_is_said_before_anything_is_written(tmp_path, monkeypatch, capsys, library, said):
+    monkeypatch.chdir(tmp_path)
+    build_file(positions=np.full((2, 3), np.nan)).to_netcdf("some.nc")
+    if not library:
+        monkeypatch.setattr(vtu, "find_spec", lambda _: None)
+    assert main(["some.nc", "--vtu"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--vtu" in line
+    assert said in line
+    assert [path.name for path in tmp_path.iterdir()] == ["some.nc"]

@@ -1,4 +1,4 @@
-"""Static states, found under any friction, or the reason why there is none; first periodic states from there."""
+"""Static states, found under any friction, or the reason why there is none; first periodic states; shakedown."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -6,22 +6,26 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from solver.accuracy.certificate import certify
+from solver.accuracy.resolved_state import ResolvedState
 from solver.continuation.first_state import solve_first_state, solve_static_state
+from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.state import State
 from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
 from solver.outcome import Outcome
+from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.structure.condensation import condense
-from solver.structure.joint import build_case
+from solver.structure.joint import Joint, build_case
 from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene
 from studies.finite_element.surfaces import surface_of_faces
-from tests.benchmarks.random_decks import run_deck
-from tests.random_decks import equilibrium_possible, law_errors, random_deck
-from tests.solver.models import dovetail, scene
+from tests.random_decks import equilibrium_possible, law_errors, random_deck, run_deck
+from tests.random_scenes import random_scene
+from tests.solver.models import branch_states, dovetail, scene
 from tests.studies.fe_models.sectors import faces_where
 from tests.studies.fe_models.solid_meshes import block, joined
 
@@ -41,24 +45,12 @@ def pressed_dovetail():
     return replace(model, linear={0: replace(linear, load_static=load)})
 
 
-def glued_force(model):
-    """Contact force (n_contact, 3), N, of the static load with all relative displacements held."""
-    linear = model.linear[0]
-    condensed = condense(np.real(linear.stiffness), model.contact.dofs.ravel(), linear.load_static)
-    return np.real(condensed.force).reshape(-1, 3)
-
-
-def static_point(model, friction):
-    case = build_case(model, friction, OMEGA, SETTINGS)
-    point = solve_static_state(case.joint(OMEGA, 0.0), np.zeros(model.contact.n_contact), Run(1e-9))
-    assert not isinstance(point, Outcome), f"no static state at a friction coefficient of {friction}"
-    return point
-
-
-def check_laws(model, friction):
-    """All laws of contact hold in the static state; returns the contact forces (n_contact, 3), N."""
-    point = static_point(model, friction)
-    errors = law_errors(build_case(model, friction, OMEGA, SETTINGS).joint(OMEGA, 0.0), point)
+def static_forces(model, friction):
+    """Contact forces (n_contact, 3), N, of the static state, in which all laws of contact hold."""
+    joint = build_case(model, friction, OMEGA, SETTINGS).joint(OMEGA, 0.0)
+    point = solve_static_state(joint, np.zeros(model.contact.n_contact), Run(1e-9))
+    assert isinstance(point, State), f"no static state at a friction coefficient of {friction}"
+    errors = law_errors(joint, point)
     assert max(errors.values()) < 1e-7, errors
     return point.evaluation.force_h[:, :, 0]
 
@@ -91,25 +83,25 @@ def stacked(force, direction=(0.0, 0.0, -1.0), interference=None, edge=False):
 
 def test_beyond_the_friction_that_holds_all_pairs_the_static_state_is_the_glued_one():
     model = pressed_dovetail()
-    force = glued_force(model)
+    linear = model.linear[0]
+    condensed = condense(np.real(linear.stiffness), model.contact.dofs.ravel(), linear.load_static)
+    force = np.real(condensed.force).reshape(-1, 3)
     # from this friction coefficient on the glued structure slips nowhere
     needed = float((np.hypot(force[:, 1], force[:, 2]) / force[:, 0]).max())
     assert 1.5 < needed < 100.0, "the test means nothing"
-    for friction in (1.01 * needed, 5.0 * needed, 1000.0):
-        evaluation = static_point(model, friction).evaluation
-        assert np.abs(evaluation.force_h[:, :, 0] - force).max() < 1e-7 * force.max()
-    assert np.abs(static_point(model, 0.7 * needed).evaluation.force_h[:, :, 0] - force).max() > 1e-3 * force.max()
+    for friction in (1.01 * needed, 1000.0):
+        assert np.abs(static_forces(model, friction) - force).max() < 1e-7 * force.max()
+    assert np.abs(static_forces(model, 0.7 * needed) - force).max() > 1e-3 * force.max()
 
 
-@pytest.mark.parametrize("friction", [0.3, 0.5, 1.0, 2.0, 5.0, 30.0, 1000.0])
+@pytest.mark.parametrize("friction", [0.3, 1.0, 1000.0])
 def test_the_dovetail_has_a_static_state_under_any_friction(friction):
-    check_laws(dovetail(), friction)
+    static_forces(dovetail(), friction)
 
 
-@pytest.mark.parametrize("force", [1.0, 1000.0])
-@pytest.mark.parametrize("friction", [0.0, 0.01, 0.1, 0.4, 1.0])
+@pytest.mark.parametrize(("friction", "force"), [(0.0, 1.0), (0.01, 1000.0), (0.4, 1.0)])
 def test_a_free_block_on_a_cantilever_has_a_static_state(friction, force):
-    forces = check_laws(stacked(force), friction)
+    forces = static_forces(stacked(force), friction)
     assert forces[:, 0].sum() == pytest.approx(force, rel=1e-6)
 
 
@@ -117,7 +109,7 @@ def test_interference_presses_as_the_closed_form_says():
     interference = 1e-6
     # two bars in a row, 5 mm each, between rigid walls
     pressure = 210e9 * interference / (0.01 - interference)
-    forces = check_laws(stacked(0.0, interference=interference), 0.1)
+    forces = static_forces(stacked(0.0, interference=interference), 0.1)
     assert forces[:, 0].sum() == pytest.approx(pressure * 0.04 * 0.01, rel=1e-4)
 
 
@@ -140,18 +132,16 @@ def test_a_joint_without_a_static_state_says_why(direction, edge, expected):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_random_decks_have_a_static_state_where_the_forces_can_balance(seed):
-    exists, outcome, errors, _ = run_deck(random_deck(seed))
+    exists, outcome, errors = run_deck(random_deck(seed))
     assert (outcome is Outcome.CONVERGED) is (exists == "possible")
     assert max(errors.values(), default=0.0) < 1e-7
 
 
 @pytest.mark.slow
 def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure():
-    model = pressed_dovetail()
-    glued = None
-    away = []
+    model, glued, away = pressed_dovetail(), 0.0, []
     for friction in (0.06, 0.08, 0.1, 5.0, 1000.0):
         case = build_case(model, friction, OMEGA, SETTINGS)
         point = solve_first_state(case, OMEGA, 0.5, np.zeros(PAIRS), Run(case.settings.tolerance))
@@ -160,12 +150,11 @@ def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure()
         glued = complex(joint.structure.harmonic_offset[0])
         cosine, sine = joint.structure.response_h(joint.to_relative(point.evaluation.displacement_h))[0, 1:3]
         away.append(abs(complex(cosine, -sine) - glued))
-    assert glued is not None
     assert away[0] > away[1] > away[2] > 0.01 * abs(glued)
     assert max(away[3:]) < 1e-6 * abs(glued)
 
 
-@pytest.mark.parametrize("frequency", [89.6, 150.0, 240.0])
+@pytest.mark.parametrize("frequency", [89.6, 240.0])
 def test_a_mass_that_friction_cannot_hold_begins_to_slide_at_once(frequency):
     case = build_case(scene("sdof_slider"), 0.5, 2.0 * np.pi * frequency, SolverSettings())
     run = Run(case.settings.tolerance)
@@ -179,3 +168,69 @@ def test_a_mass_that_slides_all_the_time_needs_no_reference_sweep():
     assert start.reference is None
     assert 0.0 < start.response_error < 1e-2
     assert start.newton_iterations < 60
+
+
+# --- ratcheting of marched masses ends in shakedown ---
+
+SHAKEN_DOWN, SLIDING_ON = 160, 178  # seeds: the mass slips until it sticks, or goes on slipping to and fro
+TOLERANCE = SolverSettings().tolerance
+
+
+def started(seed, **settings):
+    scene = random_scene(seed)
+    omegas = [2.0 * np.pi * scene.frequency_hz]
+    return branch_states(scene.model, scene.friction, scene.amplitude, omegas, SolverSettings(**settings))[0]
+
+
+def ratcheting(seed, monkeypatch):
+    """The first state that is refined at the frequency of the scene, before its masses shake down."""
+    seen: list[tuple[Joint, State]] = []
+
+    def note(level, _):
+        seen.append((level.joint, level.point))
+        return level
+
+    with monkeypatch.context() as patched:
+        patched.setattr(ResolvedState, "at_rest", note)
+        # few samples: with many the last work falls slowly from one shakedown to the next
+        started(seed, harmonics=3, samples=64)
+    omega = 2 * np.pi * random_scene(seed).frequency_hz
+    return next((joint, point) for joint, point in seen if np.isclose(joint.omega, omega, rtol=1e-12))
+
+
+@pytest.mark.slow
+def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch):
+    joint, point = ratcheting(SHAKEN_DOWN, monkeypatch)
+    assert ratchets(joint, point.evaluation, 0.5)
+    assert "energy_error" in certify(joint, point.evaluation).failures(TOLERANCE)
+    shaken = shake_down(joint, point, 1e-3, Run(TOLERANCE))
+    assert shaken.evaluation.slip_work.sum() < 1e-6 * point.evaluation.slip_work.sum()
+    assert shaken.evaluation.scaled_residual() <= TOLERANCE
+    assert certify(joint, shaken.evaluation).holds(TOLERANCE)
+
+
+@pytest.mark.slow
+def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch):
+    joint, point = ratcheting(SLIDING_ON, monkeypatch)
+    shaken = shake_down(joint, point, 1e-3, Run(TOLERANCE))
+    assert not ratchets(joint, shaken.evaluation, 1e-3)
+    assert shaken.evaluation.slip_work.sum() > 0.1 * point.evaluation.slip_work.sum()
+    # the next state starts from where this one stays
+    again = shake_down(joint, shaken, 1e-3, Run(TOLERANCE))
+    assert again is shaken
+    middle = shaken.evaluation.displacement_h[:, 1:, 0] - shaken.evaluation.history
+    moved = np.abs(shaken.evaluation.displacement_h[:, 1:, 1:]).max()
+    assert np.abs(middle[joint.penalty.inertial]).max() < 0.1 * moved
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [SHAKEN_DOWN, 371, 710])
+def test_states_whose_slip_was_ratcheting_are_found(seed):
+    start = started(seed)
+    assert start.outcome is Outcome.CONVERGED
+    if seed == 710:
+        # shaken down with 3 harmonics it slips 1e-12 N m on to where 9 have it, a thousand times what is left there
+        scene = random_scene(seed)
+        case = build_case(scene.model, scene.friction, start.penalty_omega, SolverSettings(), start.resolution)
+        joint = case.joint(start.state.omega, scene.amplitude)
+        assert evaluated(joint, start.state)[1].slip_work.sum() < 1e-13

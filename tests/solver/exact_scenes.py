@@ -1,21 +1,24 @@
-"""Random textbook scenes with one contact pair whose periodic motions are known exactly, of any size and unit."""
+"""Scenes whose periodic motions are known exactly, and the errors of automatic states against them.
 
-from collections.abc import Callable
+Structures with one contact pair: the textbook scenes, and random ones of any size and unit. Then a cantilever.
+"""
+
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from solver.loading_history.start_states import follow_branch
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.outcome import Outcome
-from solver.results.history import WearHistory
+from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.structure.fourier import synthesis, to_complex
-from solver.structure.joint import build_case
+from solver.structure.joint import Joint, build_case
+from tests.cantilever import FRICTION, Cantilever
 from tests.contact_pair import ContactPair
+from tests.event_driven import Orbit
 from tests.solver.models import march_wear
-
-Draw = Callable[[np.random.Generator], "Scene"]
 
 
 @dataclass(frozen=True)
@@ -40,60 +43,67 @@ class Scene(ContactPair):
         )
         return ReducedModel({0: linear}, contact, tuple(f"mass {index}" for index in range(len(rows))))
 
+    def orbit_next_to(self, joint: Joint, displacement_h: FloatArray) -> Orbit:
+        """The exact motion next to a state, given by its relative displacements. Raises NoPeriodicMotionError."""
+        orders, masses = joint.basis.orders, np.diag(self.mass) > 0.0
+        motion_h = np.zeros((masses.size, 2 * len(orders) + 1))
+        motion_h[masses] = joint.structure.response_h(joint.to_relative(displacement_h))
+        if self.tangent is not None and not masses[self.tangent]:
+            motion_h[self.tangent] = displacement_h[0, 1]
+        displacement = (motion_h @ synthesis(orders, np.zeros(1)))[:, 0]
+        velocity = (1j * self.omega * np.array(orders) * to_complex(motion_h)).sum(axis=1).real
+        return self.orbit_near(displacement, velocity)
+
 
 @dataclass(frozen=True)
 class Found:
-    """What the solver finds, and its true errors where it says that there is a state; NaN where not.
+    """What the solver finds; NaN where it finds no state.
 
-    slip_work: exact, N m.
+    Relative errors of amplitudes, of complex first harmonics and of the slip work; what was estimated of the last two.
     """
 
     outcome: Outcome
+    amplitude: float = np.nan
     response: float = np.nan
     wear_rate: float = np.nan
     response_estimate: float = np.nan
     wear_rate_estimate: float = np.nan
-    slip_work: float = np.nan
+    highest: int = 0
+    samples: int = 0
     iterations: int = 0
 
+    @property
+    def safe(self) -> bool:
+        """Whether each estimate is at least half of the error; what is exact has the estimate zero."""
+        response, wear_rate = 0.5 * self.response - 1e-10, 0.5 * self.wear_rate - 1e-10
+        return self.response_estimate >= response and self.wear_rate_estimate >= wear_rate
 
-def find(scene: Scene, rtol: float, sweep: str = "up") -> Found:
-    """Solve with automatic settings and compare with the exact motion next to what is found.
 
-    Raises tests.event_driven.NoPeriodicMotionError.
-    """
-    settings, model = SolverSettings(rtol=rtol), scene.model
-    frequency = np.array([scene.omega / (2.0 * np.pi)])
+def find(scene: Scene, settings: SolverSettings, sweep: str = "up") -> Found:
+    """Solve, and compare with the exact motion next to what is found. Raises NoPeriodicMotionError."""
+    model, frequency = scene.model, np.array([scene.omega / (2.0 * np.pi)])
     ((_, start),) = follow_branch(model, scene.friction, scene.excitation, frequency, sweep, settings)
+    # the wear rate is the slip work
     history = march_wear(model, scene.friction, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
     if history.outcome is not Outcome.CONVERGED or start.state is None:
         return Found(history.outcome, iterations=history.newton_iterations)
     case = build_case(model, scene.friction, start.penalty_omega, settings, start.resolution)
-    joint = case.joint(scene.omega, scene.excitation)
-    masses = np.diag(scene.mass) > 0.0
-    motion_h = np.zeros((len(scene.mass), 2 * len(start.resolution.orders) + 1))
-    motion_h[masses] = joint.structure.response_h(joint.to_relative(start.state.displacement_h))
-    if scene.tangent is not None and not masses[scene.tangent]:
-        motion_h[scene.tangent] = start.state.displacement_h[0, 1]
-    orders = start.resolution.orders
-    displacement = (motion_h @ synthesis(orders, np.zeros(1)))[:, 0]
-    velocity = (1j * scene.omega * np.array(orders) * to_complex(motion_h)).sum(axis=1).real
-    orbit = scene.orbit_near(displacement, velocity)
-    exact, slip_work = scene.response(orbit), scene.slip_work(orbit)
+    orbit = scene.orbit_next_to(case.joint(scene.omega, scene.excitation), start.state.displacement_h)
+    exact, slip_work, found = scene.response(orbit), scene.slip_work(orbit), history.response[0]
     return Found(
         history.outcome,
-        response=float(np.linalg.norm(history.response[0] - exact) / np.linalg.norm(exact)),
-        wear_rate=_relative(history, slip_work),
+        amplitude=float(np.linalg.norm(np.abs(found) - np.abs(exact)) / np.linalg.norm(exact)),
+        response=float(np.linalg.norm(found - exact) / np.linalg.norm(exact)),
+        wear_rate=abs(float(history.wear_rate[0]) - slip_work) / (slip_work or 1.0),
         response_estimate=float(history.response_error[0]),
         wear_rate_estimate=float(history.wear_rate_error[0]),
-        slip_work=slip_work,
+        highest=start.resolution.highest,
+        samples=start.resolution.samples,
         iterations=history.newton_iterations,
     )
 
 
-def _relative(history: WearHistory, slip_work: float) -> float:
-    found = float(history.wear_rate[0])
-    return abs(found - slip_work) / slip_work if slip_work else found
+# --- random scenes ---
 
 
 def _spread(random: np.random.Generator, low: float, high: float) -> float:
@@ -207,9 +217,8 @@ def jenkins(random: np.random.Generator) -> Scene:
     """Elastic dry friction about its two resonances."""
     tangential = _spread(random, 0.1, 30.0)
     omega = random.uniform(0.8, 1.2) * random.choice([1.0, np.sqrt(1.0 + tangential)])
-    return behind_spring(
-        tangential, random.uniform(0.002, 0.1), _spread(random, 0.1, 5.0), omega, 1.0, _spread(random, 1e-3, 1e3)
-    )
+    damping, limit = random.uniform(0.002, 0.1), _spread(random, 0.1, 5.0)
+    return behind_spring(tangential, damping, limit, omega, 1.0, _spread(random, 1e-3, 1e3))
 
 
 def slipping_little(random: np.random.Generator) -> Scene:
@@ -242,19 +251,50 @@ def inclined(random: np.random.Generator) -> Scene:
     return Scene(mass, damping, stiffness, load, harmonic, 0, 1, 0.0, 0.0, random.uniform(0.2, 0.6), omega, force)
 
 
-KINDS: dict[str, Draw] = {
-    "slider": slider,
-    "stopping slider": stopping_slider,
-    "swinging slider": swinging_slider,
-    "two masses": two_masses,
-    "impact": impact,
-    "grazing": grazing,
-    "jenkins": jenkins,
-    "slipping little": slipping_little,
-    "inclined": inclined,
-}
+_DRAWS = (slider, stopping_slider, swinging_slider, two_masses, impact, grazing, jenkins, slipping_little, inclined)
+KINDS = {draw.__name__.replace("_", " "): draw for draw in _DRAWS}
 
 
 def drawn(kind: str, seed: int) -> Scene:
     """A scene of a kind."""
     return KINDS[kind](np.random.default_rng([seed, sorted(KINDS).index(kind)]))
+
+
+# --- textbook scenes ---
+
+
+def textbook_scenes() -> dict[str, tuple[Scene, str]]:
+    """By name: the scene, and the sweep that leads to its state."""
+    found = {}
+    # force, N, against 5 N of friction; frequency ratio
+    sliders = [(10.0, ratio) for ratio in (0.5, 0.6, 0.9, 1.1, 1.4)] + [(7.0, 0.8), (7.0, 1.25)]
+    for force, ratio in (*sliders, (5.5, 0.6), (5.5, 0.8), (5.5, 1.25)):
+        found[f"slider {force} N {ratio}"] = slid(0.1, 0.0, 1.6e5, 10.0, 0.5, force, ratio * np.sqrt(1.6e6)), "up"
+    damping, stiffness = np.array([[0.04, -0.02], [-0.02, 0.02]]), np.array([[2.0, -1.0], [-1.0, 1.0]])
+    for omega in (0.3, 0.4, 0.5, 0.6, 0.7, 1.3, 1.6, 1.8):
+        parts = np.eye(2), damping, stiffness, np.zeros(2), np.array([20.0, 0.0])
+        found[f"two masses {omega}"] = Scene(*parts, None, 1, 14.4, 0.0, 0.5, omega, 20.0), "up"
+    for omega, sweep in ((1.05, "up"), (1.1, "up"), (1.2, "up"), (1.5, "up"), (1.2, "down")):
+        branch = "upper" if sweep == "up" else "open"
+        found[f"vibro-impact {omega} {branch}"] = wall(omega, 5.0, 0.025, 100.0), sweep
+    return found
+
+
+# --- a cantilever with rigid friction at its tip ---
+
+SPRINGS = {"rigid": np.inf, "soft spring": 20.0, "stiff spring": 200.0}  # N/m
+
+
+@lru_cache
+def exact_tip(name: str, force: float, omega: float) -> tuple[complex, float]:
+    """First harmonic and largest displacement of the tip, m."""
+    beam = Cantilever(spring=SPRINGS[name])
+    orbit, tip = beam.orbit(force, omega), beam.tip_of_orbit()
+    first = sum(share * orbit.harmonic(dof) for dof, share in enumerate(tip))
+    return complex(first), float(np.abs(tip @ orbit.sample(4096)[: tip.size]).max())
+
+
+def reported_tip(model: ReducedModel, start: StartState, settings: SolverSettings) -> tuple[complex, float]:
+    """The same as reported of an unworn state."""
+    history = march_wear(model, FRICTION, start, 0.0, 1.0, "explicit", np.zeros(1), settings)
+    return complex(history.response[0, 0]), float(history.response_peak[0, 0])

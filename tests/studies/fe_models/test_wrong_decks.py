@@ -4,7 +4,7 @@ import pytest
 
 from studies.fe_models.deck.read import read_deck
 from studies.scene_error import SceneError
-from tests.studies.fe_models.decks import CUBES, PART, SECTOR, write
+from tests.studies.fe_models.decks import BLOCKS, CUBES, PART, SECTOR, prepared_deck, write
 from tests.studies.fe_models.mutations import mutate
 
 LEAST = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=E\n1,1,2,3,4\n"
@@ -37,6 +37,41 @@ def test_wrong_decks(tmp_path, text, sentence):
     with pytest.raises(SceneError, match=sentence) as wrong:
         read_deck(write(tmp_path, text))
     assert str(wrong.value).isprintable()
+
+
+def with_friction(lines):
+    return BLOCKS.replace("*FRICTION\n0.4", lines)
+
+
+NO_FRICTION = [with_friction("*FRICTION, TAUMAX=100.\n0.4"), with_friction("*FRICTION\n0.4, 0.\n0.3, 1.")]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (BLOCKS + "*CONTACT\n", r"\*CONTACT is not read, and may change the model; give \*CONTACT PAIR for"),
+        (BLOCKS + "*NONSENSE\n", r"\*NONSENSE is not read, and may change the model; remove it if the model is right"),
+        (BLOCKS + "*MATERIAL, NAME=STEEL\n*ELASTIC\n7e4, 0.3\n", r"\*ELASTIC of one material again \(before: deck.inp"),
+        (BLOCKS + "*INITIAL CONDITIONS, TYPE=STRESS\n", r"\*INITIAL CONDITIONS: TYPE=STRESS is not read"),
+        (NO_FRICTION[0], r"\*FRICTION with TAUMAX is not read; give one coefficient, there or by"),
+        (NO_FRICTION[1], r"\*FRICTION of several coefficients is not read; give one coefficient, there or by"),
+        (BLOCKS + "*EQUATION\n2\n5,1,1.,15,1,-1.\n2\n5,1,1.,10,1,-1.\n", "displacement 1 of node 5 depends on others"),
+        (BLOCKS + "*EQUATION\n2\n1,1,1.,15,1,-1.\n", "displacement 1 of node 1 depends on others and is held"),
+        (BLOCKS + "*EQUATION\n2\n105,1,1.,15,1,-1.\n2\n20,1,1.,15,1,-1.\n", "node 105 depends on others and moves in"),
+        (BLOCKS + "*TRANSFORM, NSET=XM, TYPE=C\n40,0,0,40,0,1\n*BOUNDARY\nXM,1\n", r"\*TRANSFORM: node 5 is on the"),
+        (BLOCKS + "*BOUNDARY\nXM, 1, 1, 0.1\n", r"\*BOUNDARY moves XM by 0.1"),
+        (BLOCKS + "*STEP\n*STATIC\n*DLOAD\nELOW, BX, 1.\n*END STEP\n", r"\*DLOAD of type BX is not read"),
+    ],
+)  # fmt: skip
+def test_what_may_change_the_model_is_refused(tmp_path, text, sentence):
+    with pytest.raises(SceneError, match=sentence) as wrong:
+        prepared_deck(tmp_path, text)
+    assert "deck.inp, line " in str(wrong.value)
+
+
+@pytest.mark.parametrize("text", NO_FRICTION)
+def test_the_study_gives_a_coefficient_in_place_of_a_law_of_friction(tmp_path, text):
+    assert prepared_deck(tmp_path, text, friction_coefficient=0.3)[0].pairs.n_contact == 15
 
 
 @pytest.mark.parametrize("more", ["2,1,2,3,4,\n", "*NSET,NSET=A,GENERATE\n1,1000000000,1\n"])

@@ -1,0 +1,170 @@
+"""Krylov methods for large systems: GMRES, Ritz values, and a preconditioner corrected by what GMRES has found.
+
+The operator may be singular, as the Jacobian of a joint that slips as a whole. So each vector is orthogonalised twice,
+and GMRES stops at stagnation, with the least-squares solution without a part in the null space.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numba import njit
+
+from solver.model import ComplexArray, FloatArray
+from solver.settings import NEGLIGIBLE
+
+SIGN_PRODUCTS = 16
+"""Products of Arnoldi's method between two computations of the eigenvalues. With four, 23 cases are equal."""
+
+STAGNATION_PRODUCTS = 20
+"""A GMRES cycle ends unless its residual is halved over so many products: saves time where a joint slides."""
+
+NO_DIRECTION = 1e-11
+"""Fraction of a vector: less is no new direction. Double precision has 2e-16."""
+
+Product = Callable[[FloatArray], FloatArray]
+"""An operator applied to a vector (n,)."""
+
+
+def solve_gmres(
+    product: Product, exact: Product, right: FloatArray, rtol: float, restart: int, cycles: float
+) -> tuple[FloatArray, bool, FloatArray, FloatArray]:
+    """Solve `exact(x) = right` (n,) by restarted GMRES from zero.
+
+    Returns x, whether it has converged, and basis and Hessenberg matrix of the last cycle (`_arnoldi`).
+
+    product: the operator with small errors allowed; `exact` is applied once in a cycle of at most `restart` products.
+    rtol: relative residual. cycles: most cycles, but for those that converge with inexact products only.
+    """
+    solution, residual = np.zeros_like(right), right
+    basis, hessenberg = right[None], np.zeros((1, 0))
+    norms = [float(np.linalg.norm(right))]
+    wanted = rtol * norms[0]
+
+    def stagnates() -> bool:
+        return len(norms) > STAGNATION_PRODUCTS and norms[-1] > 0.5 * norms[-1 - STAGNATION_PRODUCTS]
+
+    while cycles > 0 and np.isfinite(norms[-1]) and norms[-1] > wanted:
+        first, null = norms[-1], np.ones(min(restart, right.size) + 1)
+
+        def enough(hessenberg: FloatArray, first: float = first, null: FloatArray = null) -> bool:
+            # the residual is the part of `first` along the left null vector of the Hessenberg matrix
+            k = hessenberg.shape[1]
+            along, below = float(null[:k] @ hessenberg[:k, -1]), float(hessenberg[k, -1])
+            null[k] = -along / below if below else along * math.inf
+            norms.append(first / math.sqrt(null[: k + 1] @ null[: k + 1]))
+            return norms[-1] <= wanted or stagnates()
+
+        basis, hessenberg = _arnoldi(product, residual, restart, enough)
+        if not hessenberg.size:
+            break
+        found = norms[-1] <= wanted
+        # without convergence, directions of the null space would only make the solution large
+        least = 0.0 if found else NEGLIGIBLE
+        along = first * np.eye(len(hessenberg))[0]
+        solution = solution + np.linalg.lstsq(hessenberg, along, rcond=least)[0] @ basis[: hessenberg.shape[1]]
+        cycles -= not found
+        residual = right - exact(solution)
+        norms[-1] = float(np.linalg.norm(residual))
+        if stagnates():
+            break
+    return solution, norms[-1] <= wanted, basis, hessenberg
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Exact inverse of an operator A on the space where GMRES has been, the identity at right angles to this space.
+
+    Arnoldi's method gives `A V = W H`. With H = Q R, the orthonormal columns of Y = W Q are the images of `U = V R^-1`.
+    So `1 + (U - Y) Y^T` leaves Y to Y itself. Directions near resonances of the structure, which GMRES has to find, are
+    thus found once, and not in each solve (Parks et al., Recycling Krylov Subspaces, SIAM J. Sci. Comput. 28, 2006).
+
+    images, changes (k, n): rows of Y and of U - Y.
+    """
+
+    images: FloatArray
+    changes: FloatArray
+
+    def apply(self, vector: FloatArray) -> FloatArray:
+        """Corrected vector (n,)."""
+        return np.asarray(vector + (self.images @ vector) @ self.changes)
+
+
+def build_correction(basis: FloatArray, hessenberg: FloatArray) -> Correction | None:
+    """Correction from W (k + 1, n) and H (k + 1, k) of Arnoldi's method; None where the operator is nearly singular."""
+    left, right = np.linalg.qr(hessenberg)
+    sizes = np.abs(np.diag(right))
+    if not sizes.min() > NEGLIGIBLE * sizes.max():
+        return None
+    images = left.T @ basis
+    return Correction(images, scipy.linalg.solve_triangular(right, basis[:-1], trans="T") - images)
+
+
+def ritz_values(
+    product: Product, start: FloatArray, most: int, enough: Callable[[ComplexArray, FloatArray], bool] | None = None
+) -> tuple[ComplexArray, FloatArray]:
+    """Ritz values (k,) of a real operator A by Arnoldi's method; outliers of the spectrum appear first.
+
+    start (n,): first vector. most: products. enough: whether values and residuals suffice, asked every `SIGN_PRODUCTS`.
+    Also returns the norms (k,) of `A x - value x` for the Ritz vectors x of norm 1. NaN where no product is finite.
+    """
+
+    def values_of(hessenberg: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        if not hessenberg.size:
+            return np.full(1, np.nan, complex), np.full(1, np.nan)
+        values, vectors = np.linalg.eig(hessenberg[:-1])
+        return values.astype(complex), hessenberg[-1, -1] * np.abs(vectors[-1])
+
+    def settled(hessenberg: FloatArray) -> bool:
+        often = hessenberg.shape[1] % SIGN_PRODUCTS == 0
+        return often and enough is not None and enough(*values_of(hessenberg))
+
+    return values_of(_arnoldi(product, start, most, settled)[1])
+
+
+def _arnoldi(
+    product: Product, start: FloatArray, most: int, enough: Callable[[FloatArray], bool]
+) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal basis W (k + 1, n) of the Krylov space of `start`, and the Hessenberg matrix H (k + 1, k).
+
+    The operator maps the first k vectors V to `A V = W H`; the last vector is 0 where the space is invariant.
+    Ends after `most` products, where the space is invariant, before an image that is not finite, or by `enough`.
+    """
+    size, k = min(most, start.size), 0
+    basis, hessenberg = np.zeros((size + 1, start.size)), np.zeros((size + 1, size))
+    basis[0] = start / np.linalg.norm(start)
+    while k < size:
+        column = _extend(basis, k, np.ascontiguousarray(product(basis[k])))
+        if not np.isfinite(column).all():
+            break
+        k += 1
+        hessenberg[: k + 1, k - 1] = column
+        if enough(hessenberg[: k + 1, :k]) or column[k] == 0.0:
+            break
+    return basis[: k + 1], hessenberg[: k + 1, :k]
+
+
+@njit(cache=True)
+def _extend(basis: FloatArray, k: int, image: FloatArray) -> FloatArray:
+    """Vector k + 1 of an orthonormal basis (most + 1, n), in place; returns the components (k + 2,) of the image (n,).
+
+    The last component is 0 where the new part is round-off.
+    """
+    column = np.zeros(k + 2)
+    length = np.linalg.norm(image)
+    there = basis[: k + 1]
+    left = image
+    for _ in range(2):
+        components = np.dot(there, left)
+        column[: k + 1] += components
+        left = left - np.dot(components, there)
+    rest = np.linalg.norm(left)
+    # the negation also ends at what is not a number
+    if not rest <= NO_DIRECTION * length:
+        column[k + 1] = rest
+        basis[k + 1] = left / rest
+    return column

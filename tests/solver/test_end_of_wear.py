@@ -1,0 +1,175 @@
+"""Histories that end at a wear, or where nothing wears any more; joints that wear without end."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from solver import march_wear as march_model
+from solver.contact.wear_law import ARCHARDS_WORK
+from solver.loading_history.start_states import follow_branch
+from solver.outcome import Outcome
+from solver.packing import Packed
+from solver.settings import SolverSettings, ToTheEnd, WearTarget
+from studies import build_scene
+from studies.scenes.den_hartog import DenHartogSlider, WearingSlider
+from tests.solver.models import assert_same, march_wear
+from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
+from tests.studies.half_space_twin import limit_depth
+
+# --- the count at which a wear is reached ---
+
+
+@pytest.mark.parametrize("scheme", ["explicit", "implicit", "adaptive"])
+def test_the_count_is_that_at_which_the_history_has_the_wear(scheme):
+    depth = 2.3e-5
+    target = WearTarget("worn_volume", depth * AREA) if scheme == "explicit" else WearTarget("wear_depth", depth)
+    found = march(4000.0, scheme, until=target)
+    assert found.outcome is Outcome.CONVERGED
+    assert found.message == ""
+    # the same history, read at that very count
+    read = march(4000.0, scheme, np.array([0.0, found.cycles_to_target, END]))
+    assert read.wear_depth[1, 0] == pytest.approx(depth, rel=1e-9)
+    # it ends there, and what there is of it is that of the whole one
+    whole = march(4000.0, scheme)
+    reached = np.isfinite(found.worn_volume)
+    assert 0 < reached.sum() < CYCLES.size
+    assert reached[found.cycles_to_target >= CYCLES].all()
+    assert found.last_cycle >= found.cycles_to_target
+    assert np.array_equal(found.wear_depth[reached], whole.wear_depth[reached])
+    assert found.newton_iterations < whole.newton_iterations
+
+
+def test_a_wear_that_is_not_reached_changes_nothing():
+    found, whole = march(4000.0, "adaptive", until=WearTarget("wear_depth", 1.0)), march(4000.0, "adaptive")
+    assert np.isnan([found.cycles_to_target, found.cycles_to_target_error]).all()
+    assert np.array_equal(found.wear_depth, whole.wear_depth)
+    assert np.array_equal(found.worn_volume_error, whole.worn_volume_error)
+
+
+def exact_count(frequency, depth):
+    """Cycles until the slider is worn so deep."""
+    pair = WearingSlider(DenHartogSlider(0.1, 1.6e5, 10.0, 2 * np.pi * frequency), 0.5, 10.0, 1e5, AREA, ARCHARDS_WORK)
+    return brentq(lambda n: pair.worn(WEAR * np.array([0.0, n]))[0][1] - depth, 1.0, 1e6)
+
+
+def exact_shift(frequency, depth):
+    """Relative change of w_r, w_r^2 = w^2 + Re(x^H F) / (m |x|^2), from the first harmonics of motion and force."""
+    slider, resonances = DenHartogSlider(0.1, 1.6e5, 10.0, 2 * np.pi * frequency), []
+    v, g = slider._factors
+    for friction in (5.0, 0.5 * (10.0 - 1e5 * depth)):
+        largest = float(slider.amplitude(np.array(friction)))
+        motion = largest - 1j * friction / 1.6e5 * (g + 4.0 / np.pi * v)
+        force = largest * 1.6e5 / v - 1j * friction * g / v
+        work = float((np.conj(motion) * force).real)
+        resonances.append(np.sqrt(slider.omega**2 + work / (0.1 * abs(motion) ** 2)))
+    return abs(resonances[1] / resonances[0] - 1.0)
+
+
+TARGETS = {
+    "wear_depth": lambda _, depth: depth,
+    "worn_volume": lambda _, depth: depth * AREA,
+    "frequency_shift": exact_shift,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("quantity", "frequency", "depth"),
+    [("wear_depth", 190.0, 1.5e-5), ("worn_volume", 160.0, 3e-5), ("frequency_shift", 190.0, 1.5e-5)],
+)
+def test_the_error_of_a_life_is_at_least_the_true_one_whatever_is_read(frequency, depth, quantity):
+    model, exact = build_scene("sdof_slider"), exact_count(frequency, depth)
+    target = WearTarget(quantity, TARGETS[quantity](frequency, depth))
+    found = [march_model(model, frequency, 10.0, 0.5, WEAR, np.linspace(0.0, 4e5, n), until=target) for n in (2, 101)]
+    for each in found:
+        assert abs(each.cycles_to_target - exact) <= each.cycles_to_target_error < np.inf
+        assert each.cycles_to_target == found[0].cycles_to_target
+        assert each.cycles_to_target_error == pytest.approx(found[0].cycles_to_target_error, rel=1e-9)
+    # all that is held of the first one is the unworn joint, which tells nothing of what has worn
+    assert np.isnan(found[0].error_estimate)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scheme", "quantity"), [("explicit", "frequency_shift"), ("implicit", "wear_depth")])
+def test_the_error_of_a_life_holds_that_of_euler_steps(scheme, quantity):
+    target = WearTarget(quantity, TARGETS[quantity](160.0, 3e-5))
+    asked = {"cycles": np.linspace(0.0, 4e5, 11), "scheme": scheme, "step": 4000.0, "until": target}
+    found = march_model(build_scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, **asked)
+    assert abs(found.cycles_to_target - exact_count(160.0, 3e-5)) <= found.cycles_to_target_error
+
+
+@pytest.mark.slow
+def test_a_life_is_known_better_with_a_smaller_rtol():
+    asked = {"until": WearTarget("frequency_shift", exact_shift(160.0, 3e-5))}
+    asked |= {"settings": SolverSettings(harmonics=19, samples=256, rtol=1e-3)}
+    found = march_model(build_scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [4e5], **asked)
+    off = abs(found.cycles_to_target - exact_count(160.0, 3e-5))
+    assert off <= found.cycles_to_target_error < 2e-2 * found.cycles_to_target
+
+
+# --- until nothing wears any more ---
+
+COARSE = SolverSettings(harmonics=3, samples=64)
+
+
+@lru_cache
+def unworn():
+    """A cylinder in partial slip."""
+    model = build_scene("cylinder_on_flat", strips=12)
+    ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", COARSE)
+    return model, start
+
+
+def worn(cycles, scheme="adaptive", **more):
+    model, start = unworn()
+    return march_wear(model, 0.6, start, 1e-13, 1000.0, scheme, cycles, COARSE, **more)
+
+
+@pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
+def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
+    found = worn(ToTheEnd(9), scheme)
+    assert found.outcome is Outcome.CONVERGED
+    # which pairs slip decides the final depths; those between which pressure moves are at least 2e-4 exact
+    limit = limit_depth(unworn()[0], found.slip_range[-1] == 0.0)
+    assert limit.max() > 0.0
+    assert np.abs(found.wear_depth[-1] - limit).max() < 2e-4 * limit.max()
+    assert found.wear_rate[-1] < 1e-4 * found.wear_rate.max()
+    assert found.last_cycle == found.cycles[-1]
+    # as far from one output to the next in volume and cycles together, each over the whole
+    way = found.worn_volume / found.worn_volume[-1] + found.cycles / found.cycles[-1]
+    assert np.diff(way) == pytest.approx(np.full(8, 0.25), rel=1e-6)
+    assert found.cycles[0] == 0.0
+    assert (np.diff(found.cycles) > 0.0).all()
+
+
+def test_one_that_was_interrupted_is_the_same_to_the_last_bit(monkeypatch):
+    monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 30)
+    kept: list[Packed] = []
+    whole = worn(ToTheEnd(9), keep=kept.append)
+    assert kept
+    assert_same(worn(ToTheEnd(9), resume=kept[-1]), whole)
+
+
+def test_a_constant_load_wears_without_end_at_the_rate_of_its_path():
+    model = build_scene("sdof_slider", normal_stiffness=0.0)
+    found = march_model(model, 160.0, 10.0, 0.5, WEAR, np.inf, settings=COARSE, outputs=4)
+    assert found.outcome is Outcome.NO_FINAL_STATE
+    assert not found.outcome.complete
+    path = 2.0 * found.slip_range[-1, 0]
+    assert found.wear_rate[-1] == pytest.approx(WEAR * 10.0 * path, rel=1e-2)
+    assert np.isfinite(found.worn_volume).all()
+
+
+@pytest.mark.parametrize(
+    ("cycles", "more", "key"),
+    [
+        (np.inf, {"scheme": "explicit", "step": 10.0}, "scheme"),
+        (1e5, {"scheme": "final"}, "scheme"),
+        (np.inf, {"outputs": 1}, "outputs"),
+    ],
+)
+def test_what_cannot_be_integrated_to_the_end_is_named(cycles, more, key):
+    with pytest.raises(ValueError, match=f"^{key}"):
+        march_model(build_scene("sdof_slider"), 160.0, 10.0, 0.5, 1e-11, cycles, **more)

@@ -1,0 +1,272 @@
+"""What is reported of states and histories: time signals, energy, fretting loops, outcomes."""
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver import march_wear as march_model
+from solver.accuracy.certificate import certify
+from solver.outcome import Outcome
+from solver.results.state_report import LOOP_PHASES, periodic_state, report_state
+from solver.results.verdict import first_cut_off, judge
+from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
+from solver.structure.fourier import build_basis
+from solver.structure.joint import build_case
+from studies import build_scene
+from studies.scenes.half_space import composite_modulus
+from studies.scenes.hertz import line_half_width, point_radius
+from tests.solver.models import OMEGA, branch_states, dovetail, first_point, march_wear, random_model, scene
+from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
+from tests.studyrunner.histories import history
+
+# --- states ---
+
+FRICTION = 0.4
+AMPLITUDE = 60.0
+SETTINGS = SolverSettings(harmonics=3, samples=64, tolerance=1e-10)
+KINDS = {
+    "3d": ("3d", "3d", "3d"),
+    "mixed": ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent"),
+}
+
+
+@lru_cache
+def periodic(kinds):
+    case = build_case(random_model(1, KINDS[kinds]), FRICTION, OMEGA, SETTINGS)
+    worn = np.random.default_rng(1).uniform(0.0, 2e-6, case.model.contact.n_contact)
+    point = first_point(case, OMEGA, AMPLITUDE, worn)
+    joint = case.joint(OMEGA, AMPLITUDE)
+    return joint, point, periodic_state(joint, point)
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds):
+    joint, _, state = periodic(kinds)
+    model, penalty = joint.model, joint.penalty
+    motion = full_motion(model, state)
+    assert not penalty.inertial.any()
+    # the contact force from the plain law alone, from what the state stores
+    moved = state.displacement_h.copy()
+    moved[:, 0, 0] -= model.contact.gap + state.wear_depth
+    eps = np.column_stack([penalty.normal, penalty.tangential, penalty.tangential])
+    predicted_h = state.contact_force_h + eps[:, :, None] * moved
+    predicted_h[model.contact.dofs[:, 0] < 0, 0, 1:] = 0.0
+    predicted_t = series(predicted_h, SETTINGS.samples)
+    forces = np.array(
+        [
+            pair_period(predicted_t[pair], FRICTION, penalty.tangential[pair] * state.start_history[pair], 8)[0]
+            for pair in range(model.contact.n_contact)
+        ]
+    )
+    size = np.abs(state.contact_force_h).max()
+    assert forces[:, 1:] @ joint.basis.analysis == pytest.approx(state.contact_force_h[:, 1:], abs=1e-9 * size)
+    # normal forces are averaged up to the instant of opening: near those of 64 times the samples, Eq. (11)
+    many = np.maximum(series(predicted_h[:, 0], 64 * SETTINGS.samples), 0.0)
+    exact = many @ build_basis(all_orders(SETTINGS.harmonics), many.shape[1]).analysis
+    kink = np.abs(np.diff(predicted_t[:, 0])).max()
+    assert np.abs(state.contact_force_h[:, 0] - exact).max() < 4 * kink / SETTINGS.samples
+    forces[:, 0] = series(state.contact_force_h[:, 0], SETTINGS.samples)
+    work, viscous, friction = motion.excitation_work(), motion.viscous_work(), contact_work(state, forces)
+    assert friction > 0.01 * work
+    assert work == pytest.approx(viscous + friction, rel=1e-6, abs=0.0)
+
+
+@pytest.mark.parametrize("kinds", KINDS)
+def test_the_report_is_that_of_the_time_signals(kinds):
+    joint, point, state = periodic(kinds)
+    model, at = joint.model, point.evaluation
+    report = report_state(joint, at, certify(joint, at))
+    motion = full_motion(model, state)
+    assert report.response == pytest.approx(motion.response(), rel=1e-8, abs=0.0)
+    static = np.real(model.linear[0].response @ motion.displacement[0])
+    phase = 2 * np.pi * np.arange(FINE_SAMPLES) / FINE_SAMPLES
+    waves = sum(np.real(motion.response(n)[:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
+    assert report.response_peak == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
+    assert report.mean_pressure == pytest.approx(
+        state.contact_force_h[:, 0, 0] / model.contact.area, rel=1e-12, abs=0.0
+    )
+    assert report.open_fraction == pytest.approx((at.force_t[:, 0] == 0).mean(axis=1))
+    slip = at.state_t / joint.penalty.tangential[:, None, None]
+    for pair in range(model.contact.n_contact):
+        distances = np.linalg.norm(slip[pair, :, :, None] - slip[pair, :, None, :], axis=0)
+        assert report.slip_range[pair] == pytest.approx(distances.max(), rel=1e-12, abs=1e-20)
+        steps = np.linalg.norm(np.diff(slip[pair]), axis=0)
+        pressure = 0.5 * (at.force_t[pair, 0] + np.roll(at.force_t[pair, 0], 1))
+        assert at.slip_work[pair] == pytest.approx(steps @ pressure, rel=1e-12, abs=1e-20)
+    assert np.array_equal(report.wear_depth, state.wear_depth)
+
+
+# --- fretting loops ---
+
+WEAR = 1.1e-11  # 1/Pa
+CYCLES = np.array([0.0, 2000.0, 8000.0, 14000.0, 16000.0])
+
+
+@lru_cache
+def slider_loops(scheme, *rows):
+    """History of the slider, counts by their places in `CYCLES`, and its loops."""
+    model, settings = scene("sdof_slider", 9), SolverSettings(harmonics=9, samples=256)
+    (start,) = branch_states(model, 0.5, 10.0, [2 * np.pi * 160.0], settings)
+    cycles = CYCLES[list(rows)]
+    return march_wear(model, 0.5, start, WEAR, 8000.0, scheme, cycles, settings, loops=(0,))
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
+def test_the_loop_of_a_sliding_mass_is_a_rectangle_of_the_energy_that_friction_takes(scheme):
+    history = slider_loops(scheme, 0, 1, 2, 3, 4)
+    motion, force = history.loop_displacement[:, 0], history.loop_force[:, 0]
+    assert motion.shape == force.shape == (CYCLES.size, LOOP_PHASES, 3)
+    normal = 10.0 - 1e5 * history.wear_depth[:, 0]
+    assert force[..., 0] == pytest.approx(np.repeat(normal[:, None], LOOP_PHASES, 1), rel=1e-9, abs=0.0)
+    assert motion[..., 0] == pytest.approx(np.repeat(history.wear_depth, LOOP_PHASES, 1), rel=1e-9, abs=1e-15)
+    assert not motion[..., 2].any()
+    assert not force[..., 2].any()
+    # the force is at its limit but in the steps in which the mass turns, of both states that are interpolated
+    share = np.abs(force[..., 1]) / (0.5 * force[..., 0])
+    assert share.max() <= 1 + 1e-12
+    assert np.count_nonzero(share < 1 - 1e-9, axis=1).max() <= 4
+    # and against the motion
+    velocity = np.roll(motion[..., 1], -1, axis=1) - np.roll(motion[..., 1], 1, axis=1)
+    fast = np.abs(velocity) > 0.1 * np.abs(velocity).max()
+    assert (velocity * force[..., 1] > 0.0)[fast].all()
+    # 128 straight lines cut the corners of the rectangle, by the square of a step; only states of steps are exact
+    mean = 0.5 * (force[..., 1] + np.roll(force[..., 1], -1, axis=1))
+    work = np.sum(mean * (np.roll(motion[..., 1], -1, axis=1) - motion[..., 1]), axis=1)[[0, 2, 4]]
+    assert work == pytest.approx(0.5 * history.wear_rate[[0, 2, 4]] / WEAR, rel=3e-3, abs=0.0)
+
+
+@pytest.mark.slow
+def test_loops_of_a_joint_keep_the_laws():
+    model, settings, friction = dovetail(5), SolverSettings(harmonics=5, samples=64), 0.5
+    start = branch_states(model, friction, 0.5, [2 * np.pi * 212.0, 2 * np.pi * 213.0], settings)[1]
+    cycles, asked = np.array([0.0, 500.0, 2000.0]), {"loops": tuple(range(16))}
+    history = march_wear(model, friction, start, WEAR, 1000.0, "explicit", cycles, settings, **asked)
+    assert history.outcome is Outcome.CONVERGED
+    assert history.slip_range.max() > 1e-7
+    normal, tangential = history.loop_force[..., 0], np.linalg.norm(history.loop_force[..., 1:], axis=-1)
+    assert (normal >= 0.0).all()
+    assert (tangential <= friction * normal * (1 + 1e-12) + 1e-12 * normal.max()).all()
+    # a pair that opens does so between two samples
+    mean = history.mean_pressure * model.contact.area
+    always = history.open_fraction == 0.0
+    assert normal.mean(axis=-1)[always] == pytest.approx(mean[always], rel=1e-9, abs=0.0)
+    assert np.abs(normal.mean(axis=-1) - mean).max() < 5e-3 * mean.max()
+    # a closed pair lies on its worn surface
+    lifted = history.loop_displacement[..., 0] - history.wear_depth[..., None]
+    motion = history.loop_displacement[..., 1:]
+    assert np.abs(lifted[always]).max() < 1e-2 * np.abs(motion).max()
+    # where much slips the slip is nearly all of the motion
+    distance = np.linalg.norm(motion[..., :, None, :] - motion[..., None, :, :], axis=-1).max(axis=(-2, -1))
+    slips = history.slip_range > 0.5 * history.slip_range.max()
+    assert distance[slips] == pytest.approx(history.slip_range[slips], rel=0.1, abs=0.0)
+
+
+def test_between_steps_loops_are_interpolated_like_all_else():
+    ends, between = slider_loops("implicit", 0, 2, 4), slider_loops("implicit", 0, 1, 2, 3, 4)
+    for name in ("loop_displacement", "loop_force", "mean_pressure"):
+        whole, inner = getattr(ends, name), getattr(between, name)
+        scale = np.abs(whole).max()
+        assert inner[[0, 2, 4]] == pytest.approx(whole, rel=0.0, abs=1e-14 * scale)
+        assert inner[1] == pytest.approx(0.75 * whole[0] + 0.25 * whole[1], rel=0.0, abs=1e-12 * scale)
+        assert inner[3] == pytest.approx(0.25 * whole[1] + 0.75 * whole[2], rel=0.0, abs=1e-12 * scale)
+
+
+# --- outcomes ---
+
+ALL = np.arange(3)
+UNKNOWN = {"worn_volume": 1e-9 * np.arange(3.0), "worn_volume_error": np.array([0.0, 0.1, 0.6])}
+
+
+@pytest.mark.parametrize(
+    ("rows", "changed", "outcome", "said"),
+    [
+        ([], {}, Outcome.CONVERGED, ""),
+        (ALL, {"inaccurate_from": 4.0}, Outcome.INACCURATE, "from cycle 8 on the response is known to 2.6 % only"),
+        ([0, 1], {"inaccurate_from": 5.0}, Outcome.CONVERGED, ""),
+        # what is not known goes before harmonics, a contact that is cut off before both
+        (ALL, {**UNKNOWN, "inaccurate_from": 0.0}, Outcome.SENSITIVE, "worn volume 2 mm3"),
+        (ALL, {**UNKNOWN, "cut_off_cycle": 4.0}, Outcome.CONTACT_CUT_OFF, "pairs at the edge"),
+        (ALL, {**UNKNOWN, "cut_off_cycle": 11.0}, Outcome.SENSITIVE, "worn volume 2 mm3"),
+        # a history that shares it and ends before is known
+        ([0, 1], UNKNOWN, Outcome.CONVERGED, ""),
+        # a joint that is held says so beside all else
+        (ALL, {"held_from": 4.0}, Outcome.CONVERGED, "from cycle 8 on every pair slips"),
+        (ALL, {"held_from": 4.0, "inaccurate_from": 0.0}, Outcome.INACCURATE, "; from cycle 8 on every pair slips"),
+        ([0], {"held_from": 4.0}, Outcome.CONVERGED, ""),
+    ],
+)
+def test_the_outcome_is_that_of_the_counts_that_are_judged(rows, changed, outcome, said):
+    """Of a history at half the speed, whose volume at the last count is known to 6 %."""
+    given = replace(history([0.0, 4.0, 10.0]), inaccurate_in="response", inaccurate_error=0.026, **changed)
+    found = judge(given, np.asarray(rows, int), 1e-2, 0.5)
+    assert found[0] is outcome
+    assert said in found[1]
+    assert bool(found[1]) is bool(said)
+
+
+# --- contacts that reach an edge where the bodies go on ---
+
+EDGE = SolverSettings(harmonics=3, samples=32)
+A_LINE = line_half_width(1.2e5, 6e-3, composite_modulus(200e9, 0.3))
+A_POINT = point_radius(100.0, 10e-3, composite_modulus(200e9, 0.3))
+
+
+def test_load_or_wear_at_the_edge_is_found_at_its_first_count():
+    contact = replace(build_scene("cylinder_on_flat", strips=6).contact, edge=np.array([False, False, True]))
+    cycles, none = np.array([0.0, 10.0, 20.0, 30.0]), np.zeros((4, 3))
+    middle = none + [2.0, 1.0, 0.0]
+    at = none.copy()
+    at[2:, 2] = 1e-3
+    assert math.isnan(first_cut_off(contact, cycles, middle, middle))
+    assert first_cut_off(contact, cycles, middle + at, middle) == 20.0
+    assert first_cut_off(contact, cycles, middle, middle + at) == 20.0
+    assert first_cut_off(contact, cycles, middle + 1.0, middle) == 0.0
+    # round-off is no load, and an edge that is none does not count
+    assert math.isnan(first_cut_off(contact, cycles, middle + 1e-9 * at, middle))
+    assert math.isnan(first_cut_off(replace(contact, edge=None), cycles, middle + at, middle))
+    # of counts without a state nothing is known
+    gone = middle + at
+    gone[2] = np.nan
+    assert first_cut_off(contact, cycles, gone, middle) == 30.0
+    gone[3] = np.nan
+    assert math.isnan(first_cut_off(contact, cycles, gone, middle))
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("cylinder_on_flat", {"strips": 12, "half_width": 0.9 * A_LINE}),
+        ("sphere_on_flat", {"patches": 4, "half_width": 0.9 * A_POINT}),
+    ],
+)
+def test_pairs_that_do_not_hold_the_unworn_contact_cut_it_off_at_once(name, values):
+    found = march_model(build_scene(name, **values), 20.0, 1.0, 0.6, 1e-13, [0.0], sweep="ramp", settings=EDGE)
+    assert found.outcome is Outcome.CONTACT_CUT_OFF
+    assert found.cut_off_cycle == 0.0
+    assert found.mean_pressure[0].min() > 0.0
+
+
+@pytest.mark.slow
+def test_a_scar_that_grows_out_of_its_pairs_is_no_result():
+    # the same pairs, with and without some farther out
+    asked = {"sweep": "ramp", "settings": EDGE}
+    cut, whole = (
+        march_model(
+            build_scene("cylinder_on_flat", stroke=1e-5, strips=strips, half_width=width * A_LINE),
+            *(20.0, 1.0, 0.6, 5e-14, np.linspace(0.0, 4000.0, 9)),
+            **asked,
+        )
+        for strips, width in ((12, 1.5), (20, 2.5))
+    )
+    assert whole.outcome is Outcome.CONVERGED
+    assert cut.outcome is Outcome.CONTACT_CUT_OFF
+    assert 0.0 < cut.cut_off_cycle < 4000.0
+    before = cut.cycles < cut.cut_off_cycle
+    assert cut.wear_depth[before].max(axis=1) == pytest.approx(whole.wear_depth[before].max(axis=1), rel=0.02)
+    assert cut.wear_depth[-1].max() > 1.02 * whole.wear_depth[-1].max()
+    # it was computed to its end, and is kept
+    assert cut.last_cycle == 4000.0
+    assert np.isfinite(cut.worn_volume).all()

@@ -1,0 +1,62 @@
+"""Figures of results and their numbers, and results with a mesh, for the tests of the report."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from studies.finite_element.pairing import ContactPairs
+from studies.scene_answers import SurfaceMesh
+from studies.scenes.dovetail_parameters import Parameters
+from studies.scenes.dovetail_sector import define_sector, describe_mesh
+from studyrunner.report.contents import FIGURES
+from studyrunner.report.drawing import Drawing, plotted_values
+from studyrunner.result.view import Result
+from tests.studyrunner.results import build_file
+
+STUDY = '[study]\nname = "s"\n[scene]\nmodel = "dovetail_sector"\nn_sectors = 47\n'
+
+
+def draw_figure(result: Result, name: str) -> Drawing:
+    found = next(entry for entry in FIGURES if entry.name == name).make(result)
+    assert isinstance(found, Drawing)
+    return found
+
+
+def numbers_of(drawing: Drawing) -> dict[str, NDArray[np.float64]]:
+    """Rows of x, y, and error or value of a cell, in the table of a figure, by "title of the panel|series"."""
+    found: dict[str, list[list[float]]] = {}
+    for title, series, _, x, _, y, value in plotted_values(drawing.figure):
+        name = f"{title}|{series}".replace("\N{NO-BREAK SPACE}", " ")
+        found.setdefault(name, []).append([float(str(each)) if each else np.nan for each in (x, y, value)])
+    return {name: np.array(rows) for name, rows in found.items()}
+
+
+def values_of(result: Result, name: str, **where: int) -> NDArray[np.float64]:
+    return np.asarray(result.dataset[name].isel(where).squeeze(drop=True).values, dtype=float)
+
+
+@lru_cache
+def dovetail(density: int = 1) -> tuple[ContactPairs, SurfaceMesh]:
+    """Pairs and mesh of the dovetail sector. density: of its mesh."""
+    parameters = Parameters(friction_coefficient=0.5, mesh=density)
+    pairs = define_sector(parameters)[1].pairs
+    assert pairs is not None
+    return pairs, describe_mesh(parameters)
+
+
+def dovetail_file(density: int = 1, **options: Any) -> xr.Dataset:
+    """A file of the dovetail sector with random numbers."""
+    pairs, mesh = dovetail(density)
+    dataset = build_file(positions=pairs.position.copy(), study=STUDY, **options)
+    dataset = dataset.assign_coords(contact_area=("contact", pairs.area.copy(), dataset["contact_area"].attrs))
+    return with_mesh(dataset, mesh)
+
+
+def with_mesh(dataset: xr.Dataset, mesh: SurfaceMesh) -> xr.Dataset:
+    """The file with the variables of a mesh."""
+    nodes = {f"mesh_{axis}": ("mesh_node", mesh.nodes[:, i].copy(), {"units": "m"}) for i, axis in enumerate("xyz")}
+    quads = (("mesh_quad_index", "mesh_corner"), mesh.quads.astype(np.int32))
+    return dataset.assign(**nodes, mesh_quad=quads, mesh_part=("mesh_quad_index", np.array(mesh.parts)))
