@@ -103,11 +103,6 @@ class SceneTask:
     gives_starts: bool = False
     cost_keys: CostKeys = (("scene",),)
 
-    def cost_of(self, *, first: bool) -> float:
-        """Estimated time, s; all scenes are alike."""
-        del first
-        return self.cost
-
 
 @dataclass(frozen=True)
 class SceneBuilt:

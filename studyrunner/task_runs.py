@@ -109,10 +109,10 @@ class TaskProgress(Office):
     def take(self, task: Task, result: Result) -> Sequence[Task]:
         """Takes a result; returns tasks that the result makes possible."""
         self._n_given[task.key] += 1
-        is_first, is_last = self._n_given[task.key] == 1, self._n_given[task.key] == task.n_results
+        is_last = self._n_given[task.key] == task.n_results
         if is_last:
             del self._n_given[task.key]
-        self._left[task.group] -= task.cost_of(first=is_first)
+        self._left[task.group] -= task.cost / task.n_results
         self._shares.pop(task.key, None)
         self._completion.add(task, result)
         self.n_points += len(task.points(result.place))
@@ -137,8 +137,8 @@ class TaskProgress(Office):
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
         done = sum(map(self.costs.measured, factors))
         longest = 0.0
-        for task, n_left, elapsed in running:
-            expected = task.cost_of(first=n_left == task.n_results) * factors[task.group]
+        for task, _, elapsed in running:
+            expected = task.cost / task.n_results * factors[task.group]
             still = self._still(task, expected, elapsed)
             left += still - expected
             done += elapsed

@@ -55,11 +55,6 @@ class Mode(JointTask):
         """All modes, this one."""
         return (("mode", ("mode", self.number)),)
 
-    def cost_of(self, *, first: bool) -> float:
-        """The first point with the way to it, or one of the others."""
-        one, two = iterations_of_mode(1), iterations_of_mode(2)
-        return self.cost * (one if first else two - one) / iterations_of_mode(self.n_results)
-
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
         own = (identity.joint(self.joint), self.mode, self.direction, described(self.settings), identity.record)

@@ -200,11 +200,6 @@ class Task(ABC):
         """Most general of the groups."""
         return str(self.cost_keys[0][0])
 
-    def cost_of(self, *, first: bool) -> float:
-        """Estimated time, s, of the first result, or of one of the others; by default all are alike."""
-        del first
-        return self.cost / self.n_results
-
     def points(self, place: int) -> tuple[Index, ...]:
         """Points that have the result at a place."""
         return self.indices[place] if self.indices else ()

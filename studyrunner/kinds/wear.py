@@ -16,7 +16,6 @@ from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
-from studyrunner.kinds.estimate import iterations_of_sweep
 from studyrunner.kinds.sharing import Integrated
 from studyrunner.kinds.task import (
     Identity,
@@ -88,11 +87,6 @@ class Sweep(_FromRest):
     def cost_keys(self) -> CostKeys:
         """All sweeps, this sweep."""
         return (("sweep", ("sweep", self.number)),)
-
-    def cost_of(self, *, first: bool) -> float:
-        """The first state with the sweep to it, or one of the others."""
-        one, two = (iterations_of_sweep(self.direction, number) for number in (1, 2))
-        return self.cost * (one if first else two - one) / iterations_of_sweep(self.direction, self.n_results)
 
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the start states."""

@@ -18,7 +18,7 @@ from typing import Any
 Task = Any
 """What is done as a whole by one rank. It has
 
-- cost: estimated time, s, positive; cost_of(first=...): that of the first result, or of one of the others;
+- cost: estimated time, s, positive, of which each result takes an equal share;
 - cost_keys: groups of similar tasks, see `CostModel`;
 - n_results: that the task gives one after the other, at least 1;
 - gives_starts: whether other tasks wait for the results.
@@ -198,7 +198,7 @@ class Dispatcher:
         task = given.task
         self._costs.forget(given.measurement)
         given.measurement = ()
-        self._costs.learn(task.cost_keys, task.cost_of(first=given.n_left == task.n_results), seconds)
+        self._costs.learn(task.cost_keys, task.cost / task.n_results, seconds)
         given.n_left -= 1
         given.began = self._clock()
         if given.n_left == 0:

@@ -132,36 +132,38 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     studies = []
     for given, of_part in parts:
         with found.collecting(renamed):
-            study = Study.model_construct(**sections, **of_part)
-            check_rules(study, found)
-            study = _with_block_studies(study, given, origin, found) if blocks else study
-            studies.append(study if found else _complete(study))
+            study, wrong = Study.model_construct(**sections, **of_part), Mistakes(origin.source)
+            check_rules(study, wrong)
+            study = _with_block_studies(study, given, origin, wrong) if blocks else study
+            wrong.raise_any()
+            studies.append(_complete(study))
     found.raise_any(table)
     study = studies[0]
     if axes:
         study = study.model_copy(update={"scene_axes": as_checked(axes, study), "variants": tuple(studies)})
-        for wrong in (*size_of_result(study), *wrong_scatter(study)):
-            found.add(*wrong)
+        for each in (*size_of_result(study), *wrong_scatter(study)):
+            found.add(*each)
         found.raise_any()
     return study
 
 
 def _known_tables(table: Mapping[str, object], found: Mistakes) -> Tables:
     """The tables of a study file, those that may be missing as empty ones; copies, in which keys may be changed."""
-    tables: Tables = {name: {} for name in _TABLES if name not in _ON_REQUEST}
+    given: Tables = {}
     for name, section in table.items():
-        if name not in _TABLES:
-            found.add(name, section, f"unknown table, give {nearest_name(name, _TABLES)}")
-        elif name != "mission" and not isinstance(section, dict):
+        meant = nearest_name(name, _TABLES)
+        if meant != name:
+            found.add(name, section, f"unknown table, give {meant}")
+        elif meant != "mission" and not isinstance(section, dict):
             found.add(name, section, f"give a table [{name}] with keys")
-        elif isinstance(section, dict):
-            tables[name] = flat_table(section) if name == "scatter" else dict(section)
-        else:
-            tables[name] = section
+        # what a table of another name holds may be wrong as well
+        if meant in _TABLES and (meant == name or meant not in table):
+            own: Any = dict(section) if isinstance(section, dict) else section if meant == "mission" else {}
+            given[meant] = flat_table(own) if meant == "scatter" else own
     for name in ("study", "scene", *(() if "mission" in table else ("axes",))):
-        if name not in table:
+        if name not in given:
             found.add(name, None, f"missing: give a table [{name}]")
-    return tables
+    return {name: {} for name in _TABLES if name not in _ON_REQUEST} | given
 
 
 def _take_worn(tables: Tables, origin: Origin, found: Mistakes) -> None:

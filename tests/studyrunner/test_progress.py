@@ -105,7 +105,7 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     histories = []
     for sweep in plan.sweeps:
         for start in fake_sweep(sweep):
-            progress.costs.learn(sweep.cost_keys, sweep.cost_of(first=False), 1.0)
+            progress.costs.learn(sweep.cost_keys, sweep.cost / sweep.n_results, 1.0)
             histories.extend(progress.take(sweep, start))
     for number, task in enumerate(histories, start=1):
         progress.costs.learn(task.cost_keys, task.cost, 2.0 * task.cost)

@@ -86,10 +86,6 @@ class Job:
     n_results: int = 1
     gives_starts: bool = False
 
-    def cost_of(self, *, first):
-        del first
-        return self.cost / self.n_results
-
     @property
     def cost_keys(self):
         return (("all", self.kind),)
