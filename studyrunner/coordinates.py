@@ -54,6 +54,11 @@ STUCK_FREQUENCY = Variable(
 )
 """Of the scene; along the axes along which the scenes of a study differ."""
 
+WORN_DEPTH = Variable(
+    ("contact",), "m", "wear depth at the start", comment="Key scene.worn; wear_depth counts from there."
+)
+"""Of a joint that is mounted worn."""
+
 COORDINATES = {
     "frequency": Variable(
         (), "Hz", "excitation frequency", comment="Of a followed resonance the middle of loading.between."

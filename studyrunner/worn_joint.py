@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.api import run_study
-from studyrunner.result.scene_pairs import depths, pairs_of_scene, tells_depth
+from studyrunner.result.pairs import depths, has_depths, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result, open_for_report
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.sections import AxesSection, WearSection
@@ -22,7 +22,14 @@ from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError, Verbatim
 
 _N_FREQUENCIES = 25  # of the curve around a resonance that the study follows
-_LEFT_OUT = ("scatter", "loading", "slow_time.until")
+_ALONE: dict[str, Any] = {
+    **dict.fromkeys(("scatter", "loading", "slow_time.until", "scene.worn")),
+    "axes.scheme": "adaptive",
+    "slow_time": {"cycles": 0.0},
+    "outputs.loops": [],
+}
+"""Keys of a study of unworn states of one point."""
+
 _HOW = (
     "Computed again from the wear depths of the file: the joint is mounted worn, and the sweep leads to the frequency;"
     " its friction forces at the start are not those at the end of the wear history"
@@ -50,14 +57,13 @@ def compute_worn_joint(
 
     path: result file with `wear_depth` or `wear_depth_last`, of wear histories. folder: for the result files of what is
     computed; what is there already is not computed twice. point: values of axes, as text; by default the point that
-    wears most. The result has
+    wears most. The entries that are asked for:
 
-    - of contact pairs `loops` the entry `"loops"`: `loop_displacement`, m, and `loop_force`, N, (cycle, contact, phase,
-      component), at the first count where the file holds its depths and at the last count;
-    - with `response` the entry `"response"`: `response_amplitude`, m (cycle, frequency, response), and its relative
-      error at the frequencies of the study; with a followed frequency over its range, and of the new joint as well;
-    - with `natural_frequencies` the entry `"natural_frequencies"`: those of the sector with the joint stuck, Hz
-      (nodal_diameter, mode).
+    - "loops" of contact pairs: `loop_displacement`, m, and `loop_force`, N, (cycle, contact, phase, component), at the
+      first count where the file holds its depths and at the last count;
+    - "response": `response_amplitude`, m (cycle, frequency, response), and its relative error at the frequencies of the
+      study; with a followed frequency over its range, and of the new joint as well;
+    - "natural_frequencies": those of the sector with the joint stuck, Hz (nodal_diameter, mode).
 
     Raises UserError where the file does not hold the depths, or the study has no such pairs or frequencies.
     """
@@ -114,8 +120,7 @@ def _overrides(result: Result) -> dict[str, Any]:
             given[f"axes.{name}"] = float(value) if name == "rtol" else value
     if result.followed:
         given["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_kept(shown)))
-    given |= dict.fromkeys(_LEFT_OUT)
-    return given | {"axes.scheme": "adaptive", "slow_time": {"cycles": 0.0}, "outputs.loops": [], "scene.worn": None}
+    return given | _ALONE
 
 
 def _drawn_inputs(result: Result, shown: Mapping[str, int]) -> dict[str, Any]:
@@ -134,7 +139,7 @@ def _drawn_inputs(result: Result, shown: Mapping[str, int]) -> dict[str, Any]:
 
 def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: bool = False) -> dict[str, Any]:
     """The table `scene.worn` with the depths at the first count, where they are known, and at the last one."""
-    if not tells_depth(result):
+    if not has_depths(result):
         raise UserError(str(result.path), "wear_depth", None, result.lacks("wear_depth").removesuffix("."))
     depth = depths(result, shown)[:, pairs_of_scene(result, shown)]
     if result.has("worn_depth"):

@@ -44,7 +44,6 @@ from tests.studyrunner.faked_runs import Solver
 ROOT = Path(solver.__file__).parents[1]
 PACKAGES = (solver, studies, studyrunner)
 PYTHON_PAGE = (ROOT / "studyrunner" / "PYTHON.md").read_text(encoding="utf-8")
-CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 FREQUENCIES = [160.0, 150.0]
 SMALL = {"axes.frequency": np.array(FREQUENCIES), "axes.scheme": ("implicit",), "slow_time.cycles": 4000}
@@ -108,18 +107,6 @@ def test_the_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
     assert "1.27e-05 m at 505 Hz, converged" in said
     assert "\n  worn volume " in said
     np.testing.assert_array_equal(names["dataset"].worn_volume, names["history"].worn_volume)
-
-
-def test_the_map_of_the_house_names_what_there_is():
-    section = CONTRIBUTING.split("\n## Map of the house\n")[1].split("\n## ")[0]
-    names = {path.name for package in PACKAGES for path in Path(package.__file__ or "").parent.rglob("*")}
-    names |= {"solver", "studies", "studyrunner", "tests"}
-    told = set(re.findall(r"`(?:\w+/)*(\w+\.(?:py|md|js|css))`", section))
-    folders = {name for path in re.findall(r"`((?:\w+/)+)", section) for name in path.strip("/").split("/")}
-    assert told
-    assert told | folders <= names, f"there is no {', '.join(sorted((told | folders) - names))}"
-    rooms = [path for package in ("solver", "studyrunner") for path in (ROOT / package).iterdir() if path.is_dir()]
-    assert {path.name for path in rooms} - {"__pycache__"} <= folders
 
 
 # --- studies ---

@@ -33,11 +33,11 @@ from studyrunner.kinds.task import (
     settings_at,
 )
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.percent import show_count
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import Realisation
 from studyrunner.study.study import Study
+from studyrunner.units import show_count
 
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory

@@ -14,7 +14,7 @@ from solver.results.verdict import describe_cut_off, judge, last_error
 from studyrunner.kinds.sharing import Integrated
 from studyrunner.kinds.task import PointResult
 from studyrunner.kinds.wear import History
-from studyrunner.percent import describe_reach, show_count
+from studyrunner.units import describe_reach, show_count
 from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10

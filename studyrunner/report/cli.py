@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from studyrunner.report.drawing import Item
     from studyrunner.result.view import Result
 
-WRITTEN, UNEXPECTED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-"""Exit statuses."""
+WRITTEN, UNEXPECTED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # exit statuses
 
 _DESCRIPTION = """\
 Draws a result file of run-study: figures as SVG and PNG, and one HTML page that holds all of them and an interactive
@@ -44,34 +43,28 @@ exit status:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that reports mistakes as UserError."""
-
     def error(self, message: str) -> NoReturn:
         raise UserError("command line", "options", None, f"{message}; study-report --help lists them")
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
-    """The command line: `result`, `folder` and `measured` are paths, None where left out; `vtu`; `point`, by axis.
+    """The command line: `result`, `folder` and `measured` are paths, None where left out; `point` is by axis.
 
     Raises UserError where it is wrong, SystemExit after --help.
     """
     look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
     parser = _Parser("study-report", description=_DESCRIPTION, epilog=_EPILOG, **look)
-    parser.add_argument("result", metavar="OUT.nc", type=Path, help="result file of run-study")
-    where = "where to write (default: OUT-report, here)"
-    parser.add_argument("-o", dest="folder", metavar="FOLDER", type=Path, help=where)
+    add, flag = parser.add_argument, dict[str, Any](action="store_true")
+    add("result", metavar="OUT.nc", type=Path, help="result file of run-study")
+    add("-o", dest="folder", metavar="FOLDER", type=Path, help="where to write (default: OUT-report, here)")
     which = "the point that root, maps, loops and --vtu show (default: the most worn one)"
-    parser.add_argument("--point", metavar="AXIS=VALUE,...", type=_read_point, default={}, help=which)
-    pairs = "compute fretting loops of these pairs"
-    parser.add_argument("--loops", metavar="PAIR,...", type=_read_pairs, default=(), help=pairs)
+    add("--point", metavar="AXIS=VALUE,...", type=_read_point, default={}, help=which)
+    add("--loops", metavar="PAIR,...", type=_read_pairs, default=(), help="compute fretting loops of these pairs")
     scar = "measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)"
-    parser.add_argument("--measured", metavar="PROFILE.csv", type=Path, help=scar)
-    for name, what in (
-        ("--natural-frequencies", "compute those of the sector over the nodal diameter, joint stuck"),
-        ("--no-compute", "draw what the file holds, without the response of a worn joint"),
-        ("--vtu", "also the root over the cycles, for ParaView (extra meshio)"),
-    ):
-        parser.add_argument(name, action="store_true", help=what)
+    add("--measured", metavar="PROFILE.csv", type=Path, help=scar)
+    add("--natural-frequencies", help="compute those of the sector over the nodal diameter, joint stuck", **flag)
+    add("--no-compute", help="draw what the file holds, without the response of a worn joint", **flag)
+    add("--vtu", help="also the root over the cycles, for ParaView (extra meshio)", **flag)
     return parser.parse_args(list(arguments))
 
 
@@ -129,14 +122,15 @@ def _report(options: argparse.Namespace) -> int:
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
         from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
-        from studyrunner.report.root.vtu import SERIES, find_writer
-        from studyrunner.result.opening import check_numbers, reading_errors
+        from studyrunner.report.vtu import SERIES, find_writer
+        from studyrunner.result.opening import reading_errors
+        from studyrunner.result.pairs import read_profile
         from studyrunner.result.view import open_for_report
         from studyrunner.system.progress import count, format_seconds
 
-        result = open_for_report(options.result, options.point, options.measured)
+        measured = read_profile(options.measured) if options.measured else None
+        result = replace(open_for_report(options.result, options.point), measured=measured)
         with result.dataset, reading_errors(str(options.result)):
-            check_numbers(result.dataset, str(options.result))
             write_series = find_writer(result) if options.vtu else None
             folder = options.folder or Path(f"{options.result.stem}-report")
             _make_folder(folder)

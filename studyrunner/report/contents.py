@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, cast
 
-from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, style
-from studyrunner.report.figures import loops, missions, pairs, points, precision, response, scatter, wear
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, as_sentences, style
+from studyrunner.report.figures import pairs, points, precision, response, root, wear
 from studyrunner.report.panels import add_legend
-from studyrunner.report.root import figures as root
-from studyrunner.result.scene_pairs import OF_PAIRS, of_shown_scene
-from studyrunner.result.view import Result, as_sentences
+from studyrunner.report.selection import course_axis
+from studyrunner.result.pairs import OF_PAIRS, of_shown_scene
+from studyrunner.result.view import Result
 
 WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
 """Kinds of results."""
@@ -58,13 +58,13 @@ CAPTIONS = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the table: one figure or table of the report.
+    """One figure or table of the report.
 
     name: of its files. title: {slow} stands for cycles or missions, {over} for the axis that figures are drawn over;
-    (table) is left out of the heading. draw: makes it. kinds: of the results that have it. needs: variables without
-    which a sentence says what to ask for. scene: where scenes of a study differ in these variables, that of the shown
-    point is drawn. at: whether the title names the "point" that is shown, or its "course" alone. always: also where no
-    point has a result.
+    (table) is left out of the heading. kinds: of the results that have it. needs: variables without which a sentence
+    says what to ask for. scene: where scenes of a study differ in these variables, that of the shown point is drawn.
+    at: whether the title names the "point" that is shown, or its "course" alone. always: also where no point has a
+    result.
     """
 
     name: str
@@ -78,19 +78,17 @@ class Entry:
 
     def make(self, result: Result) -> Item | None:
         """The figure, a sentence in its place, or None."""
-        over = (result.course_axis or "").replace("_", " ")
-        title = self.title.format(slow=result.counted, over=over).removesuffix(" (table)")
+        axis, how = course_axis(result) or "", CAPTIONS.get(self.name, "")
+        title = self.title.format(slow=result.counted, over=axis.replace("_", " ")).removesuffix(" (table)")
         shown = of_shown_scene(result, self.scene) if self.scene else result
         drawn = result.lacks(*self.needs) or self._drawn(shown, WIDTH)
         if drawn is None:
             return None
         if isinstance(drawn, str):
             return Missing(self.name, title, drawn)
-        named = {"point": ("frequency", "scheme", *shown.varying, *shown.fixed)}
-        named["course"] = (result.course_axis or "frequency",)
+        named = {"point": ("frequency", "scheme", *shown.varying, *shown.fixed), "course": (axis or "frequency",)}
         where = shown.describe(shown.shown_point(), named.get(self.at, ()))
         title = f"{title}: {where}" if where else title
-        how = CAPTIONS.get(self.name, "")
         if isinstance(drawn, Table):
             return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, how))
         figure, *notes = drawn
@@ -108,6 +106,8 @@ class Entry:
 
 _ONE: dict[str, Any] = {"scene": OF_PAIRS, "at": "point"}
 _BLOCK: dict[str, Any] = {"kinds": (MISSIONS,), "at": "point"}
+_SHARES: dict[str, Any] = {**_BLOCK, "needs": ("block_worn_volume", "block_share")}
+_OF_BLOCKS: dict[str, Any] = {**_BLOCK, "needs": ("response_amplitude",)}
 _MODE: dict[str, Any] = {"kinds": (MODES,)}
 _WEAR: dict[str, Any] = {"kinds": (WEAR,)}
 _OF_ONE = {**_WEAR, **_ONE}
@@ -124,15 +124,15 @@ def _of(draw: Callable[..., Drawn], name: str, title: str, **options: Any) -> En
 
 
 FIGURES = (
-    Entry("blocks", "Blocks of the mission with their wear (table)", missions.list_blocks, **_BLOCK),
-    Entry("block_shares", "Wear by block over the missions", missions.draw_shares, **_BLOCK),
-    Entry("block_responses", "Vibration of each block over the missions", missions.draw_responses, **_BLOCK),
+    Entry("blocks", "Blocks of the mission with their wear (table)", wear.list_blocks, **_BLOCK),
+    Entry("block_shares", "Wear by block over the missions", wear.draw_shares, **_SHARES),
+    Entry("block_responses", "Vibration of each block over the missions", wear.draw_block_responses, **_OF_BLOCKS),
     _of(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude", **_MODE),
     _of(response.draw_mode, "damping_ratio", "Damping ratio of a mode over its amplitude", **_MODE),
-    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", scatter.draw_bands),
-    Entry("worn_volume_bands_course", "Worn volume of the samples over {over}", scatter.draw_bands_over_course),
-    Entry("exceedance", "Probability of more wear", scatter.draw_exceedance),
-    Entry("deciding_inputs", "What decides the worn volume", scatter.draw_deciding_inputs),
+    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", points.draw_bands),
+    Entry("worn_volume_bands_course", "Worn volume of the samples over {over}", points.draw_bands_over_course),
+    Entry("exceedance", "Probability of more wear", points.draw_exceedance),
+    Entry("deciding_inputs", "What decides the worn volume", points.draw_deciding_inputs),
     Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, **_WORN, at="course"),
     Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, **_WORN),
     _of(wear.draw_map, "worn_volume_map", "Worn volume over {over} and {slow}"),
@@ -153,9 +153,9 @@ FIGURES = (
     Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, **_ONE),
     Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, **_ONE),
     Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, **_OF_ONE, needs=("mean_pressure",)),
-    Entry("fretting_loops", "Fretting loops", loops.draw_fretting, **_OF_ONE),
-    Entry("normal_load", "Normal force through a period", loops.draw_normal, **_OF_ONE),
-    Entry("pair_motion", "Motion of the pairs in the contact plane", loops.draw_motion, **_OF_ONE),
+    Entry("fretting_loops", "Fretting loops", response.draw_fretting, **_OF_ONE),
+    Entry("normal_load", "Normal force through a period", response.draw_normal, **_OF_ONE),
+    Entry("pair_motion", "Motion of the pairs in the contact plane", response.draw_motion, **_OF_ONE),
     _of(root.draw_fraction, "slip_fraction", "Where the joint slips", **_MODE, **_ONE),
     _of(root.draw_fraction, "open_fraction", "Where the joint opens", **_MODE, **_ONE),
     Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS, **_ALL),
@@ -178,11 +178,3 @@ def draw_report(result: Result) -> Iterator[Item]:
                 yield item
     if not has_results:
         yield Missing("results", "Results", "No point was computed: the file holds no results to draw.")
-
-
-def list_figures() -> str:
-    """The table of figures for the page REPORT."""
-    only: dict[tuple[str, ...], str] = {(MISSIONS,): f" ({MISSIONS})", (MODES,): f" ({MODES})"}
-    named = ((entry, entry.title.format(slow="cycles", over="frequency")) for entry in FIGURES)
-    rows = [f"| `{entry.name}` | {title}{only.get(entry.kinds, '')} |" for entry, title in named]
-    return "\n".join(("| file | shows |", "|---|---|", *rows))

@@ -60,10 +60,7 @@ _STYLE: Any = {
 
 @dataclass(frozen=True)
 class Drawing:
-    """One figure. name: of its files, without suffix. caption: plain sentences that say what is seen.
-
-    narrow: draws the same with its panels below each other, `COLUMN_WIDTH` wide.
-    """
+    """One figure. name: of its files. narrow: draws the same, `COLUMN_WIDTH` wide, with its panels below each other."""
 
     name: str
     title: str
@@ -72,10 +69,7 @@ class Drawing:
     narrow: Callable[[], Figure]
 
     def save(self, folder: Path) -> tuple[Path, Path]:
-        """Write SVG, PNG and CSV files into a folder that exists; the SVG files, `<name>` and `<name>_column`.
-
-        A figure without lines and maps has no CSV file.
-        """
+        """Write SVG, PNG and, of lines and maps, CSV files into a folder; the SVG files of both widths."""
         values = folder / f"{self.name}.csv"
         values.unlink(missing_ok=True)
         if rows := plotted_values(self.figure):
@@ -117,9 +111,14 @@ sentence in their place; None for nothing to see.
 """
 
 
+def as_sentences(*parts: str) -> str:
+    """Text of those parts that are not empty, each ended with a full stop."""
+    return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
+
+
 @contextmanager
 def style(width: float = WIDTH) -> Iterator[None]:
-    """Inside, figures are built, this wide, and saved in the one style of the report, whatever matplotlibrc says."""
+    """Inside, figures are built, this wide, and saved in the style of the report, whatever matplotlibrc says."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update({**_STYLE, "figure.figsize": (width, 1.0)})
@@ -127,9 +126,8 @@ def style(width: float = WIDTH) -> Iterator[None]:
 
 
 def plotted_values(figure: Figure) -> list[tuple[object, ...]]:
-    """The numbers of all lines, dots and maps of a figure, as shown: rows of panel, series, x, its value, y, its value.
-
-    The last column is the error of a value of a line, or the value of a cell or dot of a map.
+    """The numbers of all lines, dots and maps of a figure, as shown: rows of panel, series, x, its value, y, its value,
+    and the error of a value of a line, or the value of a cell or dot of a map.
     """
     rows: list[tuple[object, ...]] = []
     for panel in figure.axes:

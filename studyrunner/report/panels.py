@@ -15,10 +15,10 @@ from matplotlib.axis import Axis, XAxis
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import ArrayLike, NDArray
 
-from studyrunner.result.units import show_power
+from studyrunner.units import show_power
 
 FloatArray = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _CHARACTERS, _MARK, _LEGEND_ROW = 14.0, 6, 0.18  # of a legend: letters in an inch, a mark in letters, inches of a row
 _TITLE = 80  # characters of titles over panels side by side
-_FEWEST_TICKS, _MOST_TICKS = 3, 6
+_MOST_TICKS = 7
 _WIDE, _LEAST, _LOW, _HIGH = 5.0, 1.5, 2.6, 3.2  # inches: least width of a wide figure; heights in a narrow one
 
 
@@ -48,16 +48,16 @@ def new_panels(
 ) -> tuple[Figure, NDArray[Any]]:
     """A figure, inches high, that lays itself out, and its axes (n_rows, n_columns). Nothing has to close it.
 
-    In a narrow figure the columns stand below each other, each panel as wide as the figure and about as high for its
-    width as in the wide one; panels share their axes alike. sharex, sharey, ratios: as for `subplots`.
+    In a narrow figure the columns stand below each other; panels share their axes alike. sharex, sharey, ratios: as for
+    `subplots`.
     """
     width = mpl.rcParams["figure.figsize"][0]
     if not is_narrow():
         figure = Figure(figsize=(width, height), layout="constrained")
         panels: NDArray[Any] = figure.subplots(n_rows, n_columns, sharex=sharex, sharey=sharey, squeeze=False, **ratios)
         return figure, panels
-    usual = height * np.array(ratios.get("height_ratios", np.ones(n_rows)), dtype=float)
-    usual /= np.sum(usual) / height
+    usual = np.array(ratios.get("height_ratios", np.ones(n_rows)), dtype=float)
+    usual *= height / np.sum(usual)
     own = np.minimum(np.maximum(0.45 * n_columns * usual, np.minimum(usual, _LOW)), np.maximum(usual, _HIGH))
     heights = np.tile(np.maximum(own, _LEAST), n_columns)
     figure = Figure(figsize=(width, heights.sum()), layout="constrained")
@@ -68,8 +68,7 @@ def new_panels(
             other = panels[0, 0] if shared is True else panels[first]
             if shared and other is not panel:
                 share(other)
-        if sharex and row < n_rows - 1:
-            panel.tick_params(labelbottom=False)
+        panel.tick_params(labelbottom=not sharex or row == n_rows - 1)
     return figure, panels
 
 
@@ -109,8 +108,8 @@ def add_line(
 ) -> float:
     """A line with the errors of its values as bars, or as a band; how high it and its errors reach.
 
-    x, y, error (n,): as shown, error NaN, infinite or 0 where there is none to draw. Errors count to the height as far
-    as twice the largest value: those that leave the values too little room are cut.
+    x, y, error (n,): as shown, error NaN, infinite or 0 where there is none to draw. Errors count to the height up to
+    twice the largest value: beyond they are cut.
     """
     (line,) = panel.plot(x, y, **look)
     highest = float(np.nanmax(y, initial=0.0))
@@ -120,15 +119,15 @@ def add_line(
     drawn = np.isfinite(error) & np.isfinite(y) & (error > 0.0)
     if not drawn.any():
         return highest
+    x, y, error = x[drawn], y[drawn], error[drawn]
     # what is worn is not less than nothing
-    at, high = x[drawn], (y + error)[drawn]
-    low = np.where(y[drawn] >= 0.0, np.maximum(y[drawn] - error[drawn], 0.0), y[drawn] - error[drawn])
+    low = np.where(y >= 0.0, np.maximum(y - error, 0.0), y - error)
     if band:
-        panel.fill_between(at, low, high, color=line.get_color(), alpha=0.18, linewidth=0.0, gid="error")
+        panel.fill_between(x, low, y + error, color=line.get_color(), alpha=0.18, linewidth=0.0, gid="error")
     else:
         bars: dict[str, Any] = {"fmt": "none", "ecolor": line.get_color(), "elinewidth": 1.0, "capsize": 2.5}
-        panel.errorbar(at, y[drawn], yerr=np.stack([y[drawn] - low, error[drawn]]), zorder=2.5, **bars)
-    return max(highest, min(float(high.max()), 2.0 * highest))
+        panel.errorbar(x, y, yerr=np.stack([y - low, error]), zorder=2.5, **bars)
+    return max(highest, min(float((y + error).max()), 2.0 * highest))
 
 
 def add_map(panel: Axes, x: ArrayLike, y: ArrayLike, values: NDArray[Any], norm: Normalize, **look: Any) -> None:
@@ -152,11 +151,10 @@ def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
 
     handles: what is named; by default whatever has a label in any panel, each label once, if there are at least two.
     """
-    found: dict[str, Any] = {str(handle.get_label()): handle for handle in handles or ()}
     if handles is None:
-        for panel in figure.axes:
-            for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-                found.setdefault(str(label), handle)
+        handles = [handle for panel in figure.axes for handle in panel.get_legend_handles_labels()[0]]
+    found = {str(handle.get_label()): handle for handle in reversed(handles)}
+    found = {label: found[label] for label in dict.fromkeys(str(handle.get_label()) for handle in handles)}
     if len(found) < 2:
         return
     room = int(_CHARACTERS * figure.get_figwidth())
@@ -183,15 +181,8 @@ def label_outer(panels: NDArray[Any]) -> None:
 
 
 def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
-    """A logarithmic axis that shows values between these, above zero, with three to six ticks in few digits."""
+    """A logarithmic axis that shows values between these, above zero, with few ticks in few digits."""
     (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
-    decades = [10.0**power for power in range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 2)]
-    if high < 20.0 * low:
-        low, high = 0.9 * low, 1.1 * high
-    for steps in ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)):
-        ticks = [factor * decade for decade in decades for factor in steps if low <= factor * decade <= high]
-        if len(ticks) >= _FEWEST_TICKS:
-            break
 
     def show(value: float, _position: object) -> str:
         number = 100.0 * value if percent else value
@@ -199,7 +190,7 @@ def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
         return f"{text} %" if percent else text
 
     axis.set_minor_locator(NullLocator())
-    axis.set_major_locator(FixedLocator(ticks[:: -(-len(ticks) // _MOST_TICKS) or 1]))
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,), numticks=_MOST_TICKS))
     axis.set_major_formatter(FuncFormatter(show))
 
 

@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.panels import FloatArray, line_style, set_log
-from studyrunner.result.units import Scale, scale_for, units_of
 from studyrunner.result.view import Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.system.progress import count
+from studyrunner.units import Scale, scale_for, units_of
 
 _DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
 _MANY = 60  # points from which markers are small
@@ -40,8 +40,8 @@ class Choice:
 def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:
     """At most `limit` combinations of the axes that are not `free`; the one of the shown point is among them.
 
-    Where there are more, the axes `first` are split first, then the others in the order of the file, each whole or
-    not at all; the rest stays at the shown point.
+    Where there are more, the axes `first` are split first, then the others, each whole or not at all; the rest stays at
+    the shown point.
     """
     order = [name for name in dict.fromkeys((*first, *result.axes)) if name in result.varying and name not in free]
     shown = {name: index for name, index in result.shown_point().items() if name not in free}
@@ -85,7 +85,7 @@ class Course:
     def read(self, result: Result, name: str, point: Mapping[str, int]) -> FloatArray:
         """A variable along the course, at a point whose index along it does not matter: (n, what follows the axes)."""
         where = {axis: place for axis, place in point.items() if axis != self.axis}
-        values = result.read(name).isel(where).transpose(self.axis, ...).values
+        values = result.dataset[name].isel(where).transpose(self.axis, ...).values
         return np.asarray(values, dtype=float)[self.index]
 
     def along(self, result: Result, flags: NDArray[np.bool_], point: Mapping[str, int]) -> NDArray[np.bool_]:
@@ -116,14 +116,22 @@ class Course:
             set_log(panel.xaxis, float(self.values[0]), float(self.values[-1]))
 
 
+def course_axis(result: Result) -> str | None:
+    """The axis that figures are drawn over: the frequency, or where it does not vary the first other axis of several
+    numbers; None where nothing but words and samples varies.
+    """
+    numbers = [name for name in result.varying if result.dataset[name].dtype.kind in "iuf" and name != SAMPLE]
+    of_first_rank = [name for name in ("frequency", "modal_amplitude") if name in numbers]
+    return next(iter(of_first_rank + numbers), None)
+
+
 def find_course(result: Result, axis: str | None = None) -> Course | None:
     """The course along an axis, by default along `course_axis`; None where it has one value."""
-    axis = axis or result.course_axis
+    axis = axis or course_axis(result)
     if axis is None or axis not in result.varying:
         return None
     values = np.asarray(result.dataset[axis].values, dtype=float)
-    scale = scale_for(units_of(result.dataset[axis]), values)
-    index = np.argsort(values, kind="stable")
+    scale, index = scale_for(units_of(result.dataset[axis]), values), np.argsort(values, kind="stable")
     shown = scale(values[index])
     text = "excitation frequency" if axis == "frequency" else axis.replace("_", " ")
     return Course(axis, index, shown, scale.label(text), axis != "frequency" and spans_decades(shown))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
+from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.scene.answers import SceneVariable
 from studyrunner.scene.pairs import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
@@ -143,10 +143,8 @@ def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Smal
     # the axis of worn states is the last one
     states = (study,) if axis is None else study.variants[: len(axis.values)]
     values = np.array([worn_depth(state, facts[0]) for state in states])
-    dimensions = ("contact",) if axis is None else (axis.name, "contact")
-    comment = "Key scene.worn; wear_depth counts from there."
-    entry = Variable(dimensions, "m", "wear depth at the start", comment=comment)
-    yield SmallArray("worn_depth", dimensions, values[0] if axis is None else values, entry)
+    dimensions, values = (("contact",), values[0]) if axis is None else ((axis.name, "contact"), values)
+    yield SmallArray("worn_depth", dimensions, values, WORN_DEPTH)
 
 
 def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:

@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.advice import Used, advise, advise_error
-from studyrunner.percent import show_percent, show_rtol
-from studyrunner.result.points import WELL_ENOUGH
-from studyrunner.result.units import show_cycles
-from studyrunner.result.view import Result
+from studyrunner.result.view import WELL_ENOUGH, Point, Result
 from studyrunner.system.progress import count
+from studyrunner.units import show_cycles, show_percent, show_rtol
 
 _MOST_NAMED = 10
-_LEAST = 1e-4  # relative error that is told, of any smaller one
+_LEAST = 1e-4  # relative error that is shown, of any smaller one
 _AUTO = "auto"
 _OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
 
@@ -44,23 +42,21 @@ class Certainty:
     @property
     def sentence(self) -> str:
         """The certainty in one sentence."""
-        aim = f"rtol = {show_rtol(self.rtol)}" if math.isfinite(self.rtol) else "their rtol"
-        held = self.rtol if math.isfinite(self.rtol) else None
-        worst = self.worst if held is not None and held < _LEAST else max(self.worst, _LEAST)
-        known = f"known within {show_percent(worst, held)}" if worst <= WELL_ENOUGH else "not known"
-        advice = f": {self.advice}" if self.advice else ""
-        if self.n_points == 1 and not self.n_short:
-            return f"the {self.of} is {known} ({aim}){advice}"
+        rtol = self.rtol if math.isfinite(self.rtol) else None
+        aim = "their rtol" if rtol is None else f"rtol = {show_rtol(rtol)}"
+        worst = self.worst if rtol is not None and rtol < _LEAST else max(self.worst, _LEAST)
+        known = f"known within {show_percent(worst, rtol)}" if worst <= WELL_ENOUGH else "not known"
         if self.n_points == 1:
-            return f"the {self.of} is not known: the point was not computed to the end"
+            if self.n_short:
+                return f"the {self.of} is not known: the point was not computed to the end"
+            return f"the {self.of} is {known} ({aim})" + (f": {self.advice}" if self.advice else "")
         text = f"{self.n_known} of {count(self.n_points, self.of)} are known within {aim}"
         text += f", {self.n_less} less well" if self.n_short and self.n_less else ""
         text += f", {self.n_short} not computed to the end" if self.n_short else ""
         text += f", {self.n_unknown} without an estimate" if self.n_unknown else ""
         if not self.worst > 0.0:
             return text
-        where = f"{self.where}, " if self.where else ""
-        advice = f"; {self.advice}" if self.advice else ""
+        where, advice = (f"{self.where}, " if self.where else ""), (f"; {self.advice}" if self.advice else "")
         return f"{text}; least certain: {where}{known.removeprefix('known ')}{advice}"
 
 
@@ -70,25 +66,23 @@ def certainty_of(result: Result, *, wore: bool = True) -> Certainty | None:
     None where the file has no errors.
     """
     if result.has_modes:
-        return _certainty(result, "point", _of_modes(result))
+        return _certainty(result, "point", _errors_of_modes(result))
     responses = result.has("response_error") and result.blocks is None
     has_errors = result.has("error_estimate") and np.isfinite(result.rtol).any() and result.computed.any()
     if result.wears and has_errors and (wore or not responses):
         return _certainty(result, "worn volume", result.errors)
     if responses:
-        last = result.over_points("response_error", lambda values: values[:, -1])
-        return _certainty(result, "response", last)
+        return _certainty(result, "response", result.over_points("response_error", lambda values: values[:, -1]))
     return None
 
 
-def _of_modes(result: Result) -> NDArray[np.float64]:
+def _errors_of_modes(result: Result) -> NDArray[np.float64]:
     """Largest relative error of natural frequency and damping ratio; in the shape of the axes."""
     errors = np.zeros(result.computed.shape)
     for name in ("natural_frequency", "damping_ratio"):
         if result.has(name, f"{name}_error"):
-            value = np.abs(result.read(name).values)
-            own = np.where(value > 0.0, result.read(f"{name}_error").values / np.where(value > 0.0, value, 1.0), 0.0)
-            errors = np.fmax(errors, own)
+            value, error = np.abs(result.dataset[name].values), result.dataset[f"{name}_error"].values
+            errors = np.fmax(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
     return errors
 
 
@@ -101,26 +95,27 @@ def _certainty(result: Result, of: str, errors: NDArray[np.float64]) -> Certaint
     n_unknown = int(np.count_nonzero(result.computed & np.isnan(errors)))
     worst, where, advice = math.nan, "", ""
     if above.any() or known.any():
-        order = np.where(above if above.any() else known, errors, -1.0)
-        place = tuple(int(index) for index in np.unravel_index(int(np.argmax(order)), order.shape))
-        worst, where = float(errors[place]), result.describe(result.point_at(place)) if result.varying else ""
+        point = result.largest(np.where(above if above.any() else known, errors, -1.0))
+        place = tuple(point.values())
+        worst, where = float(errors[place]), result.describe(point) if result.varying else ""
         if above.any():
             found = "set a smaller solver.rtol"
             if of == "worn volume":
-                rates = result.at("wear_rate_error", result.point_at(place)) if result.has("wear_rate_error") else ()
-                found = advise_error(worst, np.asarray(rates).tolist(), settings_of(result, place))
+                rates = result.at("wear_rate_error", point).values.tolist() if result.has("wear_rate_error") else ()
+                found = advise_error(worst, rates, settings_of(result, place))
             advice = f"for {show_rtol(float(result.rtol[place]))} {found}"
     n_known, n_less = (int(np.count_nonzero(each)) for each in (within, above))
     rtol = float(several[0]) if several.size == 1 else math.nan
     return Certainty(of, errors.size, n_known, n_less, n_unknown, rtol, worst, where, advice)
 
 
-def show_error(result: Result, place: tuple[int, ...]) -> str:
+def show_error(result: Result, point: Point) -> str:
     """Error of the worn volume of a point as text: "2.6 %"."""
+    place = tuple(point[name] for name in result.axes)
     return show_percent(float(result.errors[place]), float(result.rtol[place]))
 
 
-def tell_ends(result: Result) -> str:
+def describe_ends(result: Result) -> str:
     """Numbers of points that were computed to the end, ended early, or have no state."""
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
     n_early = int(np.count_nonzero(result.held & ~result.computed))
@@ -130,20 +125,20 @@ def tell_ends(result: Result) -> str:
     return f"{text}, {n_without} without a result." if n_without else f"{text}."
 
 
-def list_ended(result: Result, number: int) -> dict[str, list[tuple[int, ...]]]:
+def list_ended(result: Result, number: int) -> dict[str, list[dict[str, int]]]:
     """Points that ended in this way, by what is to be said of each beside the outcome; the text may be empty."""
     messages = result.dataset["message"].values if result.has("message") else None
-    found: dict[str, list[tuple[int, ...]]] = {}
+    found: dict[str, list[dict[str, int]]] = {}
     for index in np.argwhere(result.dataset["outcome"].values == number):
-        place = tuple(index.tolist())
+        place, point = tuple(index.tolist()), result.point_at(index)
         said = "" if messages is None else str(messages[place])
         if result.held[place] and result.counted[:-1] not in said:
             last = show_cycles(float(result.last_cycle[place]), result.counted)
             end = "" if result.computed[place] else f"computed up to {last}"
             is_known = 0.0 < result.errors[place] <= WELL_ENOUGH
-            known = f"worn volume known within {show_error(result, place)}" if is_known else ""
+            known = f"worn volume known within {show_error(result, point)}" if is_known else ""
             said = ", ".join(filter(None, (end, known, said)))
-        found.setdefault(said, []).append(place)
+        found.setdefault(said, []).append(point)
     return found
 
 
@@ -152,9 +147,9 @@ def describe_ended(result: Result, number: int) -> list[str]:
     axes = (*result.varying, *result.fixed)
     texts = list_ended(result, number)
     lines = []
-    for said, places in list(texts.items())[:_MOST_NAMED]:
-        named = [result.describe(result.point_at(place), axes) for place in places[:_MOST_NAMED]]
-        named += [f"{count(len(places) - _MOST_NAMED, 'more point')}"] if len(places) > _MOST_NAMED else []
+    for said, points in list(texts.items())[:_MOST_NAMED]:
+        named = [result.describe(point, axes) for point in points[:_MOST_NAMED]]
+        named += [f"{count(len(points) - _MOST_NAMED, 'more point')}"] if len(points) > _MOST_NAMED else []
         lines.append(": ".join(filter(None, ("; ".join(named), said))))
     left = sum(map(len, list(texts.values())[_MOST_NAMED:]))
     return [line for line in (*lines, f"and {count(left, 'more point')}" if left else "") if line]
@@ -171,28 +166,23 @@ def advise_ended(result: Result, number: int) -> list[str]:
 
 
 def settings_of(result: Result, place: tuple[int, ...]) -> Used:
-    """Settings of a point, as far as the file tells."""
-    dataset, point, solver = result.dataset, result.point_at(place), result.study.get("solver", {})
-    slow_time = result.study.get("slow_time", {})
-
-    def of(key: str) -> Any:
-        return dataset[key].values[point[key]] if key in point else solver.get(key, _AUTO)
-
-    def number(key: str) -> int | str:
-        return _AUTO if str(of(key)) == _AUTO else int(float(of(key)))
-
-    def words(key: str) -> tuple[str, ...]:
-        return tuple(map(str, dataset[key].values)) if key in point else ()
-
+    """Settings of a point, as far as the file says."""
+    dataset, solver, slow_time = result.dataset, result.study.get("solver", {}), result.study.get("slow_time", {})
+    of: dict[str, Any] = {"sweep": _AUTO, "harmonics": _AUTO, "samples": _AUTO, **solver}
+    # missions and modes have neither step nor scheme, and what they take of their own controls its error
+    of |= {"scheme": "adaptive"} | {name: dataset[name].values[index] for name, index in result.point_at(place).items()}
+    harmonics, samples = (each if each == _AUTO else int(float(each)) for each in (of["harmonics"], of["samples"]))
+    schemes, sweeps = (
+        tuple(map(str, dataset[name].values)) if name in result.axes else () for name in ("scheme", "sweep")
+    )
     return Used(
-        # missions and modes have neither step nor scheme, and what they take of their own controls its error
-        scheme=str(of("scheme")) if "scheme" in point else "adaptive",
-        sweep=str(of("sweep")),
-        harmonics=number("harmonics"),
-        samples=number("samples"),
+        scheme=str(of["scheme"]),
+        sweep=str(of["sweep"]),
+        harmonics=harmonics,
+        samples=samples,
         rtol=float(result.rtol[place]),
-        schemes=words("scheme"),
-        sweeps=words("sweep"),
+        schemes=schemes,
+        sweeps=sweeps,
         by_depth="largest_depth" in slow_time,
         until="until" in slow_time,
     )

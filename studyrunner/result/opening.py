@@ -11,14 +11,14 @@ import functools
 import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
+from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.study.toml_text import read_toml
@@ -46,24 +46,27 @@ _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
 _INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", *CERTIFICATE)
 """Ends of the names of variables that may be infinite: errors that are not known, what comes after any cycle."""
-_ATTRIBUTES = ("units", "long_name", "flag_meanings", "sentences", "flag_values")  # of variables, for the report
 _LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
+_LONGEST = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanings": 50 * _LONGEST_SENTENCE}
+_ATTRIBUTES = (*_LONGEST, "sentences", "flag_values")  # of variables, for the report
 _REMEDY = "give a result file of run-study that is whole"
 
-_OF_SCENE = SCENE["mesh"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
+_OF_SCENE = SCENE["mesh"] | SCENE["natural_frequency"]
+_OF_SCENE |= {"stuck_frequency": STUCK_FREQUENCY, "worn_depth": WORN_DEPTH}
 _OF_SCENE |= {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
 _WORDS = ("scheme", "sweep")
 _TEXTS = (*_WORDS, "response", "component", "block")
 _DRAWN_VALUES = Variable((), "1", "what the samples draw of an input")
 
+_LIKE_CYCLES = {
+    "mission": "cycle",
+    "last_mission": "last_cycle",
+    "missions_to_target": "cycles_to_target",
+    "missions_to_target_error": "cycles_to_target_error",
+}
 
-class _WrongError(Exception):
-    """A variable of a file is wrong. name: of the variable. found: what is wrong."""
-
-    def __init__(self, name: str, found: str) -> None:
-        super().__init__(name, found)
-        self.name = name
-        self.found = found
+Known = dict[str, tuple[tuple[str, ...], Variable | None]]
+"""Of each variable of a file its dimensions and what it is, None for the values of an axis."""
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -96,8 +99,19 @@ def open_result(path: str | Path) -> xr.Dataset:
 
 
 def open_known(path: str | Path) -> xr.Dataset:
-    """What the report knows of a result file, with its texts cleaned, see `check_dataset`. Raises UserError."""
-    return _open(path)[1]
+    """What the report knows of a result file, with its texts cleaned, see `check_dataset`.
+
+    Raises UserError, also where numbers are too large to be drawn, but for variables of more than 16 MB.
+    """
+    known, source = _open(path)[1], str(path)
+    with reading_errors(source, every=True):
+        for name, variable in known.variables.items():
+            if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
+                sizes = np.abs(variable.values)
+                may_be_infinite = str(name).endswith(_INFINITE)
+                wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (not may_be_infinite))]
+                _need(source, not wrong.size, str(name), f"{wrong.max(initial=0.0):g}")
+    return known
 
 
 def _open(path: str | Path) -> tuple[xr.Dataset, xr.Dataset]:
@@ -111,6 +125,41 @@ def _open(path: str | Path) -> tuple[xr.Dataset, xr.Dataset]:
         except BaseException:
             opened.close()
             raise
+
+
+def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
+    """The dataset with missions as cycles and without what belongs to single blocks, and these variables or None.
+
+    Responses with a unit of their own in their name, as root stress [MPa], are left out: the others share a scale.
+    """
+    history, blocks = dataset, None
+    if "response" in dataset.coords:
+        own = np.char.endswith(dataset["response"].values.astype(str), "]")
+        if own.any() and not own.all():
+            history = history.isel(response=np.flatnonzero(~own))
+    if "block" in dataset.dims:
+        renamed = history.rename({name: new for name, new in _LIKE_CYCLES.items() if name in history.variables})
+        of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
+        history, blocks = renamed.drop_vars(of_blocks), renamed[of_blocks]
+    if history is not dataset:
+        # a dataset of another loses the file to be closed
+        history.set_close(dataset.close)
+    return history, blocks
+
+
+def find_value(dataset: xr.Dataset, name: str, text: str) -> float | str:
+    """The value of an axis as it is in a file, from its text on the command line. Raises UserError."""
+    axes = [str(axis) for axis in dataset["outcome"].dims]
+    remedy = f"give one of the axes {', '.join(axes)}"
+    if name in axes:
+        values = dataset[name].values.tolist()
+        for value in values:
+            with suppress(TypeError, ValueError):
+                if value == text or math.isclose(value, float(text), rel_tol=1e-9):
+                    return value  # type: ignore[no-any-return]
+        remedy = f"give one of the values of {name}: {', '.join(map(str, values[:12]))}"
+        remedy += ", ..." if len(values) > 12 else ""
+    raise UserError("command line", "--point", f"{name}={text}", remedy)
 
 
 @contextmanager
@@ -155,65 +204,51 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     if lacking:
         raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
     axes = tuple(map(str, dataset["outcome"].dims))
-    try:
-        _check_sizes(dataset, axes, slow)
-        known = _known_variables(dataset, axes, slow)
-        for name, (dimensions, entry) in known.items():
-            _check_variable(dataset.variables[name], name, dimensions, entry)
-        checked = dataset.drop_vars([name for name in dataset.variables if name not in known]).copy()
-        checked = checked.set_coords([name for name in known if name in COORDINATES or name.startswith(DRAWN)])
-        texts = {name: _texts(dataset.variables[name], name) for name in known if dataset[name].dtype.kind in "OSU"}
-        checked = checked.assign_coords({name: texts.pop(name) for name in list(texts) if name in checked.coords})
-        checked = checked.assign(texts)
-        _check_values(checked, axes, slow)
-    except _WrongError as wrong:
-        raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
-    checked.attrs = _cleaned(checked.attrs)
+    _check_sizes(source, dataset, axes, slow)
+    known = _known_variables(source, dataset, axes, slow)
+    for name, (dimensions, entry) in known.items():
+        _check_variable(source, name, dataset.variables[name], dimensions, entry)
+    checked = dataset.drop_vars([name for name in dataset.variables if name not in known]).copy()
+    for name in known:
+        if name in COORDINATES or name.startswith(DRAWN):
+            checked = checked.set_coords(name)
+        if checked[name].dtype.kind in "OSU":
+            texts = _texts(source, name, checked.variables[name])
+            checked = checked.assign_coords({name: texts}) if name in checked.coords else checked.assign({name: texts})
+    _check_values(source, checked, axes, slow)
+    checked.attrs = _attributes(checked.attrs)
     for variable in checked.variables.values():
-        variable.attrs = _cleaned({name: variable.attrs[name] for name in _ATTRIBUTES if name in variable.attrs})
+        variable.attrs = _attributes({name: variable.attrs[name] for name in _ATTRIBUTES if name in variable.attrs})
     checked.set_close(dataset.close)
     study_tables(checked.attrs, source)
     return checked
 
 
-def check_numbers(dataset: xr.Dataset, source: str) -> None:
-    """Raises UserError where there are numbers that are too large to be drawn, but for variables of more than 16 MB."""
-    for name, variable in dataset.variables.items():
-        if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
-            sizes = np.abs(variable.values)
-            may_be_infinite = str(name).endswith(_INFINITE)
-            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (not may_be_infinite))]
-            if wrong.size:
-                raise UserError(source, str(name), Verbatim(f"{wrong[0]:g}"), _REMEDY)
-
-
-def _need(right: object, name: str, found: str) -> None:
+def _need(source: str, right: object, name: str, found: str) -> None:
     if not right:
-        raise _WrongError(name, found)
+        raise UserError(source, name, Verbatim(found), _REMEDY)
 
 
-def _check_sizes(dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
+def _check_sizes(source: str, dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
     for name in axes:
-        _need(name.isidentifier() and len(name) <= _LONGEST_NAME, "outcome", "axes with unusual names")
+        _need(source, name.isidentifier() and len(name) <= _LONGEST_NAME, "outcome", "axes with unusual names")
     sizes = {str(name): size for name, size in dataset.sizes.items()}
     for name in (*axes, slow, "contact"):
-        _need(0 < sizes.get(name, 0) <= _MOST_NAMES, name, f"{sizes.get(name, 0)} values")
+        _need(source, 0 < sizes.get(name, 0) <= _MOST_NAMES, name, f"{sizes.get(name, 0)} values")
     n_points = math.prod(sizes[name] for name in axes)
     n_values = n_points * math.prod(sizes.get(name, 1) for name in (slow, "response", "block"))
     is_small = n_points <= _MOST_POINTS and n_values <= _MOST_VALUES
-    _need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
+    _need(source, is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
 
 
-def _known_variables(
-    dataset: xr.Dataset, axes: Sequence[str], slow: str
-) -> dict[str, tuple[tuple[str, ...], Variable | None]]:
-    """Variables of a file that the report knows: their dimensions and what they are, None for the values of an axis."""
+def _known_variables(source: str, dataset: xr.Dataset, axes: Sequence[str], slow: str) -> Known:
+    """Variables of a file that the report knows."""
     with_axes = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
     if slow == "mission":
         with_axes = OF_MISSIONS | OF_A_MISSION
     elif "modal_amplitude" in axes:
         with_axes = OF_MODES | OF_A_MODE_POINT
-    found: dict[str, tuple[tuple[str, ...], Variable | None]] = {}
+    found: Known = {}
     for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
         # what is of the scene, or drawn, has those axes along which it differs
         along = tuple(axis for axis in axes if axis in variable.dims)
@@ -221,34 +256,38 @@ def _known_variables(
             found[name] = (name,), None
         elif name.startswith(DRAWN) or (name == "frequency" and "frequency_ratio" in axes):
             found[name] = (*along, *(each for each in ("contact",) if each in variable.dims)), _DRAWN_VALUES
-            _need({SAMPLE, "frequency_ratio"} & set(along), name, f"dimensions {', '.join(map(str, variable.dims))}")
+            is_along = {SAMPLE, "frequency_ratio"} & set(along)
+            _need(source, is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
         elif name in with_axes:
             found[name] = (*axes, *with_axes[name].dimensions), with_axes[name]
         elif name in _OF_SCENE:
             found[name] = (*along, *_OF_SCENE[name].dimensions), _OF_SCENE[name]
     for name in axes:
-        _need(name in found, name, "no values along the dimension of this name")
+        _need(source, name in found, name, "no values along the dimension of this name")
     return found
 
 
-def _check_variable(variable: xr.Variable, name: str, dimensions: tuple[str, ...], entry: Variable | None) -> None:
+def _check_variable(
+    source: str, name: str, variable: xr.Variable, dimensions: tuple[str, ...], entry: Variable | None
+) -> None:
     """Dimensions and type; entry None: of an axis, which has finite numbers or texts."""
-    _need(variable.dims == dimensions, name, f"dimensions {', '.join(map(str, variable.dims))}")
-    _need(not {"scale_factor", "add_offset"} & set(variable.encoding), name, "packed values")
+    need = functools.partial(_need, source)
+    need(variable.dims == dimensions, name, f"dimensions {', '.join(map(str, variable.dims))}")
+    need(not {"scale_factor", "add_offset"} & set(variable.encoding), name, "packed values")
     kind = variable.dtype.kind
     if entry is not None:
         right = "OSU" if entry.is_text else "iuf" if entry.dtype.startswith("float") else "iu"
-        _need(kind in right, name, f"type {variable.dtype}")
+        need(kind in right, name, f"type {variable.dtype}")
     elif kind in "iuf":
-        _need(name not in _WORDS, name, "numbers in place of words")
-        _need(np.isfinite(variable.values).all(), name, "a value that is no finite number")
+        need(name not in _WORDS, name, "numbers in place of words")
+        need(np.isfinite(variable.values).all(), name, "a value that is no finite number")
     elif name in COORDINATES and name not in _TEXTS:
-        _need(all(map(_is_choice, variable.values.tolist())), name, "texts in place of numbers")
+        need(all(map(_is_choice, variable.values.tolist())), name, "texts in place of numbers")
     if entry is _DRAWN_VALUES:
         # NaN of pairs that a scene does not have
-        _need(variable.size <= _MOST_VALUES, name, f"shape {variable.shape}")
+        need(variable.size <= _MOST_VALUES, name, f"shape {variable.shape}")
         right = (np.abs(variable.values) < _LARGEST_NUMBER) | (np.isnan(variable.values) & ("contact" in dimensions))
-        _need(right.all(), name, "a value that is no finite number")
+        need(right.all(), name, "a value that is no finite number")
 
 
 def _is_choice(text: object) -> bool:
@@ -259,46 +298,49 @@ def _is_choice(text: object) -> bool:
         return False
 
 
-def _check_values(kept: xr.Dataset, axes: Sequence[str], slow: str) -> None:
+def _check_values(source: str, kept: xr.Dataset, axes: Sequence[str], slow: str) -> None:
     """Tests the values that lead to other values: cycles or missions, pairs, flags and mesh."""
+    need = functools.partial(_need, source)
     # worn joints whose modes are sought stand in any order
     counts = np.sort(kept[slow].values) if slow in axes else kept[slow].values
     rising = counts.dtype.kind in "iuf" and counts[0] >= 0 and (np.diff(counts) > 0).all()
-    _need(rising, slow, "no counts in ascending order")
+    need(rising, slow, "no counts in ascending order")
     pairs = kept["contact"].values
     differ = pairs.dtype.kind in "iu" and len(set(pairs.tolist())) == pairs.size
-    _need(differ, "contact", "no whole numbers that differ")
+    need(differ, "contact", "no whole numbers that differ")
     flags = np.atleast_1d(kept["outcome"].attrs.get("flag_values", np.zeros(0, int)))
-    _need(flags.dtype.kind in "iu", "outcome:flag_values", "no whole numbers")
+    need(flags.dtype.kind in "iu", "outcome:flag_values", "no whole numbers")
     nodes = [kept[name].values for name in ("mesh_x", "mesh_y", "mesh_z") if name in kept]
-    _need(all(np.isfinite(each).all() for each in nodes), "mesh_x", "no finite number, here or beside it")
+    need(all(np.isfinite(each).all() for each in nodes), "mesh_x", "no finite number, here or beside it")
     if "mesh_quad" in kept:
         quad, n_nodes = kept["mesh_quad"].values, min((each.size for each in nodes), default=0)
-        _need(((quad >= 0) & (quad < n_nodes)).all(), "mesh_quad", "nodes that there are not")
+        need(((quad >= 0) & (quad < n_nodes)).all(), "mesh_quad", "nodes that there are not")
 
 
-def _texts(variable: xr.Variable, name: str) -> xr.Variable:
-    _need(variable.size <= _MOST_NAMES, name, f"shape {variable.shape}")
+def _texts(source: str, name: str, variable: xr.Variable) -> xr.Variable:
+    _need(source, variable.size <= _MOST_NAMES, name, f"shape {variable.shape}")
     longest = _LONGEST_SENTENCE if name == "message" else _LONGEST_NAME
     texts = [_line(each, longest) for each in variable.values.flat]
     return xr.Variable(variable.dims, np.array(texts, dtype=np.str_).reshape(variable.shape), variable.attrs)
 
 
-def _cleaned(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value if name == "flag_values" else _clean(name, value) for name, value in attributes.items()}
+def _attributes(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes without control characters, in one line but for texts of several."""
 
+    def clean(name: str, value: object) -> object:
+        if name in ("study", "sentences"):
+            return show_text(_decoded(value))
+        return value if name == "flag_values" else _line(value, _LONGEST.get(name, _LONGEST_SENTENCE))
 
-def _clean(name: object, value: object) -> str:
-    """Text of an attribute without control characters."""
-    if name in ("study", "sentences"):
-        return show_text(value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value))
-    longest = {"units": _LONGEST_NAME, "flag_meanings": 50 * _LONGEST_SENTENCE}.get(str(name), _LONGEST_SENTENCE)
-    return _line(value, longest)
+    return {name: clean(name, value) for name, value in found.items()}
 
 
 @functools.lru_cache(maxsize=4096)  # most messages are the same
 def _line(value: object, longest: int) -> str:
     """Text in one line, without control characters. longest: number of characters."""
-    text = value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)
-    text = show_text(" ".join(text[: 2 * longest].split()))
+    text = show_text(" ".join(_decoded(value)[: 2 * longest].split()))
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
+
+
+def _decoded(value: object) -> str:
+    return value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)

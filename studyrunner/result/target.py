@@ -59,8 +59,6 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
     """
     try:
         target = Path(os.path.realpath(path))
-        # the libraries that write it are given a text, not bytes
-        str(target).encode(sys.getfilesystemencoding())
         remedy = _obstacle(option, path, target, inputs)
         if not remedy:
             trial = new_partial(target)
@@ -70,10 +68,10 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
                     sync(file)
                 finally:
                     trial.unlink()
-    except OSError as error:
-        remedy = f"give a file that can be written: {error.strerror}"
-    except ValueError:
-        remedy = f"give a name in {sys.getfilesystemencoding().upper()}, as those of its folders"
+    except (OSError, ValueError) as error:
+        # a name that the system cannot encode is a ValueError
+        reason = error.strerror if isinstance(error, OSError) else "it has a name that no file has"
+        remedy = f"give a file that can be written: {reason}"
     if remedy:
         raise UserError("command line", option, str(path), remedy)
     return target
@@ -81,12 +79,10 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
 
 def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> str:
     """Remedy for what keeps a file from being written to `target`; "" for nothing. Raises OSError."""
-    if target.is_dir():
-        return "give the name of a file: this is a folder"
+    # the libraries that write it are given a text, not bytes
+    str(target).encode(sys.getfilesystemencoding())
     if not target.parent.is_dir():
-        no_folder = next((part for part in path.parents if os.path.lexists(part) and not part.is_dir()), None)
-        missing = f"there is no folder {path.parent}" if no_folder is None else f"{no_folder} is no folder"
-        return f"give a file in a folder that exists: {missing}"
+        return f"give a file in a folder that exists: there is no folder {path.parent}"
     # what leads to a stream, or to a file without a name, exists although its target does not
     if os.path.lexists(target) or path.exists():
         if not target.is_file():
@@ -104,9 +100,9 @@ def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> 
 def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
     """Target of a result, after `check_output` and a test that nothing forbids to replace what exists there.
 
-    option: of the command line, that gave the path. study: of the new result. overwrite: whether a result of another
-    study may be replaced. how: the user asks for that, in words. Raises UserError where the file cannot be written, is
-    no result of run-study, or where it or its progress belongs to another study.
+    study: of the new result. overwrite: whether a result of another study may be replaced. how: the user asks for that,
+    in words. Raises UserError where the file cannot be written, is no result of run-study, or where it or its progress
+    belongs to another study.
     """
     target = Target(check_output(option, path, study.files))
     own, (standing, finished) = identity_of(study), _read_result(option, target.path)

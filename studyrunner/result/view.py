@@ -3,44 +3,54 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.result.opening import open_known
-from studyrunner.result.points import Points
-from studyrunner.result.scars import Profile, read_profile
-from studyrunner.result.units import show_cycles, show_value
-from studyrunner.statistics.samples import SAMPLE
+from studyrunner.result.opening import as_history, find_value, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
-from studyrunner.user_error import UserError, show_text
+from studyrunner.units import show_cycles, show_value
+from studyrunner.user_error import show_text
+
+if TYPE_CHECKING:
+    from studyrunner.result.pairs import Profile
+
+CONVERGED = 0
+"""The `outcome` of a point that was computed to the end without restriction."""
+
+COMPLETE_WORDS = ("converged", "inaccurate", "sensitive")
+"""Outcomes of points that were computed to the end."""
+
+WELL_ENOUGH = 0.5
+"""Largest relative error of a number that is a result: that of the outcome `sensitive`."""
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
 
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Probabilities of the bands that figures show."""
+_AT_ONCE = 2**21  # numbers that are read at once
 
-_LIKE_CYCLES = {
-    "mission": "cycle",
-    "last_mission": "last_cycle",
-    "missions_to_target": "cycles_to_target",
-    "missions_to_target_error": "cycles_to_target_error",
-}
-
+Mask = NDArray[np.bool_]
 Point = Mapping[str, int]
 """Index along each axis. A missing axis stands for all its values."""
 
 
 @dataclass(frozen=True)
-class Result(Points):
-    """A result file.
+class Ending:
+    """One outcome: word of the file, sentence for the reader."""
+
+    word: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """A result file, each point one combination of the axes. Arrays of points have the shape of the axes.
 
     dataset: read lazily; a variable that was read as a whole stays in memory. fixed: axes of which this holds one value
     of several, and how many the file has. blocks: of missions what belongs to single blocks; in `dataset` missions then
@@ -58,10 +68,45 @@ class Result(Points):
     again: Mapping[str, xr.Dataset] = field(default_factory=dict)
     no_worn_response: str = ""
 
-    @cached_property
+    @property
     def title(self) -> str:
         """Title of the study, or the name of the file."""
         return str(self.dataset.attrs.get("title") or show_text(self.path.stem))
+
+    @cached_property
+    def study(self) -> dict[str, dict[str, object]]:
+        """The effective study in the file, by table; empty where there is none that can be read."""
+        return study_tables(self.dataset.attrs)
+
+    @cached_property
+    def axes(self) -> tuple[str, ...]:
+        """Dimensions of a point, in the order of the file."""
+        return tuple(str(name) for name in self.dataset["outcome"].dims)
+
+    @cached_property
+    def varying(self) -> tuple[str, ...]:
+        """Axes of more than one value."""
+        return tuple(name for name in self.axes if self.dataset.sizes[name] > 1)
+
+    @cached_property
+    def numerical(self) -> list[str]:
+        """Axes that are numerical settings."""
+        return [name for name in self.axes if name in ("step", "scheme") or name in self.study.get("solver", {})]
+
+    @property
+    def has_modes(self) -> bool:
+        """Whether the points are those of nonlinear modes, which have no slow time: `cycle` is then an axis."""
+        return "modal_amplitude" in self.axes
+
+    @property
+    def counted(self) -> str:
+        """What slow time counts: "cycles" or "missions"."""
+        return "cycles" if self.blocks is None else "missions"
+
+    @property
+    def wears(self) -> bool:
+        """Whether wear was asked for, and not unworn states or modes only."""
+        return not self.has_modes and (self.has("cycle_count") or bool(self.dataset["cycle"].values[-1] > 0.0))
 
     @property
     def followed(self) -> str:
@@ -70,12 +115,6 @@ class Result(Points):
         return given if isinstance(given, str) else ""
 
     @property
-    def stuck_frequency(self) -> float:
-        """First natural frequency with the joint stuck, Hz; NaN where there are several, or the file has none."""
-        found = self.dataset["stuck_frequency"].values if self.has("stuck_frequency") else np.array(math.nan)
-        return float(found) if found.ndim == 0 else math.nan
-
-    @cached_property
     def responses(self) -> tuple[str, ...]:
         """Names of the responses; empty where the file has none."""
         return tuple(map(str, self.dataset["response"].values)) if "response" in self.dataset.coords else ()
@@ -83,32 +122,127 @@ class Result(Points):
     @cached_property
     def statistics(self) -> xr.Dataset | None:
         """What the samples of the file say, see `statistics_of_file`; None where it has none."""
-        return statistics_of_file(self.dataset, QUANTILES)
+        return statistics_of_file(self.dataset)
+
+    def has(self, *names: str) -> bool:
+        """Whether the file holds all of these variables."""
+        return all(name in self.dataset.variables for name in names)
 
     def lacks(self, *names: str) -> str:
         """Sentence that says which of these variables to ask for; empty where the file has all."""
-        missing = [name for name in names if not self.has(name)]
+        missing = [
+            name for name in names if not self.has(name) and name not in (() if self.blocks is None else self.blocks)
+        ]
         return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
-
-    def read(self, name: str) -> xr.DataArray:
-        """A whole variable. Whole numbers along `cycle` become floating ones, NaN where there is no state."""
-        values = self.dataset[name]
-        if values.dtype.kind in "iu" and "cycle" in values.dims and not self.has_modes:
-            if self.has("cycle_count"):
-                return values.where(self.dataset["cycle_count"].notnull())
-            last = xr.DataArray(np.where(self.held, self.last_cycle, -1.0), dims=self.axes)
-            return values.where(self.dataset["cycle"] <= last)
-        return values
 
     def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
         """A variable of one point, read for this point only. cycle: index, or indices, along `cycle` if it has that."""
-        values = self.dataset[name]
-        where: dict[str, int | slice | list[int]] = {
-            axis: index for axis, index in point.items() if axis in values.dims
-        }
-        if "cycle" in values.dims and not self.has_modes:
-            where["cycle"] = cycle
-        return values.isel(where)
+        values = self.dataset[name].isel(point, missing_dims="ignore")
+        return values.isel(cycle=cycle) if "cycle" in values.dims and not self.has_modes else values
+
+    def over_points(
+        self, name: str, reduce: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """A number of each point, read some at a time. reduce: from values (n_points, ...) to (n_points,)."""
+
+        def reduced(part: xr.DataArray) -> NDArray[np.float64]:
+            values = np.asarray(part.transpose(*self.axes, ...).values, dtype=float)
+            return reduce(values.reshape(-1, *values.shape[len(self.axes) :]))
+
+        # in a function of its own, so that no part is in memory while the next one is read; `map` holds none either
+        parts = map(reduced, _in_slabs(self.dataset[name], self.axes))
+        return np.concatenate(list(parts)).reshape(self.computed.shape)
+
+    @cached_property
+    def endings(self) -> dict[int, Ending]:
+        """All ways for a point to end that the file names, by number; a number without a name stands for itself."""
+        outcome = self.dataset["outcome"]
+        numbers = np.atleast_1d(outcome.attrs.get("flag_values", ())).tolist()
+        words = str(outcome.attrs.get("flag_meanings", "")).split()
+        # versions before 0.5 said so of every point that was computed to the end
+        claimed = str(outcome.attrs.get("sentences", "")).replace("computed to tolerance", "computed to the end")
+        sentences = claimed.splitlines() + [""] * len(words)
+        found = {number: Ending(f"outcome_{number}", f"outcome {number}") for number in np.unique(outcome).tolist()}
+        for number, word, sentence in zip(numbers, words, sentences, strict=False):
+            found[int(number)] = Ending(word, sentence or word.replace("_", " "))
+        return found
+
+    def ended(self, *words: str) -> Mask:
+        """Points with one of these outcomes."""
+        numbers = [number for number, ending in self.endings.items() if ending.word in words]
+        return np.asarray(np.isin(self.dataset["outcome"].values, numbers))
+
+    @cached_property
+    def computed(self) -> Mask:
+        """Points that were computed to the end."""
+        if not self.has("last_cycle") and not self.has_modes:
+            # an older file holds nothing of any other point
+            return np.asarray(self.dataset["outcome"].values == CONVERGED)
+        return self.ended(*COMPLETE_WORDS)
+
+    @cached_property
+    def last_cycle(self) -> NDArray[np.float64]:
+        """Last cycle counts with values, NaN without values."""
+        if self.has_modes:
+            return np.where(self.computed, 0.0, np.nan)
+        last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
+        # points of an older file, or of one that was joined to this
+        return np.where(self.computed & np.isnan(last), self.dataset["cycle"].values[-1], last)
+
+    @cached_property
+    def held(self) -> Mask:
+        """Points with values, if only of the first cycles."""
+        if self.has_modes:
+            return self.computed
+        return np.asarray(self.computed | (self.last_cycle >= self.dataset["cycle"].values[0]))
+
+    @cached_property
+    def errors(self) -> NDArray[np.float64]:
+        """Estimated relative errors of the last worn volumes; NaN where the file has none."""
+        known = self.dataset["error_estimate"].values if self.has("error_estimate") else np.nan
+        return np.broadcast_to(np.asarray(known, dtype=float), self.computed.shape)
+
+    @cached_property
+    def rtol(self) -> NDArray[np.float64]:
+        """Relative error that each point was to keep below; NaN where the file does not say."""
+        outcome = self.dataset["outcome"]
+        if "rtol" in outcome.dims:
+            return np.asarray(self.dataset["rtol"].broadcast_like(outcome).transpose(*self.axes).values, dtype=float)
+        value = self.study.get("solver", {}).get("rtol")
+        return np.full(outcome.shape, float(value) if isinstance(value, int | float) else math.nan)
+
+    @property
+    def above(self) -> Mask:
+        """Points that were computed to the end with a worn volume known less well than rtol."""
+        return np.asarray(self.computed & (self.errors > self.rtol))
+
+    @cached_property
+    def usable(self) -> Mask:
+        """Points whose worn volume is a result: computed to the end, and not known to a factor of two only."""
+        found = self.computed & ~self.ended("sensitive")
+        return found & (self.errors <= WELL_ENOUGH) if self.has("error_estimate") else found
+
+    @cached_property
+    def best_known(self) -> Mask:
+        """Of usable points that differ in numerical settings only, those with the smallest error.
+
+        Of explicit histories, which wear too much, only those without another one of the same case.
+        """
+        errors = np.where(self.usable, self.errors if self.has("error_estimate") else 0.0, np.inf)
+        labelled = xr.DataArray(errors, dims=self.axes)
+        if "scheme" in self.axes:
+            labelled = labelled + xr.DataArray(self.dataset["scheme"].values == "explicit", dims="scheme")
+        best = labelled <= labelled.min(self.numerical)
+        return np.asarray(self.usable & best.transpose(*self.axes).values)
+
+    @cached_property
+    def worn(self) -> NDArray[np.float64]:
+        """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
+
+        def last(values: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.where(np.isnan(values[:, -1]), np.fmax.reduce(values, axis=1), values[:, -1])
+
+        return self.over_points("worn_volume", last)
 
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
@@ -135,6 +269,10 @@ class Result(Points):
         reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))
         return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
 
+    def cycle_label(self, index: int) -> str:
+        """A kept cycle count in words."""
+        return show_cycles(float(self.cycles[index]), self.counted)
+
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show: of `best_known` the one with the largest final worn volume.
 
@@ -149,39 +287,32 @@ class Result(Points):
             amplitude = self.dataset["modal_amplitude"].broadcast_like(self.dataset["outcome"])
             measures.insert(0, amplitude.transpose(*self.axes).values)
         elif self.has("response_amplitude"):
-            amplitude = self.read("response_amplitude").isel(cycle=0)
+            amplitude = self.dataset["response_amplitude"].isel(cycle=0)
             measures.insert(0, amplitude.max("response", skipna=False).transpose(*self.axes).values)
         if not self.has_modes and self.has("worn_volume"):
             measures.insert(0, self.worn)
-        has_slow_time = np.ones(self.computed.shape, np.bool_)
+        all_points = has_slow_time = np.ones(self.computed.shape, np.bool_)
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
         wanted = xr.ones_like(self.dataset["outcome"], dtype=bool)
-        for name, value in self.chosen.items():
-            if name in self.varying:
-                wanted = wanted & (self.dataset[name] == value)
-        allowed = np.asarray(wanted.transpose(*self.axes).values)
-        usable, best, all_points = self.usable, self.best_known, np.ones_like(allowed)
-        sets = (best & has_slow_time, usable & has_slow_time, best, self.computed, self.held, all_points)
+        for name in set(self.chosen) & set(self.varying):
+            wanted = wanted & (self.dataset[name] == self.chosen[name])
+        allowed, best = np.asarray(wanted.transpose(*self.axes).values), self.best_known
+        sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.held, all_points)
         points = next(each & allowed for each in sets if (each & allowed).any())
         for measure in measures:
             known = np.where(points & np.isfinite(measure), measure, 0.0)
             if known.max() > 0.0:
                 break
-        return self.point_at(np.unravel_index(int(np.argmax(known)), known.shape))
+        return self.largest(known)
+
+    def largest(self, values: NDArray[Any]) -> dict[str, int]:
+        """The point at which an array of points is largest."""
+        return self.point_at(np.unravel_index(int(np.argmax(values)), values.shape))
 
     def point_at(self, place: Sequence[Any] | NDArray[np.intp]) -> dict[str, int]:
         """The point at a place in an array of points."""
         return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
-
-    @cached_property
-    def course_axis(self) -> str | None:
-        """The axis that figures are drawn over: the frequency, or where it does not vary the first other axis of
-        several numbers; None where nothing but words and samples varies.
-        """
-        numbers = [name for name in self.varying if self.dataset[name].dtype.kind in "iuf" and name != SAMPLE]
-        of_first_rank = [name for name in ("frequency", "modal_amplitude") if name in numbers]
-        return next(iter(of_first_rank + numbers), None)
 
     def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
@@ -193,65 +324,24 @@ class Result(Points):
             if name in kept and name in point
         )
 
-    def cycle_label(self, index: int) -> str:
-        """A kept cycle count in words."""
-        return show_cycles(float(self.cycles[index]), self.counted)
 
-    def when(self, index: int, before: str = "at") -> str:
-        """A kept cycle count in words, with the word `before` it: "at 5 cycles"."""
-        return f"{before} {self.cycle_label(index)}"
-
-
-def as_sentences(*parts: str) -> str:
-    """Text of those parts that are not empty, each ended with a full stop."""
-    return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
+def _in_slabs(values: xr.DataArray, axes: Sequence[str]) -> Iterator[xr.DataArray]:
+    """Parts of a variable along its axes, in their order, of which none is much larger than `_AT_ONCE`."""
+    if values.size <= _AT_ONCE or not axes:
+        yield values
+        return
+    axis, *others = axes
+    length = max(1, _AT_ONCE // (values.size // values.sizes[axis]))
+    for start in range(0, values.sizes[axis], length):
+        yield from _in_slabs(values.isel({axis: slice(start, start + length)}), others if length == 1 else [])
 
 
-def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
-    """The dataset with missions as cycles and without what belongs to single blocks, and these variables or None.
-
-    Responses with a unit of their own in their name, as root stress [MPa], are left out: the others share a scale.
-    """
-    if "response" in dataset.coords:
-        own = np.char.endswith(dataset["response"].values.astype(str), "]")
-        if own.any() and not own.all():
-            close = dataset.close
-            dataset = dataset.isel(response=np.flatnonzero(~own))
-            dataset.set_close(close)
-    if "block" not in dataset.dims:
-        return dataset, None
-    renamed = dataset.rename({name: new for name, new in _LIKE_CYCLES.items() if name in dataset.variables})
-    of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
-    history = renamed.drop_vars(of_blocks)
-    # renaming and dropping variables loses the file to be closed
-    history.set_close(dataset.close)
-    return history, renamed[of_blocks]
-
-
-def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None, measured: Path | None = None) -> Result:
+def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -> Result:
     """Open a result file as the report reads it.
 
-    chosen: values of axes, as text, of the point that figures of a single point show. measured: CSV file of a worn
-    profile. Raises UserError where it is no result of `run-study`, or has no such point.
+    chosen: values of axes, as text, of the point that figures of a single point show. Raises UserError where it is no
+    result of `run-study`, or has no such point.
     """
-    profile = None if measured is None else read_profile(measured)
     dataset, blocks = as_history(open_known(path))
-    values = {name: _find_value(dataset, name, text) for name, text in (chosen or {}).items()}
-    return Result(Path(path), dataset, blocks=blocks, chosen=values, measured=profile)
-
-
-def _find_value(dataset: xr.Dataset, name: str, text: str) -> float | str:
-    """The value of an axis as it is in a file, from its text. Raises UserError."""
-    axes = [str(axis) for axis in dataset["outcome"].dims]
-    remedy = f"give one of the axes {', '.join(axes)}"
-    if name in axes:
-        values = dataset[name].values.tolist()
-        for value in values:
-            try:
-                if value == text or math.isclose(value, float(text), rel_tol=1e-9):
-                    return value  # type: ignore[no-any-return]
-            except (TypeError, ValueError):
-                continue
-        remedy = f"give one of the values of {name}: {', '.join(map(str, values[:12]))}"
-        remedy += ", ..." if len(values) > 12 else ""
-    raise UserError("command line", "--point", f"{name}={text}", remedy)
+    values = {name: find_value(dataset, name, text) for name, text in (chosen or {}).items()}
+    return Result(Path(path), dataset, blocks=blocks, chosen=values)

@@ -54,9 +54,8 @@ def write_result(
     """Writes the result of a study: axes in the order of the study, then cycle or mission, then others.
 
     Points that are not computed yet have the outcome `not_computed`; with such points a finished result stays.
-    completion: the finished histories. target: is replaced as a whole or not at all. arrays: coordinates, and variables
-    that no task computes. origin: attributes of the file. scene: contents of its group. Returns the number of points of
-    each outcome. Raises StorageError.
+    completion: the finished histories. target: is replaced as a whole or not at all. origin: attributes of the file.
+    scene: contents of its group. Returns the number of points of each outcome. Raises StorageError.
     """
     shape = tuple(len(values) for values in study.dimensions.values())
     slab = _slab_shape(shape, completion.kind.itemsize)

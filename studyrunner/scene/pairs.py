@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.scatter.draws import ScatteredPairs
+from studyrunner.scatter import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import draw_pairs, is_of_pairs

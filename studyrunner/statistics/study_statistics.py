@@ -1,7 +1,9 @@
-"""The statistics of a result with samples, as a labelled dataset."""
+"""The statistics of a result with samples, as a labelled dataset and in sentences."""
 
 from __future__ import annotations
 
+import math
+import tomllib
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,27 +11,31 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from studyrunner.scatter import ScatterSection
 from studyrunner.statistics.samples import (
     CYCLE,
     DRAWN,
+    FEWEST,
     SAMPLE,
     Array,
     SampleValues,
+    deciding_pair,
+    density,
     exceedance,
     quantiles,
     rank_correlations,
-    read_inputs,
-    read_samples,
     saltelli_indices,
-    scatter_of,
+    two_groups,
 )
-from studyrunner.statistics.two_groups import deciding_pair, density, two_groups
+from studyrunner.units import show_percent
 
-_N_THRESHOLDS = 41
-_N_DENSITY = 101
-_FEWEST = 2
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show
+_N_THRESHOLDS, _N_DENSITY = 41, 101
 _MOST_VALUES, _MOST_OF_ALL = 10**6, 10**7
 """Worn volumes of a file from which on only some of the cycle counts are used, and none: a million take some 30 s."""
+
+_MM3 = 1e9
+_MEASURES = ("first_index", "rank_correlation")
 
 _Arrays = dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]
 """For each name dimensions, values and attributes, as xarray takes them."""
@@ -71,21 +77,77 @@ def worn_volume_statistics(
     if "cycle_count" in dataset:
         # each point has counts of its own: they share the last one only
         dataset = dataset.isel({CYCLE: [-1]})
-    section = scatter_of(dataset)
-    rows = np.arange(dataset.sizes[SAMPLE])
+    section, rows = _scatter_of(dataset), np.arange(dataset.sizes[SAMPLE])
     is_saltelli = section is not None and section.method == "saltelli"
     if section is not None and is_saltelli:
         # A and B are independent samples
         rows = rows[rows % section.rows_a_sample < 2]
-    everything, names = read_samples(dataset, "worn_volume")
+    everything, names = _read_samples(dataset, "worn_volume")
     values = everything.at((..., rows))
     found, coords = _of_values(dataset, values, rows, names, quantiles, confidence, (exceed, depth))
-    if inputs := read_inputs(dataset):
-        found |= _of_inputs(dataset, everything, confidence, names, is_saltelli=is_saltelli)
-        coords["input"] = ("input", list(inputs), _about("1", "input that scatters"))
+    order = sorted(str(name).removeprefix(DRAWN) for name in dataset.coords if str(name).startswith(DRAWN))
+    if inputs := [*section.inputs] if section is not None else order:
+        found |= _of_inputs(dataset, inputs, everything, confidence, names, is_saltelli=is_saltelli)
+        coords["input"] = ("input", inputs, _about("1", "input that scatters"))
     found |= _of_groups(dataset.isel({SAMPLE: rows}), values, names)
     kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(names)}
     return xr.Dataset(found, kept | coords, {"title": f"Statistics of {len(rows)} samples", "confidence": confidence})
+
+
+def statistics_of_file(dataset: xr.Dataset) -> xr.Dataset | None:
+    """`worn_volume_statistics` at all counts, or at some of these, evenly spaced, where a file has many.
+
+    None without samples, without worn volumes, or with too many of them.
+    """
+    if dataset.sizes.get(SAMPLE, 0) < 2 or "worn_volume" not in dataset:
+        return None
+    counts = dataset.sizes[CYCLE]
+    per_count = dataset["worn_volume"].size // counts
+    if 2 * per_count > _MOST_OF_ALL:
+        return None
+    kept = min(counts, max(2, _MOST_VALUES // per_count))
+    places = np.unique(np.linspace(0, counts - 1, kept).astype(int))
+    return worn_volume_statistics(dataset.isel({CYCLE: places}), _QUANTILES)
+
+
+def _scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
+    """[scatter] of the study of a result; None where there is none that fits the samples of the file."""
+    try:
+        section = ScatterSection.model_validate(tomllib.loads(str(dataset.attrs.get("study", ""))).get("scatter"))
+    except ValueError:
+        return None
+    has_all = all(f"{DRAWN}{name}" in dataset.coords for name in section.inputs)
+    return section if has_all and dataset.sizes[SAMPLE] % section.rows_a_sample == 0 else None
+
+
+def _read_samples(dataset: xr.Dataset, name: str) -> tuple[SampleValues, tuple[str, ...]]:
+    """Samples of a variable of a result, and the dimensions before them: worn_volume, m3, wear_depth_max, m, or
+    wear_depth, m, of which the deepest pair counts, with the largest error of any pair.
+
+    What was not computed lies above the last value that was, without upper bound. What is `sensitive` lies within its
+    error. An error that was never estimated is infinite.
+    """
+    values = dataset[name].astype(float)
+    errors = dataset.get(f"{name}_error", xr.full_like(values, np.inf))
+    if "contact" in values.dims:
+        values, errors = values.max("contact"), errors.max("contact")
+    values, outcome = values.transpose(..., SAMPLE), dataset["outcome"]
+    words = dict(zip(outcome.attrs["flag_meanings"].split(), np.atleast_1d(outcome.attrs["flag_values"]), strict=False))
+    value, missing = values.values, values.isnull().values
+    low, high = np.where(missing, 0.0, value), np.where(missing, np.inf, value)
+    if CYCLE in values.dims:
+        # wear never falls
+        low = np.where(missing, np.maximum.accumulate(low, axis=values.dims.index(CYCLE)), low)
+    error = errors.fillna(np.inf).broadcast_like(values).transpose(*values.dims).values.copy()
+    # nothing worn is known to be nothing
+    error[missing | (value == 0.0)] = 0.0
+    if name == "worn_volume":
+        # its error is relative
+        error *= low
+    sensitive = (outcome == words.get("sensitive", -1)).broadcast_like(values).transpose(*values.dims).values
+    vague = sensitive & ~missing
+    low, high = np.where(vague, np.maximum(low - error, 0.0), low), np.where(vague, high + error, high)
+    return SampleValues(low, high, np.where(vague, 0.0, error)), tuple(map(str, values.dims[:-1]))
 
 
 def _about(units: str, long_name: str) -> dict[str, str]:
@@ -127,7 +189,7 @@ def _of_values(
         (of_depth, "depth", "m", thresholds[1], "probability that a pair is worn deeper before this count"),
     ):
         if variable is not None:
-            whole, own_names = read_samples(dataset, variable)
+            whole, own_names = _read_samples(dataset, variable)
             own = whole.at((..., rows))
             even = np.linspace(0.0, float(own.low.max()) or 1.0, _N_THRESHOLDS)
             above = even if given is None else np.sort(np.atleast_1d(np.asarray(given, dtype=np.float64)))
@@ -139,11 +201,17 @@ def _of_values(
 
 
 def _of_inputs(
-    dataset: xr.Dataset, values: SampleValues, confidence: float, names: tuple[str, ...], *, is_saltelli: bool
+    dataset: xr.Dataset,
+    inputs: Sequence[str],
+    values: SampleValues,
+    confidence: float,
+    names: tuple[str, ...],
+    *,
+    is_saltelli: bool,
 ) -> _Arrays:
-    """What each input decides."""
-    inputs, dims = read_inputs(dataset), (*names, "input")
-    table = np.stack(list(inputs.values()), axis=1)
+    """What each input decides, in the order of the columns of the design; of an input of pairs their mean counts."""
+    drawn, dims = [dataset[f"{DRAWN}{name}"] for name in inputs], (*names, "input")
+    table = np.stack([each.mean([d for d in each.dims if d != SAMPLE]).values for each in drawn], axis=1)
     if is_saltelli:
         words = "share of the variance that the input decides"
         first, total = saltelli_indices(table, values, confidence)
@@ -152,9 +220,8 @@ def _of_inputs(
     words = "rank correlation of the worn volume with the input"
     found = _bands("rank_correlation", words, "1", rank_correlations(table, values, confidence), dims)
     # the mean over the pairs says nothing of what their own draws decide
-    of_pairs = ["contact" in dataset[f"{DRAWN}{name}"].dims for name in inputs]
     for _, ends, _ in found.values():
-        ends[..., of_pairs, :] = np.nan
+        ends[..., ["contact" in each.dims for each in drawn], :] = np.nan
     return found
 
 
@@ -191,17 +258,81 @@ def _of_groups(dataset: xr.Dataset, values: SampleValues, names: tuple[str, ...]
     }
 
 
-def statistics_of_file(dataset: xr.Dataset, quantiles: Sequence[float]) -> xr.Dataset | None:
-    """`worn_volume_statistics` at all counts, or at some of these, evenly spaced, where a file has many.
+# --- in sentences ---
 
-    None without samples, without worn volumes, or with too many of them.
+
+def describe_volumes(point: xr.Dataset) -> str:
+    """Range, median and numerical error of the worn volumes of one point, and two groups where there are."""
+    ends = point["worn_volume_quantile"].values * _MM3
+    probabilities, n_without = point["quantile"].values, int(point["n_without_value"])
+    share = 100.0 * (probabilities[-1] - probabilities[0])
+    text = f"{share:.4g} % of {int(point['n_samples'])} samples wear {_range(ends[0, 0], ends[-1, 1])} mm3"
+    (n_lower, n_upper), (lower, upper) = point["group_size"].values.tolist(), point["group_gap"].values * _MM3
+    if 0.5 in probabilities:
+        middle = ends[probabilities == 0.5][0]
+        moved = point["worn_volume_quantile_error"].values[probabilities == 0.5][0] * _MM3
+        # how far the ends move, apart from what samples without a value may have
+        finite = np.isfinite(middle)
+        by = np.abs(moved[finite] - middle[finite])
+        error = "not known"
+        if finite.any() and np.isfinite(by).all():
+            error = show_percent(float(by.sum() / middle[finite].sum()) if by.any() else 0.0)
+        between = "between two groups, " if n_upper and lower < middle.mean() < upper else ""
+        text += f", median {_range(*middle)} mm3 ({between}numerical error {error})"
+    text += f"; {n_without} have no volume that can be trusted" if n_without else ""
+    if n_upper:
+        rest = int(point["n_samples"]) - n_without - n_lower - n_upper
+        text += f"; two groups, {n_lower} samples up to {lower:.3g} mm3 and {n_upper} from {upper:.3g} mm3"
+        text += f" ({rest} known too badly to tell)" if rest > 0 else ""
+        contact = int(point["deciding_contact"])
+        text += "" if contact < 0 else f", which differ in the wear depth of contact pair {contact}"
+    return text
+
+
+def _range(low: float, high: float, digits: str = ".3g") -> str:
+    first, last = f"{low:{digits}}", f"{high:{digits}}"
+    return f"above {first}" if math.isinf(high) else first if first == last else f"{first} to {last}"
+
+
+def measure_of(statistics: xr.Dataset) -> str | None:
+    """Name of the statistic by which the inputs are ranked; None where there is none."""
+    return next((name for name in _MEASURES if name in statistics), None)
+
+
+def deciding_input(intervals: Array) -> int | None:
+    """Place of the input that decides most, from intervals (n_inputs, 2); None where the samples do not tell.
+
+    They tell where the interval of the strength of one input, a share or a correlation without its sign, is above those
+    of all others.
     """
-    if dataset.sizes.get(SAMPLE, 0) < _FEWEST or "worn_volume" not in dataset:
-        return None
-    counts = dataset.sizes[CYCLE]
-    per_count = dataset["worn_volume"].size // counts
-    if 2 * per_count > _MOST_OF_ALL:
-        return None
-    kept = min(counts, max(2, _MOST_VALUES // per_count))
-    places = np.unique(np.linspace(0, counts - 1, kept).astype(int))
-    return worn_volume_statistics(dataset.isel({CYCLE: places}), quantiles)
+    ends = np.nan_to_num(intervals)
+    least = np.where((ends[:, 0] < 0.0) & (ends[:, 1] > 0.0), 0.0, np.abs(ends).min(axis=1))
+    most = int(np.argmax(least))
+    others = np.delete(np.abs(ends).max(axis=1), most)
+    return most if least[most] > others.max(initial=0.0) else None
+
+
+def describe_ranking(point: xr.Dataset) -> str:
+    """The deciding input in words, or why none is known; "" where no input varies."""
+    name = measure_of(point)
+    if name is None:
+        return ""
+    n_samples, words = int(point["n_samples"]), [str(each).replace("_", " ") for each in point["input"].values]
+    values, intervals = (point[f"{name}{each}"].transpose("input", "bound").values for each in ("", "_interval"))
+    if np.isnan(values).all():
+        # two independent samples for each base sample
+        too_few = n_samples < FEWEST * (2 if name == "first_index" else 1)
+        return f"{n_samples} samples are too few to say which input decides" if too_few else ""
+    without = [word for word, row in zip(words, values, strict=True) if np.isnan(row).all()]
+    inputs = "input" if len(without) == 1 else "inputs"
+    more = f"; {inputs} not ranked: {', '.join(without)}" if without else ""
+    most = int(np.argmax(np.abs(np.nan_to_num(values)).max(axis=1)))
+    (low, high), (lowest, highest) = intervals[most], values[most].tolist()
+    if name == "first_index":
+        share = _range(100.0 * lowest, 100.0 * highest, ".0f")
+        shown = f"{share} % of the variance, interval {100.0 * low:.0f} to {100.0 * high:.0f} %"
+    else:
+        shown = f"rank correlation {_range(lowest, highest, '.2f')}, interval {low:.2f} to {high:.2f}"
+    if deciding_input(intervals) is None:
+        return f"which input decides is not known: {words[most]} has the largest estimate ({shown}){more}"
+    return f"{words[most]} decides most ({shown}){more}"

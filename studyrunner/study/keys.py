@@ -1,7 +1,4 @@
-"""The keys of a study file as text, from the classes that check them: a new study, and the list of STUDY_FILE.md.
-
-`python -m studyrunner.study.keys` prints the list.
-"""
+"""The keys of a study file as text, from the classes that check them: a new study, and a list of all keys."""
 
 from __future__ import annotations
 
@@ -151,7 +148,3 @@ def _words(annotation: object) -> list[str]:
 
 def _is_number(annotation: object) -> bool:
     return annotation in (int, float) or any(map(_is_number, get_args(annotation)))
-
-
-if __name__ == "__main__":
-    print(key_list())

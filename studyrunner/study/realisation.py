@@ -13,8 +13,7 @@ from pydantic import BaseModel
 
 from studies.scenes import scene_with_room
 from studies.scenes.half_space import ExpectedWear
-from studyrunner.scatter.draws import Drawn, ScatteredPairs, drawn
-from studyrunner.scatter.section import OF_PAIRS, Scattered
+from studyrunner.scatter import OF_PAIRS, Drawn, Scattered, ScatteredPairs, drawn
 from studyrunner.study.mission import MissionBlock
 from studyrunner.study.study import NUMBERS, Study
 from studyrunner.user_error import UserError, WrongValueError

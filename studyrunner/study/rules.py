@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 from solver.settings import FIRST_HARMONICS
 from studyrunner.coordinates import SCENE
-from studyrunner.scatter.section import OF_PAIRS
+from studyrunner.scatter import OF_PAIRS
 from studyrunner.study.mistakes import Mistakes, nearest_name
 from studyrunner.study.realisation import is_of_pairs
 from studyrunner.study.sections import AUTO, DEFAULT

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studyrunner.coordinates import SCENE
-from studyrunner.scatter.section import ScatterSection
+from studyrunner.scatter import ScatterSection
 from studyrunner.study.mistakes import nearest_name
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import (
@@ -234,7 +234,7 @@ class OutputsSection(Section):
     """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
     variables: Annotated[Listed[str], BeforeValidator(_check_variables), AfterValidator(once)] = Field(
-        (DEFAULT,), description="list of names; default: the usual ones, see RESULT_FILE.md"
+        (DEFAULT,), description="list of names; default: those that cost little"
     )
     loops: Annotated[
         Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]],

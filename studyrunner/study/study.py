@@ -13,7 +13,7 @@ from pydantic import Field
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.scatter.section import ScatterSection
+from studyrunner.scatter import ScatterSection
 from studyrunner.study.mission import OWN_AXES, MissionBlock
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.scene_section import SceneSection

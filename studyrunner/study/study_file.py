@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
-from studyrunner.scatter.section import flat_table
+from studyrunner.scatter import flat_table
 from studyrunner.study.mission import OWN_AXES, MissionBlock, engine_frequency, read_blocks
 from studyrunner.study.mistakes import Mistakes, check_table, close_name, nearest_name
 from studyrunner.study.overrides import override

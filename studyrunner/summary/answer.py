@@ -15,12 +15,11 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, list_ended
-from studyrunner.result.points import COMPLETE_WORDS
-from studyrunner.result.scene_pairs import contact_pairs
-from studyrunner.result.units import show_number
-from studyrunner.result.view import Result, as_history
+from studyrunner.result.opening import as_history
+from studyrunner.result.pairs import contact_pairs
+from studyrunner.result.view import COMPLETE_WORDS, Result
 from studyrunner.statistics.samples import SAMPLE
-from studyrunner.statistics.sentence import describe_ranking, describe_volumes
+from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
 from studyrunner.summary.wear import (
     Life,
     MeshChange,
@@ -33,6 +32,7 @@ from studyrunner.summary.wear import (
     vibration_of,
     where_is,
 )
+from studyrunner.units import show_number
 
 SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
@@ -110,6 +110,8 @@ def summarise(result: Result) -> Summary:
     if result.has_modes:
         return Summary(*numbers, certainty_of(result), modes=_modes(result))
     wear = most_wear(result)
+    of_scenes = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
+    stuck = float(of_scenes) if of_scenes.ndim == 0 else math.nan
     return Summary(
         *numbers,
         certainty_of(result, wore=not isinstance(wear, NothingWore)),
@@ -118,8 +120,8 @@ def summarise(result: Result) -> Summary:
         vibration_of(result, wear),
         shortest_life(result),
         compare_meshes(result),
-        stuck_frequency=result.stuck_frequency,
-        doubts=tuple(filter(None, (_not_small(result), _in_radians(result)))),
+        stuck_frequency=stuck,
+        doubts=tuple(filter(None, (_not_small(result), _in_radians(result, stuck)))),
     )
 
 
@@ -130,7 +132,7 @@ def _samples(result: Result) -> Samples | None:
     last = statistics.isel(cycle=-1, missing_dims="ignore")
     medians = last["worn_volume_quantile"].sel(quantile=0.5).isel(bound=0)
     place = np.unravel_index(int(np.argmax(medians.values)), medians.shape)
-    point = {str(name): int(index) for name, index in zip(medians.dims, place, strict=True)}
+    point = dict(zip(map(str, medians.dims), map(int, place), strict=True))
     where = result.describe(point, [name for name in result.varying if name != SAMPLE])
     of_all = last.isel(point)
     return Samples(where, int(medians.size), describe_volumes(of_all), describe_ranking(of_all))
@@ -145,7 +147,8 @@ def _modes(result: Result) -> tuple[ModeRange, ...]:
         computed = result.computed.take(index, axis=axis)
         ranges = {}
         for name in ("natural_frequency", "damping_ratio"):
-            values = result.read(name).values.take(index, axis=axis)[computed] if result.has(name) else np.zeros(0)
+            values = result.dataset[name].values.take(index, axis=axis) if result.has(name) else np.zeros(0)
+            values = values[computed] if values.size else values
             ranges[name] = (float(values.min()), float(values.max())) if values.size else (math.nan, math.nan)
         frequency, damping = ranges.values()
         found.append(ModeRange(int(number), over, frequency, damping, int(computed.sum()), computed.size))
@@ -159,10 +162,10 @@ def _failures(result: Result) -> tuple[Failure, ...]:
         ending = result.endings[number]
         if ending.word == "converged":
             continue
-        reason, (place, *_) = next(iter(list_ended(result, number).items()))
+        reason, (point, *_) = next(iter(list_ended(result, number).items()))
         sentence = re.split(r"[.:](?:\s|$)", ending.sentence)[0]
         advice = " ".join(advise_ended(result, number)[:1]).rstrip(".")
-        where = where_is(result, result.point_at(place)) if result.varying else ""
+        where = where_is(result, point) if result.varying else ""
         # what the message of a sensitive one holds is no result
         reason = "" if ending.word == "sensitive" else reason
         is_complete = ending.word in COMPLETE_WORDS
@@ -183,19 +186,17 @@ def _not_small(result: Result) -> str:
     pairs = contact_pairs(result, result.shown_point())
     areas = [float(np.nansum(pairs.area[pairs.surface == surface])) for surface in np.unique(pairs.surface)]
     width = math.sqrt(min((area for area in areas if area > 0.0), default=math.inf))
-    ratios = np.nan_to_num(np.where(result.computed, result.read("largest_wear_depth").values, 0.0) / width)
+    ratios = np.nan_to_num(np.where(result.computed, result.dataset["largest_wear_depth"].values, 0.0) / width)
     if ratios.max() <= SMALL:
         return ""
-    point = result.point_at(np.unravel_index(int(np.argmax(ratios)), ratios.shape))
     return (
         f"the method assumes shallow wear, but the depth is {ratios.max():.2g} of the contact width at"
-        f" {where_is(result, point)}: take fewer cycles, and check that wear_coefficient is in 1/Pa"
+        f" {where_is(result, result.largest(ratios))}: take fewer cycles, and check that wear_coefficient is in 1/Pa"
     )
 
 
-def _in_radians(result: Result) -> str:
-    """Frequencies that are all far above the first resonance, and near it if they are in rad/s."""
-    first = result.stuck_frequency
+def _in_radians(result: Result, first: float) -> str:
+    """Frequencies that are all far above the first resonance, Hz, and near it if they are in rad/s."""
     if math.isnan(first) or "frequency" not in result.axes:
         return ""
     values = result.dataset["frequency"].values / (2.0 * math.pi)

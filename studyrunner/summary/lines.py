@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from studyrunner.percent import show_percent
-from studyrunner.result.units import scale_for, show_cycles, show_number
 from studyrunner.summary.answer import Failure, ModeRange, Samples, Summary
-from studyrunner.summary.wear import Deepest, Life, MostWear, NothingWore, Number, Vibration
+from studyrunner.summary.wear import Deepest, Life, MeshChange, MostWear, NothingWore, Number, Vibration
 from studyrunner.system.progress import count
+from studyrunner.units import scale_for, show_cycles, show_number, show_percent
 
 MOST_LINES = 9
 _MOST_FAILURES, _MOST_MODES, _MOST_DOUBTS = 2, 4, 1
@@ -49,7 +48,7 @@ def summary_rows(summary: Summary) -> tuple[tuple[str, str], ...]:
     if summary.life is not None:
         rows.append(("life", _life(summary.life, summary)))
     if summary.mesh is not None:
-        rows.append(("mesh", _mesh(summary)))
+        rows.append(("mesh", _mesh(summary.mesh)))
     for each in summary.failures[:_MOST_FAILURES]:
         rows.append(("uncertain" if each.is_complete else "failed", _failure(each, summary.n_points)))
     if left := summary.failures[_MOST_FAILURES:]:
@@ -171,9 +170,7 @@ def _mode(mode: ModeRange) -> str:
     return f"natural frequency {frequency} Hz, damping ratio {damping}{over}{found}"
 
 
-def _mesh(summary: Summary) -> str:
-    mesh = summary.mesh
-    assert mesh is not None
+def _mesh(mesh: MeshChange) -> str:
     coarse, fine = (show_number(each) for each in mesh.meshes)
     text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(mesh.median)} {mesh.at}"
     return f"{text}, at most {show_percent(mesh.largest)}" if mesh.largest > mesh.median else text

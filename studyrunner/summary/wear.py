@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.result.points import WELL_ENOUGH
-from studyrunner.result.scene_pairs import contact_pairs, last_depth, tells_depth
-from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
+from studyrunner.result.view import NO_VOLUME, WELL_ENOUGH, Point, Result
 
 _NO_MOTION = 1e-12  # m, round-off: less than the size of an atom
 
@@ -94,7 +92,7 @@ class MeshChange:
     largest: float
 
 
-def where_is(result: Result, point: dict[str, int]) -> str:
+def where_is(result: Result, point: Point) -> str:
     """A point in words, along the axes that vary; where none does, its frequency."""
     return result.describe(point, result.varying or ("frequency",))
 
@@ -107,14 +105,14 @@ def most_wear(result: Result) -> MostWear | NothingWore | None:
     worn = np.where(best, result.worn, -1.0)
     if worn.max() <= NO_VOLUME:
         return _nothing(result, best)
-    place = np.unravel_index(int(np.argmax(worn)), worn.shape)
-    point, volume = result.point_at(place), float(worn[place])
-    at, blocks = result.last_kept(point), result.blocks
+    point = result.largest(worn)
+    place, at = tuple(point.values()), result.last_kept(point)
+    volume = float(worn[place])
     # points that differ in more than steps
     known = xr.DataArray(best, dims=result.axes).any(result.numerical).values
     shares: tuple[tuple[str, float], ...] = ()
-    if blocks is not None and "block_worn_volume" in blocks:
-        own = blocks["block_worn_volume"].isel(point).isel(cycle=at)
+    if result.blocks is not None and "block_worn_volume" in result.blocks:
+        own = result.blocks["block_worn_volume"].isel(point).isel(cycle=at)
         shares = tuple(zip(own["block"].values.tolist(), (own.values / volume).tolist(), strict=True))
     return MostWear(
         point=point,
@@ -128,11 +126,11 @@ def most_wear(result: Result) -> MostWear | NothingWore | None:
     )
 
 
-def _deepest(result: Result, point: dict[str, int], at: int) -> Deepest:
+def _deepest(result: Result, point: Point, at: int) -> Deepest:
     def read(name: str, *index: int) -> float:
         return float(result.at(name, point, at).values[index]) if result.has(name) else math.nan
 
-    if not tells_depth(result):
+    if not has_depths(result):
         return Deepest(Number(read("largest_wear_depth")))
     depth = np.nan_to_num(last_depth(result, point), nan=0.0)
     pair, pairs = int(np.argmax(depth)), contact_pairs(result, point)
@@ -155,14 +153,12 @@ def _nothing(result: Result, best: NDArray[np.bool_]) -> NothingWore:
         largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=(1, 2)))
         slip = float(largest[best].max())
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
-    words = "points"
-    if len(result.varying) == 1:
-        words = {"frequency": "frequencies", "sample": "samples"}.get(result.varying[0], words)
-    at = "in" if words == "samples" else "at"
+    only = result.varying[0] if len(result.varying) == 1 else ""
+    words = {"frequency": "at {} frequencies", "sample": "in {} samples"}.get(only, "at {} points")
     if n_computed < n_points:
-        where = f"{at} {n_computed} of {n_points} {words}, the others have no result"
+        where = f"{words.format(f'{n_computed} of {n_points}')}, the others have no result"
     elif n_points > 1:
-        where = f"{at} all {n_points} {words}"
+        where = words.format(f"all {n_points}")
     else:
         where = f"at {where_is(result, result.shown_point()) or 'the only point'}"
     return NothingWore(0.0 if slip < _NO_MOTION else slip, where)
@@ -174,7 +170,7 @@ def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibrati
     place = tuple(point[name] for name in result.axes)
     if result.blocks is not None or not result.has("response_amplitude") or not result.computed[place]:
         return None
-    ends: Any = [0, result.last_kept(point)]
+    ends = [0, result.last_kept(point)]
     amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
     of = int(np.argmax(amplitude[0]))
     values = np.where(amplitude[:, of] > _NO_MOTION, amplitude[:, of], 0.0)
@@ -184,14 +180,14 @@ def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibrati
     name, where = result.responses[of], where_is(result, point)
     if result.followed and result.has("excitation_frequency"):
         first, last = result.at("excitation_frequency", point, ends).values.tolist()
-        followed_error = "excitation_frequency_error"
-        error = float(result.at(followed_error, point, ends[1])) if result.has(followed_error) else math.nan
+        known = result.has("excitation_frequency_error")
+        error = float(result.at("excitation_frequency_error", point, ends[1])) if known else math.nan
         return Vibration(name, where, result.followed, (first, Number(last, error)), (new, worn))
     frequency, peak = _peak(result, point, of)
     return Vibration(name, where, "", (frequency, Number(math.nan)), (new, worn), peak)
 
 
-def _peak(result: Result, point: dict[str, int], of: int) -> tuple[float, float]:
+def _peak(result: Result, point: Point, of: int) -> tuple[float, float]:
     """Frequency, Hz, and amplitude, m, of the largest response of the unworn joint; NaN at the ends of the range."""
     if result.dataset.sizes.get("frequency", 1) < 3:
         return math.nan, math.nan
@@ -213,15 +209,16 @@ def shortest_life(result: Result) -> Life | None:
         return None
     (quantity, target), *_ = until.items()
     found = result.computed & ~result.ended("sensitive")
-    lives, errors = (result.read(name).values for name in ("cycles_to_target", "cycles_to_target_error"))
+    lives, errors = (result.dataset[name].values for name in ("cycles_to_target", "cycles_to_target_error"))
     unsure = found & (errors > WELL_ENOUGH * lives)
     counts = int(np.count_nonzero(found & np.isnan(lives))), int(np.count_nonzero(unsure))
     lives = np.where(found & ~unsure, lives, np.nan)
-    if np.isnan(lives).all():
-        return Life(str(quantity), float(target), Number(math.nan), "", *counts)
-    place = np.unravel_index(int(np.nanargmin(lives)), lives.shape)
-    shortest = Number(float(lives[place]), float(errors[place]))
-    return Life(str(quantity), float(target), shortest, where_is(result, result.point_at(place)), *counts)
+    shortest, where = Number(math.nan), ""
+    if not np.isnan(lives).all():
+        point = result.largest(-np.nan_to_num(lives, nan=np.inf))
+        place = tuple(point.values())
+        shortest, where = Number(float(lives[place]), float(errors[place])), where_is(result, point)
+    return Life(str(quantity), float(target), shortest, where, *counts)
 
 
 def compare_meshes(result: Result) -> MeshChange | None:

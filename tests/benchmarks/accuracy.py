@@ -22,7 +22,6 @@ CANTILEVERS = [  # spring, force, N, frequency, rad/s
 
 
 def exact_states(rtol: float) -> None:
-    """The textbook scenes."""
     columns = ("amplitude", "response", "estimate", "wear rate", "estimate", "harmonics", "samples", "iterations")
     table = Table(f"rtol {rtol:g}", *columns, "good")
     for name, (scene, sweep) in textbook_scenes().items():
@@ -33,7 +32,6 @@ def exact_states(rtol: float) -> None:
 
 
 def cantilevers(rtol: float) -> None:
-    """The cantilever, whose exact motion takes a while."""
     table = Table(f"rtol {rtol:g}", "N", "rad/s", "response", "peak", "estimate", "good")
     for name, force, omega in CANTILEVERS:
         model, settings = Cantilever(spring=SPRINGS[name]).model(), SolverSettings(rtol=rtol)
@@ -45,7 +43,6 @@ def cantilevers(rtol: float) -> None:
 
 
 def main() -> None:
-    """Prints the tables."""
     given = arguments(__doc__, ("exact", "cantilevers"), rtol=[1e-2, 1e-3])
     for rtol in given.rtol:
         for word, show in (("exact", exact_states), ("cantilevers", cantilevers)):

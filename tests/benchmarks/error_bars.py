@@ -142,7 +142,6 @@ def random_joints(n: int) -> None:
 
 
 def main() -> None:
-    """Everything that is asked for."""
     given = arguments(__doc__, mesh=[1], diameter=[0], stuck_modes=20, random=0, step=STEPS, frequency=[0.0])
     for mesh, diameter in product(given.mesh, given.diameter):
         model = scene("dovetail_sector", HARMONICS, mesh=mesh, nodal_diameter=diameter, stuck_modes=given.stuck_modes)

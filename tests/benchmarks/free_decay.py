@@ -49,7 +49,6 @@ def decay_of(signal, step):
 
 
 def main():
-    """Prints the table."""
     model = build_scene("dovetail_sector", mesh=1)
     structure = build(model, 0.5, 212.7, 0.0, STEPS)
     begun = push_mode(structure, at_rest(model, structure, model.contact.gap), LET_GO + 0j)

@@ -48,7 +48,6 @@ def compute_variant(mesh: int, seed: int, frequencies: list[float]) -> list[tupl
 
 
 def main() -> None:
-    """All variants, one after the other."""
     given = arguments(__doc__, mesh=1, noise=20, frequency=[0.0], one=-1)
     frequencies = given.frequency if any(given.frequency) else list(FREQUENCIES[given.mesh])
     if given.one >= 0:

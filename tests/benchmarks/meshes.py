@@ -18,7 +18,6 @@ SHARES = [0.99556, 0.99676, 0.99735, 0.99794, 0.99853, 0.99912, 1.00029]  # f/f_
 
 
 def main() -> None:
-    """A row for each mesh and frequency."""
     given = arguments(__doc__, mesh=[1, 2, 3], share=SHARES, records=None, picture=None)
     columns = ("f/f_1", "worn volume, mm3", "error", "outcome", "tip, mm", "worn tip, mm", "CPU s")
     table, settings = Table("model", *columns, file=given.records), SolverSettings()

@@ -37,7 +37,6 @@ Row = tuple[str, str, float, float]
 def wear_histories(
     model: ReducedModel, at: tuple[float, float], rtols: tuple[float, ...], steps: tuple[float, ...]
 ) -> Iterator[Row]:
-    """All runs of the solver."""
     asked = [(f"rtol {rtol:g}", {"settings": SolverSettings(rtol=rtol)}) for rtol in rtols]
     for scheme in ("implicit", "explicit"):
         asked += [(f"step {step:g}", {"scheme": scheme, "step": step}) for step in steps]
@@ -88,7 +87,6 @@ def least_time(runs: list[Row], truth: float, target: float) -> float | None:
 
 
 def main() -> None:
-    """For each scene all runs, and what an error costs with each method."""
     given = arguments(__doc__, tuple(CASES), picture=None)
     for name in given.chosen:
         (kind, values, *case), (n_steps, periods, each) = CASES[name], IN_TIME[name]

@@ -83,7 +83,6 @@ def settle(notebook: NotebookNode) -> NotebookNode:
 
 
 def main() -> None:
-    """Remakes the outputs of the notebooks that are named."""
     result, *names = sys.argv[1:]
     for path in NOTEBOOKS:
         if names and path.stem not in names:

@@ -8,14 +8,13 @@ the cores of this machine. Wanted: at most 0.5 ms of the processor of rank 0 of 
 """
 
 import re
-import sys
 import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from tests.benchmarks.frame import Table, arguments
-from tests.mpi.launching import FAKED, launcher, run_command
+from tests.mpi.launching import FAKED, options, run_to_end
 
 FREQUENCIES = 10
 
@@ -39,16 +38,15 @@ def run(n_ranks: int, n_points: int, folder: Path, name: str = "out.nc", outputs
         "outputs.variables=['worn_volume']",
         "solver.shortcuts=false",
     )
-    command = [*launcher(n_ranks), sys.executable, FAKED, "sdof_slider", *(f"--set={change}" for change in changes)]
+    study = [FAKED, "sdof_slider", *options(*changes), "-o", name]
     began = time.perf_counter()
-    done = run_command([*command, "-o", name], folder, {"FAKE_NOTHING": "1"})
-    assert done.returncode == 0, done.stderr
-    ((memory, of_rank_0),) = re.findall(r"rank 0: (\d+) KiB, (\S+) s", done.stderr)
+    ended = run_to_end(n_ranks, study, folder, {"FAKE_NOTHING": "1"})
+    assert ended.status == 0, ended.said
+    ((memory, of_rank_0),) = re.findall(r"rank 0: (\d+) KiB, (\S+) s", ended.said)
     return Spent(time.perf_counter() - began, float(of_rank_0), int(memory) / 1024)
 
 
 def main() -> None:
-    """Prints a row for one process and one for 4 ranks."""
     n_points = arguments(__doc__, points=10_000).points
     table = Table("per point", "ms", "ms of rank 0", "MiB in all")
     with tempfile.TemporaryDirectory() as name:

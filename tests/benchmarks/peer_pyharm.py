@@ -1,9 +1,8 @@
 """Curves of `peers` by pyHarm, in its environment: prints JSON. pyHarm is made for large joints, not for one slider.
 
-On the dovetail `Penalty3D` is pyHarm's: a spring closes the gap, friction of Coulomb behind springs follows the normal
-force. `Rigid` is the law of its rigid contact, `DLFT3D`, which between a body and the ground divides the force by two
-bodies and lacks the derivative of the linear forces in its Jacobian: the ground counts as no body, and the derivative
-is there.
+On the dovetail `Rigid` is the law of pyHarm's rigid contact, `DLFT3D`, which between a body and the ground divides the
+force by two bodies and lacks the derivative of the linear forces in its Jacobian: here the ground counts as no body,
+and the derivative is there.
 
 pyHarm's closing is negative: the normal displacements change their sign.
 """
@@ -25,7 +24,6 @@ from pyHarm.Elements.SubstructureMatrixElements.MatrixElement import MatrixEleme
 from pyHarm.Systems.System import System  # type: ignore[import-not-found]
 
 ARC = 20.0  # rad/s along the curve of the slider: steps of about 3 Hz
-PRESSED = 1e-9  # N; pyHarm's Penalty3D takes a pair that is pressed, with none it has friction only where it is open
 _slopes = jax.jit(jax.jacfwd(DLFTFriction3DResidual_jax, argnums=(0, 2)))
 
 
@@ -105,9 +103,7 @@ def slider(asked: dict[str, Any]) -> dict[str, Any]:
 def dovetail(asked: dict[str, Any], model: dict[str, Any]) -> dict[str, Any]:
     """The input of pyHarm for pairs of three displacements, then modes."""
     n_pairs, omega = asked["pairs"], 2.0 * np.pi * np.array(asked["frequency"])
-    springs = {"k_n": asked["stiffness"], "k_t": asked["stiffness"], "N0": PRESSED}
-    law = springs if asked["element"] == "Penalty3D" else {"eps": asked["stiffness"], "N0": 0.0}
-    pair = {"type": asked["element"], "mu": asked["friction"], "g": 0.0, "dirs": [0, 1, 2], **law}
+    pair = {"type": "Rigid", "eps": asked["penalty"], "mu": asked["friction"], "N0": 0.0, "g": 0.0, "dirs": [0, 1, 2]}
     matrix = {name: model[name] for name in "MCK"} | {"G": np.zeros_like(model["M"])}
     body = {"matrix": matrix, "ndofs": 3, "nnodes": n_pairs, "nmodes": len(model["M"]) - 3 * n_pairs}
     connectors = {
@@ -119,7 +115,7 @@ def dovetail(asked: dict[str, Any], model: dict[str, Any]) -> dict[str, Any]:
     course = {"predictor": "previous", "corrector": "nocontinuation", "ds0": step, "ds_max": step}
     course |= {"ds_min": step / 64.0, "puls_inf": float(omega[0]), "puls_sup": float(omega[-1]) - 1e-3 * step}
     parts = {"plugin": [Load, Rigid, WholeSlope], "substructures": {"root": body}, "connectors": connectors}
-    return study_of(asked, parts, newton, course, "WholeSlope" if asked["element"] == "Rigid" else "Base")
+    return study_of(asked, parts, newton, course, "WholeSlope")
 
 
 def study_of(

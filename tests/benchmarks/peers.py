@@ -5,8 +5,8 @@
 Slider: one response curve of a mass of 0.1 kg on a mount (1.6e5 N/m, 20 N s/m) under 10 N, held by friction of 5 N, at
 27 frequencies from 120 to 250 Hz: rigid friction, and elastic friction behind a spring of 1.6e6 N/m, against the exact
 motion. Dovetail: 16 pairs, 0.5 N, friction 0.5, unworn, 25 frequencies from 211 to 214 Hz, against a start state of
-this project with 25 harmonics and `rtol` 1e-4, which `time_integration` confirms. Other programs get the model, the
-first state of the own curve as their first guess, and springs or penalties; no friction history.
+this project with 25 harmonics and `rtol` 1e-4, which `time_integration` confirms. pyHarm gets the model, the first
+state of the own curve as its first guess, and a penalty; no friction history.
 
 Printed are the CPU time of the second of two equal runs (compiling is left out), the iterations really made, and the
 error of the first harmonic at the frequencies that the program has chosen; the same in `peers.csv` of the folder.
@@ -43,17 +43,10 @@ MASS, DAMPING, MOUNT, FORCE, FRICTION, SPRING = 0.1, 20.0, 1.6e5, 10.0, 5.0, 1.6
 SLIDER = {"mass": MASS, "damping": DAMPING, "mount": MOUNT, "force": FORCE, "friction": FRICTION, "spring": SPRING}
 SLIDER_FREQUENCIES, FREQUENCIES = np.linspace(120.0, 250.0, 27), np.linspace(211.0, 214.0, 25)
 LOAD, MU = 0.5, 0.5  # of the dovetail: N, 1
-STRUCTURE = 2e8  # N/m: what the bodies resist a displacement of one pair with, 1.1e8 to 3.4e8
-HARMONICS, SAMPLES = (5, 13), 256
+PENALTY = 2e8  # N/m, of other programs: what the bodies resist a displacement of one pair with is 1.1e8 to 3.4e8
+HARMONICS, SAMPLES = 13, 256
 NEWTON = {"tolerance": 1e-6, "most": 25}  # of the residual, N, and iterations; a curve that converges takes ten
 PYHARM, JAX = ("pyharm-os==1.2.2",), ("jax[cpu]", "scipy")
-ELEMENTS = (
-    ("pyHarm", "Penalty3D", "springs", STRUCTURE, 5),
-    ("pyHarm", "Penalty3D", "springs", 10.0 * STRUCTURE, 5),
-    *(("pyHarm", "Rigid", "rigid, own element", STRUCTURE, harmonics) for harmonics in HARMONICS),
-    ("tmdsimpy", "ElasticDryFriction3D", "springs", STRUCTURE, 5),
-)
-"""Program and its element for the dovetail, words for the table, springs or penalty, N/m, harmonics."""
 # One core, as the own curves. With the 32 bits that JAX takes unless told otherwise Newton's method does not converge.
 _SURROUNDINGS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_ENABLE_X64": "1"}
 Curve = dict[str, Any]
@@ -74,7 +67,6 @@ def exact(kind: str, frequency: float) -> float:
 
 
 def show(table: Table, name: str, harmonics: int | str, curve: Curve, truth: Truth) -> None:
-    """A row of the table."""
     frequencies, amplitudes = np.array(curve["frequency"]), np.array(curve["amplitude"])
     if not frequencies.size:
         table.row(name, harmonics, 0, curve.get("failed", 0), *6 * [None])
@@ -87,8 +79,7 @@ def show(table: Table, name: str, harmonics: int | str, curve: Curve, truth: Tru
 
 
 def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArray, force: float, truth: Truth) -> None:
-    """The rows of this project."""
-    for harmonics in (*HARMONICS, "auto"):
+    for harmonics in (HARMONICS, "auto"):
         settings = SolverSettings(harmonics=harmonics, samples="auto" if harmonics == "auto" else SAMPLES)
         asked = (model, frequencies, force, MU)
         runs = [measure(lambda: frequency_response(*asked, settings=settings)) for _ in range(2)]  # noqa: B023
@@ -100,7 +91,6 @@ def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArr
 
 
 def slider(table: Table, programs: dict[str, Program]) -> None:
-    """The rows of the slider."""
     asked = {**SLIDER, "first": 120.0, "last": 250.0, "n_frequencies": 27, "samples": SAMPLES}
     asked["frequency"] = SLIDER_FREQUENCIES.tolist()
     for kind in ("elastic", "rigid"):
@@ -112,13 +102,10 @@ def slider(table: Table, programs: dict[str, Program]) -> None:
 
         own_rows(table, f"slider, {kind}", model, SLIDER_FREQUENCIES, FORCE, truth)
         for name in programs if kind == "elastic" else ("pyHarm",):
-            for harmonics in HARMONICS:
-                label = f"{name}, slider, {kind}"
-                peer_row(table, label, programs[name], harmonics, {**asked, "kind": kind}, truth)
+            peer_row(table, f"{name}, slider, {kind}", programs[name], {**asked, "kind": kind}, truth)
 
 
 def dovetail(table: Table, programs: dict[str, Program], folder: Path) -> None:
-    """The rows of the dovetail."""
     model = build_scene("dovetail_sector", mesh=1)
 
     @cache
@@ -131,33 +118,28 @@ def dovetail(table: Table, programs: dict[str, Program], folder: Path) -> None:
 
     own_rows(table, "dovetail, rigid", model, FREQUENCIES, LOAD, truth)
     file = folder / "dovetail.npz"
-    asked = {"file": str(file), "pairs": model.contact.n_contact, "friction": MU, "samples": SAMPLES, **NEWTON}
-    asked["frequency"] = FREQUENCIES.tolist()
-    for name, element, words, stiffness, harmonics in ELEMENTS:
-        write_model(file, model, 0.0 if "rigid" in words else 1.0 / stiffness, harmonics)
-        label, wanted = f"{name}, dovetail, {words}, {stiffness:.0e}", {"element": element, "stiffness": stiffness}
-        peer_row(table, label, programs[name], harmonics, {**asked, **wanted}, truth)
+    write_model(file, model)
+    asked = {"file": str(file), "pairs": model.contact.n_contact, "friction": MU, "penalty": PENALTY, **NEWTON}
+    asked |= {"samples": SAMPLES, "frequency": FREQUENCIES.tolist()}
+    peer_row(table, "pyHarm, dovetail, own rigid element", programs["pyHarm"], asked, truth)
 
 
-def write_model(file: Path, model: ReducedModel, compliance: float, harmonics: int) -> None:
+def write_model(file: Path, model: ReducedModel) -> None:
     """Matrices, loads, response and first guess as arrays in a file; pairs first, normal before tangents.
 
-    The first guess is the state of the own curve at the first frequency, mean and first harmonic. With springs a pair
-    closes by its normal force times their compliance, m/N.
+    The first guess is the state of the own curve at the first frequency, mean and first harmonic.
     """
     linear, omega = model.linear[0], 2.0 * np.pi * FREQUENCIES[0]
     mass, damping, stiffness = (np.real(part) for part in (linear.mass, linear.damping, linear.stiffness))
     state = branch_states(model, MU, LOAD, [omega], SolverSettings())[0].state
     n, joint, cosine = len(mass), model.contact.dofs.size, LOAD * np.real(linear.load_harmonic)
-    guess, closing = np.zeros((2 * harmonics + 1, n)), np.array([compliance, 0.0, 0.0])
+    guess = np.zeros((2 * HARMONICS + 1, n))
     for order, load in ((0, linear.load_static), (1, cosine)):
         impedance = stiffness + 1j * order * omega * damping - (order * omega) ** 2 * mass
-        moved, force = (
-            part[..., 0] + 0.0j if order == 0 else part[..., 1] - 1j * part[..., 2]
-            for part in (state.displacement_h, state.contact_force_h)
-        )
-        free = np.linalg.solve(impedance[joint:, joint:], load[joint:] - impedance[joint:, :joint] @ moved.ravel())
-        whole = np.concatenate([(moved + closing * force).ravel(), free])
+        parts = state.displacement_h
+        moved = (parts[..., 1] - 1j * parts[..., 2] if order else parts[..., 0] + 0.0j).ravel()
+        free = np.linalg.solve(impedance[joint:, joint:], load[joint:] - impedance[joint:, :joint] @ moved)
+        whole = np.concatenate([moved, free])
         guess[order] = whole.real
         if order:
             guess[2] = -whole.imag
@@ -174,17 +156,14 @@ def environment(folder: Path, packages: tuple[str, ...]) -> str:
     return str(python)
 
 
-def peer_row(table: Table, label: str, program: Program, harmonics: int, asked: dict[str, Any], truth: Truth) -> None:
+def peer_row(table: Table, label: str, program: Program, asked: dict[str, Any], truth: Truth) -> None:
     """A row of another program, from what its script prints last; a sentence where it is not to be had."""
     try:
         command, script, more = program()
-        command = [
-            *command,
-            str(Path(__file__).with_name(script)),
-            json.dumps({**asked, "harmonics": harmonics, **more}),
-        ]
+        given = json.dumps({**asked, "harmonics": HARMONICS, **more})
         with tempfile.TemporaryDirectory() as folder:  # pyHarm writes where it runs
             surroundings = {**os.environ, **_SURROUNDINGS}
+            command = [*command, str(Path(__file__).with_name(script)), given]
             done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=surroundings)
     except (subprocess.CalledProcessError, FileNotFoundError) as error:
         said = (getattr(error, "stderr", None) or str(error)).strip().splitlines() or ["no message"]
@@ -192,11 +171,10 @@ def peer_row(table: Table, label: str, program: Program, harmonics: int, asked: 
         line = next((line for line in said if line.startswith("error: ")), said[-1])
         print(f"{label} is not run here: {line}")
     else:
-        show(table, label, harmonics, json.loads(done.stdout.splitlines()[-1]), truth)
+        show(table, label, HARMONICS, json.loads(done.stdout.splitlines()[-1]), truth)
 
 
 def main() -> None:
-    """Builds the environments and prints the table."""
     home = str(Path.home() / ".cache" / "fretwear_peers")
     given = arguments(__doc__, ("slider", "dovetail"), folder=home, tmdsimpy=None, nlvib=None)
     folder = Path(given.folder).resolve()

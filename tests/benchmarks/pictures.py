@@ -93,7 +93,6 @@ def drawings_of(path: str, names: tuple[str, ...]) -> dict[str, Drawing]:
 
 
 def main() -> None:
-    """Writes pictures and numbers of the results that are named."""
     dovetail, *precision = sys.argv[1:]
     drawings = drawings_of(dovetail, NAMES)
     figures = {

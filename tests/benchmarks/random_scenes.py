@@ -62,14 +62,12 @@ def solved(record: dict[str, Any]) -> bool:
 
 
 def small_scene(seed: int, _: int) -> dict[str, Any]:
-    """A scene of `tests.random_scenes`."""
     drawn = random_scene(seed)
     record = run_scene(drawn)
     return {**record, "facts": drawn.facts, "solved": solved(record), "ended": f"{record['first']}, {record['march']}"}
 
 
 def sector_point(seed: int, mesh: int) -> dict[str, Any]:
-    """A point of the bundled dovetail sector with a mesh."""
     random = np.random.default_rng([SALT, seed])
     diameter, friction = int(random.integers(0, 24)), float(random.uniform(0.1, 0.8))
     amplitude, ratio = log_uniform(random, 0.1, 3.0), float(random.uniform(0.98, 1.02))
@@ -88,7 +86,6 @@ def sector_point(seed: int, mesh: int) -> dict[str, Any]:
 
 
 def blocks(seed: int, _: int) -> dict[str, Any]:
-    """A model of `tests.random_decks`."""
     deck = random_deck(seed)
     exists, outcome, errors = run_deck(deck)
     ended = f"static state {exists}, {outcome.meaning}"
@@ -99,7 +96,6 @@ KINDS = {"scenes": small_scene, "sector": sector_point, "blocks": blocks}
 
 
 def main() -> None:
-    """Runs the cases and prints the tables."""
     given = arguments(__doc__, tuple(KINDS), count=1000, first=0, mesh=1, records=None)
     for word in given.chosen:
         table, records = Table(f"{word} not solved", "seed", "CPU s", "ended", file=given.records), []

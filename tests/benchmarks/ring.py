@@ -54,7 +54,6 @@ def ring_in_time(diameter: int, frequency: float, amplitude: float, steps: Seque
 
 
 def main() -> None:
-    """The table."""
     table = Table("nodal diameter, Hz, N", "tip um", "sector", "volume mm3", "sector", "error told", "true")
     for diameter, frequency, amplitude in CASES:
         tips, volumes = ring_in_time(diameter, frequency, amplitude, (360, 720), CYCLES)

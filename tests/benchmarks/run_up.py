@@ -48,7 +48,6 @@ def steady(model: ReducedModel, passage: Passage, amplitude: float) -> MissionHi
 
 
 def main() -> None:
-    """Both wears for each rate and direction."""
     given = arguments(__doc__, scene="sdof_slider", rates=[0.1, 0.3, 1.0, 3.0], steps=500)
     changes, ends, amplitude = CASES[given.scene]
     model = build_scene(given.scene, **changes)

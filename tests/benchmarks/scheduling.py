@@ -64,18 +64,16 @@ step axis, which the plan knows."""
 
 
 def recorded(study: str) -> list[dict[str, float]]:
-    """The rows of a file of recorded costs."""
     with Path(__file__).with_name(f"{study}_costs.csv").open(encoding="utf-8") as file:
         return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
 
 
 def start_result(place: int, row: dict[str, float]) -> StartResult:
-    """The start state of a recorded row."""
     return StartResult(place, None, bool(row["moves"]), int(row["n_unknowns"]))
 
 
 class DovetailCosts:
-    """Costs of the tasks of a study with the shape of the recorded ones."""
+    """Costs, s, of the tasks of a study with the shape of the recorded ones."""
 
     def __init__(self, plan: TaskPlan) -> None:
         rows, rng = recorded("dovetail"), np.random.default_rng(0)
@@ -116,7 +114,7 @@ class DovetailCosts:
 
 
 class ScatterCosts:
-    """Costs of samples: each is one of the recorded samples, times a factor."""
+    """Costs, s, as those of `DovetailCosts`: each sample is one of the recorded samples, times a factor."""
 
     def __init__(self, plan: TaskPlan) -> None:
         rows, rng = recorded("scatter"), np.random.default_rng(0)
@@ -124,17 +122,14 @@ class ScatterCosts:
         self._factors = np.exp(SPREAD_TASK * rng.standard_normal((len(plan.sweeps), 2)))
 
     def start(self, sweep: Sweep, place: int) -> tuple[StartResult, float]:
-        """A start state and its cost, s."""
         row = self._rows[sweep.number]
         return start_result(place, row), float(row["start_seconds"] * self._factors[sweep.number, 0])
 
     def history(self, task: History) -> float:
-        """Cost of a history, s."""
         return float(self._rows[task.sweep]["seconds"] * self._factors[task.sweep, 1])
 
 
 def main() -> None:
-    """Prints a table for each study."""
     given = arguments(__doc__, tuple(SHAPES), ranks=[2, 16, 64, 256, 1024, 4096])
     for name in given.chosen:
         study, overrides = SHAPES[name]

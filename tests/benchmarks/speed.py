@@ -65,19 +65,16 @@ def iteration() -> None:
 
 
 def history() -> None:
-    """An adaptive history of 48 pairs."""
     model = scene("dovetail_sector", 13)
     second("adaptive history, 48 pairs", lambda: march_wear(model, 211.75, 0.5, FRICTION, WEAR, CYCLES), "30", "250")
 
 
 def slider() -> None:
-    """A response curve of the slider."""
     model, frequencies = scene("sdof_slider"), np.linspace(120.0, 250.0, 27)
     second("curve, slider, 27 frequencies", lambda: frequency_response(model, frequencies, 10.0, FRICTION), "5", "400")
 
 
 def dovetail() -> None:
-    """A response curve of 16 pairs."""
     model, frequencies = scene("dovetail_sector", mesh=1), np.linspace(211.0, 214.0, 25)
     second("curve, 16 pairs, 25 frequencies", lambda: frequency_response(model, frequencies, 0.5, FRICTION), "", "1000")
 
@@ -101,7 +98,6 @@ def run(n_ranks: int, folder: Path) -> tuple[float, float]:
 
 
 def study() -> None:
-    """The default study: on one rank, and two ranks over one."""
     with tempfile.TemporaryDirectory() as name:
         run(2, Path(name))  # fills the caches
         times = [(run(1, Path(name)), run(2, Path(name))) for _ in range(REPEATS)]
@@ -116,7 +112,6 @@ ROWS = {row.__name__: row for row in (iteration, history, slider, dovetail, larg
 
 
 def main() -> None:
-    """Prints the table."""
     for name in arguments(__doc__, tuple(ROWS)).chosen:
         ROWS[name]()
 

@@ -361,7 +361,6 @@ def first_harmonic(structure: Structure, motion: Motion, rows: FloatArray) -> np
 
 
 def main() -> None:
-    """Worn volume and tip of the dovetail root."""
     given = arguments(
         __doc__, mesh=1, steps=250, periods=1000, sectors=47, diameter=0, frequency=212.42, each=20.0, single=0.0,
         cycles=1e5, amplitude=0.5, friction=0.5, approach="up",

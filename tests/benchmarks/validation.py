@@ -40,7 +40,8 @@ Continuum = tuple[float, float]
 
 def cylinder(strips: int) -> tuple[ReducedModel, Continuum]:
     """120 N/mm, half of the force that slides."""
-    c = line_stick_width(a := line_half_width(1.2e5, 6e-3, MODULUS), SHARE)
+    a = line_half_width(1.2e5, 6e-3, MODULUS)
+    c = line_stick_width(a, SHARE)
     x = np.linspace(c, 2.0 * a, 40001)
     depth = line_worn_depth(x, 6e-3, a, c)
     model = build_scene("cylinder_on_flat", strips=strips)
@@ -49,7 +50,8 @@ def cylinder(strips: int) -> tuple[ReducedModel, Continuum]:
 
 def sphere(patches: int) -> tuple[ReducedModel, Continuum]:
     """100 N, half of the force that slides; patches along each side of the square around the whole contact."""
-    c = point_stick_radius(a := point_radius(100.0, 10e-3, MODULUS), SHARE)
+    a = point_radius(100.0, 10e-3, MODULUS)
+    c = point_stick_radius(a, SHARE)
     r = np.linspace(c, 2.0 * a, 40001)
     depth = point_worn_depth(r, 10e-3, a, c)
     model = build_scene("sphere_on_flat", patches=patches // 2)
@@ -109,7 +111,6 @@ def gross_slip(strips: int = 60) -> None:
 
 
 def main() -> None:
-    """Prints the chosen tables."""
     chosen = arguments(__doc__, ("A", "B", "C")).chosen
     if "A" in chosen:
         limits("A", cylinder, (50, 100, 200))

@@ -1,4 +1,4 @@
-"""Marks of the tests of this folder, and the interrupt."""
+"""Marks of the tests of this folder, and signals."""
 
 import signal
 from pathlib import Path
@@ -15,10 +15,14 @@ def pytest_collection_modifyitems(items):
 
 
 @pytest.fixture(scope="package", autouse=True)
-def interrupt():
-    """Tests that run in the background ignore the interrupt, and what they start would, too."""
-    before = signal.getsignal(signal.SIGINT)
-    if before is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+def default_signals():
+    """Whoever runs the tests may ignore signals, as in the background or under nohup: what they start would, too."""
+    handlers = {
+        signal.SIGINT: signal.default_int_handler,
+        signal.SIGHUP: signal.SIG_DFL,
+        signal.SIGUSR1: signal.SIG_DFL,
+    }
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     yield
-    signal.signal(signal.SIGINT, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)

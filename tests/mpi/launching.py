@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 import uuid
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -24,10 +24,12 @@ from studyrunner.cli import main
 FAKED = str(Path(__file__).with_name("run_faked.py"))
 ROOT = Path(__file__).parents[2]
 
-CHEAP = (
-    *("two_masses", "--set", "axes.wear_coefficient=1e-11"),
-    *("--set", "slow_time.cycles=20_000", "--set", "slow_time.outputs=21"),
-)
+
+def options(*overrides: str) -> list[str]:
+    return [part for text in overrides for part in ("--set", text)]
+
+
+CHEAP = ("two_masses", *options("axes.wear_coefficient=1e-11", "slow_time.cycles=20_000", "slow_time.outputs=21"))
 """A study for the stand-in, of the scene that is built fastest: most of what these tests take is the start of runs."""
 
 PATIENCE = 240.0
@@ -41,34 +43,20 @@ _MARK = "FRETWEAR_TEST_RUN"
 """Variable in the environment of all processes of a run, those that its launcher has left behind included."""
 
 
-def mpiexec() -> str:
-    """The launcher of the environment that the tests run in; the one on the path where it has none."""
+def launcher(n_ranks: int) -> list[str]:
+    """What stands before the command, nothing for 0 ranks: mpiexec of the environment, or the one on the path."""
     own = Path(sys.executable).with_name("mpiexec")
     found = str(own) if own.exists() else shutil.which("mpiexec")
     if found is None:
         pytest.fail("the tests need the extra mpi: there is no mpiexec")
-    return found
-
-
-def launcher(n_ranks: int) -> list[str]:
-    """What stands before the command: nothing for 0 ranks."""
-    return [mpiexec(), "-n", str(n_ranks)] if n_ranks else []
-
-
-def run_command(
-    command: Sequence[str], folder: Path, environment: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
-    """The command, ended, with all that it said; never hangs."""
-    variables = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", **(environment or {})}
-    given = {"cwd": folder, "env": variables, "timeout": PATIENCE, "check": False}
-    return subprocess.run(command, capture_output=True, text=True, errors="replace", **given)
+    return [found, "-n", str(n_ranks)] if n_ranks else []
 
 
 @contextlib.contextmanager
-def mounted(folder: Path, options: str) -> Iterator[Path]:
+def mounted(folder: Path, how: str) -> Iterator[Path]:
     """A file system in memory on a new folder; the test is skipped where none can be mounted."""
     folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+    mount = ["mount", "-t", "tmpfs", "-o", how, "tmpfs", str(folder)]
     if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
         pytest.skip("a file system can be mounted by root only")
     try:
@@ -79,9 +67,10 @@ def mounted(folder: Path, options: str) -> Iterator[Path]:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run ended: exit status, what it said on stderr, seconds from the signal to the end of its last process."""
+    """How a run ended: exit status, stdout and stderr, seconds from the signal to the end of its last process."""
 
     status: int
+    out: str
     said: str
     seconds: float
 
@@ -96,9 +85,8 @@ class Running:
 
     @property
     def said(self) -> str:
-        """Its stderr so far."""
-        size = os.fstat(self._stderr.fileno()).st_size
-        return os.pread(self._stderr.fileno(), size, 0).decode("utf-8", "replace")
+        """What it has said on stderr so far."""
+        return _text_of(self._stderr)
 
     def reaches(self, condition: Callable[[], bool]) -> bool:
         """Waits until the condition holds; False where the run ends before. Fails where neither happens."""
@@ -120,39 +108,29 @@ class Running:
                     found[int(path.parent.name)] = dict(each.split(b"=", 1) for each in variables if b"=" in each)
         return found
 
-    def shared_memory(self) -> dict[str, bool]:
-        """Memory that MPICH shares between the ranks, and whether it still has a name, which a kill would leave."""
-        lines = [line for pid in self.ranks().values() for line in Path(f"/proc/{pid}/maps").read_text().splitlines()]
-        names = {line[line.index("/dev/shm/") :] for line in lines if "/dev/shm/mpich_shm_" in line}
-        return {name: Path(name).exists() for name in names}
-
     def ranks(self) -> dict[int, int]:
         """The processes that compute, by their number: run-study alone, or those that the launcher has given one."""
         numbers = {pid: variables.get(b"PMI_RANK") for pid, variables in self.processes().items()}
         return {int(number): pid for pid, number in numbers.items() if number is not None} or {0: self.process.pid}
 
 
-def run_to_end(
-    n_ranks: int,
-    arguments: Sequence[str],
+def run_command(
+    command: Sequence[str],
     folder: Path,
-    environment: dict[str, str] | None = None,
+    environment: Mapping[str, str] | None = None,
     disturb: Callable[[Running], object] = lambda _: None,
 ) -> Ended:
-    """Runs under mpiexec, or alone for 0 ranks, with `disturb` called once it has started; never hangs.
+    """A command to its end, with `disturb` called once it has started; never hangs.
 
-    Fails where a process outlives the run.
+    Fails where a process outlives the command.
     """
-    command = [*launcher(n_ranks), sys.executable, *arguments]
     mark = uuid.uuid4().hex
+    own = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", _MARK: mark}
     with (
+        tempfile.TemporaryFile() as stdout,
         tempfile.TemporaryFile() as stderr,
         subprocess.Popen(
-            command,
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": str(ROOT), **(environment or {}), _MARK: mark},
-            stdout=subprocess.DEVNULL,
-            stderr=stderr,
+            command, cwd=folder, env={**os.environ, **own, **(environment or {})}, stdout=stdout, stderr=stderr
         ) as process,
     ):
         running = Running(process, stderr, mark)
@@ -168,26 +146,36 @@ def run_to_end(
             for pid in running.processes():
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
-        return Ended(status, running.said, seconds)
+        return Ended(status, _text_of(stdout), running.said, seconds)
 
 
-def run_here(arguments: Sequence[str], folder: Path) -> xr.Dataset:
-    """The result of a run in this process, which has loaded everything already."""
-    with contextlib.chdir(folder):
-        assert main([*arguments, "-o", "out.nc"]) in (0, 3)
-        return results()
+def _text_of(file: IO[bytes]) -> str:
+    return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode("utf-8", "replace")
 
 
-def fake_here(arguments: Sequence[str], folder: Path, environment: dict[str, str] | None = None) -> int:
-    """Exit status of a run with the stand-in for the solver, in this process. arguments: FAKED first, as elsewhere."""
+def run_to_end(
+    n_ranks: int,
+    arguments: Sequence[str],
+    folder: Path,
+    environment: Mapping[str, str] | None = None,
+    disturb: Callable[[Running], object] = lambda _: None,
+) -> Ended:
+    """Python with these arguments under mpiexec, or alone for 0 ranks."""
+    return run_command([*launcher(n_ranks), sys.executable, *arguments], folder, environment, disturb)
+
+
+def run_here(arguments: Sequence[str], folder: Path, environment: Mapping[str, str] | None = None) -> int:
+    """Exit status of a run in this process, which has loaded everything already; with the stand-in after FAKED."""
     from tests.mpi.run_faked import compute_fake
 
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr(task_runs, "compute_task", compute_fake)
         for name, value in (environment or {}).items():
             patch.setenv(name, value)
-        return main(arguments[1:])
+        if arguments[0] == FAKED:
+            patch.setattr(task_runs, "compute_task", compute_fake)
+            arguments = arguments[1:]
+        return main(list(arguments))
 
 
 def results(path: Path | str = "out.nc") -> xr.Dataset:

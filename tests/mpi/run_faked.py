@@ -1,15 +1,13 @@
 """run-study with a stand-in for the solver, to be started by the tests under mpiexec.
 
-FAKE_SECONDS: longest time of a history; each rank then notes those that it took in a file.
+FAKE_SECONDS: longest time of a history.
 FAKE_FAILURE: rank whose first history gives more results than it should: a bug, which raises. The histories of the
 others wait for that.
 FAKE_STEPS: every history takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
-takes two. Each step is noted in a file, what was gone on from in another one, and what was done when in a third.
+takes two. What was done when, and what was gone on from, is noted in a file.
 FAKE_PROGRESS: a task says so often how far it is, s; 0.03 where it is not given.
 FAKE_CRASH: what each history at the second frequency does instead: "segfault" or "abort".
 FAKE_NOTHING: tasks take no time at all; in the end rank 0 says how much memory and time it has taken.
-FAKE_TELLING: seconds between two lines that say how far the run is.
-FAKE_PATIENCE: each sweep stops after its first start state until a history from it is done; after this time it raises.
 """
 
 import ctypes
@@ -33,15 +31,19 @@ from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi import schedule
 from studyrunner.mpi.ranks import launcher_rank
 from studyrunner.scene.scene import SceneFacts, describe_scene
-from studyrunner.system import progress
-from tests.mpi.losses import DONE
 from tests.studyrunner.fakes import changed, fake_evaluate, fake_sweep
 
 BULK = np.random.default_rng(0).random(0 if "FAKE_NOTHING" in os.environ else 100_000)
 """Goes with every start state: larger than what MPI sends off at once, and not smaller when it is compressed."""
 
+DONE = "done.txt"
+"""A line for each step and result that was finished, and each that was gone on from: time (s), what, task, number."""
+
 PATIENCE = 200.0
 """Seconds: less than the tests have."""
+
+FACTS: dict[int, tuple[object, SceneFacts]] = {}
+"""Of models, by their identity: found once."""
 
 
 def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterator[Result]:
@@ -49,18 +51,13 @@ def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterat
     model = models[task.scenes[0]]
     if id(model) not in FACTS:
         FACTS[id(model)] = model, describe_scene(model)
-    facts = FACTS[id(model)][1]
     seconds = float(os.environ.get("FAKE_SECONDS", "0.0" if "FAKE_NOTHING" in os.environ else "0.002"))
     n_steps = int(os.environ.get("FAKE_STEPS", "0"))
     if isinstance(task, Sweep):
         yield from compute_sweep(task, n_steps, seconds, keep)
     else:
         assert isinstance(task, History)
-        yield from compute_history(task, facts, n_steps, seconds, keep)
-
-
-FACTS: dict[int, tuple[object, SceneFacts]] = {}
-"""Of models, by their identity: found once."""
+        yield from compute_history(task, FACTS[id(model)][1], n_steps, seconds, keep)
 
 
 def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iterator[Result]:
@@ -72,28 +69,23 @@ def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iter
             continue
         if n_steps:
             time.sleep(2.0 * seconds)
-            note_step(task, number)
+            note("step", task, number)
         if started.place in left:
             left.remove(started.place)
             if n_steps:
-                note_done("result", task, started.place)
+                note("result", task, started.place)
             yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
         if n_steps:
             keep(Packed("sweep", (np.array([number + 1.0]),)))
-        if "FAKE_PATIENCE" in os.environ:
-            latest = time.monotonic() + float(os.environ["FAKE_PATIENCE"])
-            while not Path(f"sweep{task.number}.txt").exists():
-                if time.monotonic() > latest:
-                    raise TimeoutError
-                time.sleep(0.01)
 
 
 def compute_history(
     task: History, facts: SceneFacts, n_steps: int, seconds: float, keep: Keep
 ) -> Iterator[PointResult]:
-    failing = int(os.environ.get("FAKE_FAILURE", "-1"))
-    if task.position == 1:
-        end_process(os.environ.get("FAKE_CRASH", ""))
+    failing, crash = int(os.environ.get("FAKE_FAILURE", "-1")), os.environ.get("FAKE_CRASH", "")
+    if task.position == 1 and crash:
+        # as a bug in compiled code would
+        ctypes.string_at(0) if crash == "segfault" else os.abort()
     if launcher_rank() == failing:
         # not the task, but what is around it
         yield from fake_evaluate(task, facts=facts)
@@ -102,12 +94,8 @@ def compute_history(
     carried = walk(task, n_steps, seconds, keep) if n_steps else 0.0
     for result in fake_evaluate(task, facts=facts, seconds=0.0 if n_steps else seconds):
         assert isinstance(result, PointResult)
-        if "FAKE_SECONDS" in os.environ and not n_steps:
-            for name in (f"rank{launcher_rank()}.txt", f"sweep{task.sweep}.txt"):
-                with Path(name).open("a", encoding="utf-8") as file:
-                    file.write(f"{result.values['run_time']}\n")
         if n_steps:
-            note_done("result", task, result.place)
+            note("result", task, result.place)
         yield changed(result, error_estimate=carried)
 
 
@@ -115,8 +103,7 @@ def gone_on_from(task: Task) -> int:
     """Step that an earlier run has come to."""
     if task.resume is None:
         return 0
-    with Path("resumed.txt").open("a", encoding="utf-8") as file:
-        file.write(f"{task.resume.text} {task.resume.arrays[0][0]:g}\n")
+    note(f"resumed-{task.resume.text}", task, int(task.resume.arrays[0][0]))
     return int(task.resume.arrays[0][0])
 
 
@@ -127,19 +114,12 @@ def walk(task: History, n_steps: int, seconds: float, keep: Keep) -> float:
     for step in range(first, n_steps):
         carried = 3.99 * carried * (1.0 - carried)
         time.sleep(seconds)
-        note_step(task, step)
+        note("step", task, step)
         keep(Packed("history", (np.array([step + 1.0, carried]),)))
     return carried
 
 
-def note_step(task: Task, number: int) -> None:
-    """A line for every step of any rank."""
-    with Path("steps.txt").open("a", encoding="ascii") as file:
-        file.write("step\n")
-    note_done("step", task, number)
-
-
-def note_done(what: str, task: Task, number: int) -> None:
+def note(what: str, task: Task, number: int) -> None:
     """When a step or a result of a task was finished, before anybody hears of it."""
     with Path(DONE).open("a", encoding="ascii") as file:
         file.write(f"{time.time()} {what} {task.key} {number}\n")
@@ -148,34 +128,19 @@ def note_done(what: str, task: Task, number: int) -> None:
 def watch_memory(samples: list[int]) -> None:
     """Memory of this process, KiB, but for that of files, which are in memory as long as there is room only."""
     while True:
-        samples.append(own_memory())
+        (line,) = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("RssAnon")]
+        samples.append(int(line.split()[1]))
         time.sleep(0.02)
-
-
-def own_memory() -> int:
-    (line,) = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("RssAnon")]
-    return int(line.split()[1])
-
-
-def end_process(how: str) -> None:
-    """As a bug in compiled code would."""
-    if how == "segfault":
-        ctypes.string_at(0)
-    elif how == "abort":
-        os.abort()
 
 
 if __name__ == "__main__":
     task_runs.compute_task = compute_fake
     schedule.SECONDS_TO_PROGRESS = float(os.environ.get("FAKE_PROGRESS", "0.03"))
-    if "FAKE_TELLING" in os.environ:
-        progress.FIRST_LINE = progress.LONGEST_SILENCE = float(os.environ["FAKE_TELLING"])
-    if "FAKE_NOTHING" in os.environ and launcher_rank() == 0:
-        samples = [own_memory()]
+    samples: list[int] = []
+    watched = "FAKE_NOTHING" in os.environ and launcher_rank() == 0
+    if watched:
         threading.Thread(target=watch_memory, args=(samples,), daemon=True).start()
-        status = main()
-        samples.append(own_memory())
+    status = main()
+    if watched:
         print(f"rank 0: {max(samples)} KiB, {time.process_time()} s", file=sys.stderr)
-    else:
-        status = main()
     sys.exit(status)

@@ -13,13 +13,7 @@ from solver.contact.coulomb import SLIP
 from solver.harmonic_balance.dlft import Balance
 from solver.newton import linear_solver
 from solver.newton.krylov import STAGNATION_PRODUCTS, build_correction, solve_gmres
-from solver.newton.linear_solver import (
-    DENSE_UNKNOWNS,
-    DenseFactor,
-    JacobianSolver,
-    build_dense_factor,
-    build_factor,
-)
+from solver.newton.linear_solver import DENSE_UNKNOWNS, DenseFactor, JacobianSolver, build_dense_factor, build_factor
 from solver.newton.period_preconditioner import build_period_factor, stiffness_of_most
 from solver.newton.run import Bordered, bordered_step, solve_newton
 from solver.outcome import Outcome

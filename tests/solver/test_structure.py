@@ -19,7 +19,6 @@ from tests.solver.models import OMEGA, cyclic_model, dovetail, random_model, sce
 from tests.solver.reconstruction import harmonic_structure
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
-ORDERS = (1, 2, 3)
 AMPLITUDE = 60.0
 
 

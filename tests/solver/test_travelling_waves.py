@@ -16,7 +16,7 @@ from tests.solver.models import dovetail
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("diameter", "frequency", "amplitude"), [(1, 280.0, 3.3), (3, 320.0, 12.0), (5, 280.0, 3.3)])
+@pytest.mark.parametrize(("diameter", "frequency", "amplitude"), [(3, 320.0, 12.0), (5, 280.0, 3.3)])
 def test_a_wave_of_the_sector_is_that_of_the_ring_in_time(diameter, frequency, amplitude):
     cycles = 300.0
     tips, volumes = ring_in_time(diameter, frequency, amplitude, (360,), cycles)

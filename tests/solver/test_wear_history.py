@@ -34,9 +34,8 @@ from tests.solver.worn_slider import (
 )
 
 # --- the slider ---
+
 STEPS = (8000.0, 4000.0, 2000.0, 1000.0)
-
-
 GIVEN: tuple[Scheme, ...] = ("explicit", "implicit")
 SCHEMES: tuple[Scheme, ...] = (*GIVEN, "adaptive")
 FEW = SolverSettings(harmonics=3, samples=128)

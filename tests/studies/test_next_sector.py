@@ -33,10 +33,6 @@ def apart(model, joint):
     return model, replace(joint, cut=replace(joint.cut, left=none, right=none))
 
 
-def turned_round(model, joint):
-    return model, replace(joint, contacts=tuple(each.turned_round for each in joint.contacts))
-
-
 def frequencies_of_sector(model, joint):
     prepared = prepare_model(replace(model, rotation=None), joint)
     return [glued_frequencies(prepared, k, 4) for k in range(N // 2 + 1)]
@@ -48,11 +44,6 @@ def test_stuck_frequencies_of_all_waves_are_those_of_the_ring(sector):
     twice = [each for k, each in enumerate(found) for _ in range(1 if k in (0, N // 2) else 2)]
     ring = glued_frequencies(prepare_model(*whole_ring(*sector)), 0, 10)
     np.testing.assert_allclose(np.sort(np.concatenate(twice))[:10], ring, rtol=1e-9)
-
-
-def test_the_order_of_the_surfaces_does_not_matter():
-    one, other = frequencies_of_sector(*SECTORS[0]), frequencies_of_sector(*turned_round(*SECTORS[0]))
-    np.testing.assert_allclose(other, one, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -106,14 +97,13 @@ def test_faces_that_do_not_meet_after_a_turn_are_said():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("diameter", [N // 2, N - 1])
-def test_a_wave_of_the_sector_is_one_of_the_ring(diameter):
-    """Slipping states: turned from sector to sector, with the phase of the wave, they balance the ring as well.
+def test_a_wave_of_the_sector_is_one_of_the_ring():
+    """A slipping state: turned from sector to sector, with the phase of the wave, it balances the ring as well.
 
-    N - 1 turns the other way. The static friction that a state keeps of its history depends on where a period begins,
+    The wave turns backwards. The static friction that a state keeps of its history depends on where a period begins,
     and is left out.
     """
-    folded, settings = min(diameter, N - diameter), SolverSettings(harmonics=3, samples=96)
+    diameter, folded, settings = N - 1, 1, SolverSettings(harmonics=3, samples=96)
     parameters = STUBBY.model_copy(update={"interference": 5e-4, "nodal_diameter": folded, "stuck_modes": 60})
     model = replace(shrouded_sector.build(parameters, 3), nodal_diameter=diameter)
     assert set(model.linear) == set(needed_nodal_diameters(diameter, N, 3)) | {folded}

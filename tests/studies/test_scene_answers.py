@@ -70,8 +70,7 @@ LAWS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("begun", [0.0, 2e-5])
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(("law", "begun"), [*((name, 0.0) for name in LAWS), ("table", 2e-5)])
 def test_the_slider_wears_by_the_differential_equation_of_its_law(law, begun):
     found = answer(law=LAWS[law], worn=begun)
     counts, limits = WEAR[0] * CYCLES, {"rtol": 1e-11, "atol": 1e-18, "max_step": 1e-9}

@@ -74,9 +74,3 @@ class FakedBlocks:
 def load_of(block: Any) -> float:
     """Static load of the model of a block, N."""
     return float(np.abs(block.model.linear[0].load_static).max())
-
-
-@pytest.fixture
-def blocks(monkeypatch: pytest.MonkeyPatch) -> FakedBlocks:
-    """Stands for the blocks in all runs of a test."""
-    return FakedBlocks(monkeypatch)

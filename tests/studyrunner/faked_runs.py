@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from studyrunner import task_runs
-from studyrunner.kinds.task import Keep, Result, Task
+from studyrunner.kinds.task import Keep, PointResult, Result, Task
 from studyrunner.scene.scene import describe_scene
 from tests.studyrunner.fakes import fake_evaluate
 
@@ -20,12 +20,16 @@ SMALL = [
 
 
 class Solver:
-    """A stand-in that counts what it does. disturb: called with each task and the number of its result."""
+    """A stand-in that counts what it does.
+
+    disturb: called with each task and the number of its result. change: makes another result of a history.
+    """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.tasks: list[Task] = []
         self.n_results = 0
         self.disturb: Callable[[Task, int], None] = lambda *_: None
+        self.change: Callable[[Task, PointResult], PointResult] = lambda _, result: result
 
         monkeypatch.setattr(
             task_runs, "compute_task", lambda task, models, keep: self.evaluate(models[task.scenes[0]], task, keep)
@@ -36,7 +40,7 @@ class Solver:
         for result in fake_evaluate(task, keep, describe_scene(model)):
             self.n_results += 1
             self.disturb(task, self.n_results)
-            yield result
+            yield self.change(task, result) if isinstance(result, PointResult) else result
 
     def end_at(self, number: int) -> None:
         """The run is interrupted at its result of this number, counted from the last beginning on."""

@@ -20,8 +20,7 @@ from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates, scene_arrays
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
-from studyrunner.scatter.draws import ScatteredPairs, drawn
-from studyrunner.scatter.section import ScatterSection
+from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn
 from studyrunner.scene.answers import SceneVariable
 from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.scene.scene_set import pair_arrays

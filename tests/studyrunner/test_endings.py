@@ -12,19 +12,11 @@ from studyrunner.system.process import begin_ending, is_ending, raise_ending, ta
 pytestmark = pytest.mark.processes
 
 
-@pytest.fixture(autouse=True)
-def _as_before():
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
-    handlers = [signal.getsignal(number) for number in numbers]
-    yield
-    begin_ending()
-    for number, handler in zip(numbers, handlers, strict=True):
-        signal.signal(number, handler)
-
-
 @pytest.fixture
 def end():
     """Sends this process what ends a run."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+    handlers = [signal.getsignal(number) for number in numbers]
     signal.signal(signal.SIGUSR1, signal.SIG_DFL)
     take_endings()
 
@@ -32,7 +24,10 @@ def end():
         os.kill(os.getpid(), signal.SIGUSR1)
         time.sleep(0.0)
 
-    return send
+    yield send
+    begin_ending()
+    for number, handler in zip(numbers, handlers, strict=True):
+        signal.signal(number, handler)
 
 
 def test_an_ending_is_raised_once(end):

@@ -20,11 +20,6 @@ VARIANT = [*APART, "--set", "axes.excitation_amplitude=11"]
 LARGER = [*APART, "--set", "axes.frequency=[100, 110, 120]"]
 
 
-def name_in(path):
-    with xr.open_dataset(path) as result:
-        return str(result.attrs["study"]).split('"')[1]
-
-
 def files():
     return {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
 
@@ -45,8 +40,11 @@ def without_progress(_):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("leave", "other"), [(finished, RENAMED), (killed, OTHER), (without_progress, OTHER)])
-def test_what_is_left_of_another_study_stays(leave, other, solver, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("leave", "other", "name"),
+    [(finished, RENAMED, "mine"), (killed, OTHER, "two_masses"), (without_progress, OTHER, "two_masses")],
+)
+def test_what_is_left_of_another_study_stays(leave, other, name, solver, monkeypatch, capsys):
     leave(solver)
     before = files()
     solver.begin_again()
@@ -56,12 +54,11 @@ def test_what_is_left_of_another_study_stays(leave, other, solver, monkeypatch, 
         early.setattr("studyrunner.scene.scene.build_study_scene", None)
         assert main(other) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    name = "two_masses" if other is OTHER else "mine"
-    for words in ('study "sdof_slider" (scene sdof_slider)', f'study "{name}" (scene', "--overwrite", "out.nc"):
-        assert words in line
+    assert all(words in line for words in ('"sdof_slider"', f'"{name}"', "--overwrite", "out.nc"))
     assert (files(), solver.tasks) == (before, [])
     assert main([*other, "--overwrite"]) == 0
-    assert name_in("out.nc") == name
+    with xr.open_dataset("out.nc") as result:
+        assert f'name = "{name}"' in result.attrs["study"]
     # it is this one's now
     assert main(other) == 0
     assert main(SMALL) == 2
@@ -81,22 +78,15 @@ def test_the_same_study_with_other_values_goes_on(solver):
     assert main([*finer, "-o", "again.nc"]) == 0
 
 
-def a_broken_file(path):
-    path.write_bytes(b"\x89HDF\r\n\x1a\nand no more")
-
-
-def a_netcdf_file(path):
-    xr.Dataset({"measured": ("time", [1.0, 2.0])}).to_netcdf(path)
-
-
-def a_scene(path):
-    assert main(["sdof_slider", "--write-scene", str(path)]) == 0
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("make", [a_broken_file, a_netcdf_file, a_scene])
-def test_what_is_no_result_is_not_replaced_at_all(make, solver, capsys):
-    make(Path("out.nc"))
+@pytest.mark.parametrize("kind", ["broken", "measured", "scene"])
+def test_what_is_no_result_is_not_replaced_at_all(kind, solver, capsys):
+    if kind == "broken":
+        Path("out.nc").write_bytes(b"\x89HDF\r\n\x1a\nand no more")
+    elif kind == "measured":
+        xr.Dataset({"measured": ("time", [1.0, 2.0])}).to_netcdf("out.nc")
+    else:
+        assert main(["sdof_slider", "--write-scene", "out.nc"]) == 0
     before = files()
     capsys.readouterr()
     for more in ([], ["--overwrite"], ["--fresh"]):
@@ -104,9 +94,9 @@ def test_what_is_no_result_is_not_replaced_at_all(make, solver, capsys):
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith('run-study: command line: -o = "')
     # a scene replaces scenes only
-    assert main(["sdof_slider", "--write-scene", "out.nc"]) == (0 if make is a_scene else 2)
+    assert main(["sdof_slider", "--write-scene", "out.nc"]) == (0 if kind == "scene" else 2)
     assert files().keys() == before.keys()
-    assert make is a_scene or files() == before
+    assert kind == "scene" or files() == before
     assert not solver.tasks
 
 
@@ -115,14 +105,14 @@ def test_progress_that_is_damaged_belongs_to_no_study(solver, capsys):
     solver.begin_again()
     Path("out.nc.progress").write_bytes(b"x" * 5000)
     assert main(OTHER) == 0
-    assert "kept as out.nc.progress.old" in capsys.readouterr().err
+    assert "out.nc.progress.old" in capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_in_python(capsys):
+def test_in_python():
     assert main(SMALL) == 0
     overrides = {"axes.scheme": "implicit", "axes.frequency": 0.05}
-    with pytest.raises(UserError, match=r'run_study: output = .*overwrite=True.*"two_masses"'):
+    with pytest.raises(UserError, match="overwrite=True"):
         run_study("two_masses", "out.nc", overrides=overrides, progress=False)
     with run_study("two_masses", "out.nc", overrides=overrides, progress=False, overwrite=True) as result:
         assert 'name = "two_masses"' in result.attrs["study"]
@@ -133,13 +123,10 @@ def test_in_python(capsys):
 def test_a_finished_result_is_not_replaced_by_less(command, solver, capsys):
     assert main(APART) == 0
     before = Path("out.nc").read_bytes()
-    capsys.readouterr()
     solver.begin_again()
     solver.end_at(2)
     assert main(command) == 130
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert said.startswith("run-study: interrupted: ")
-    assert "are kept, out.nc is the finished result that it was" in said
+    assert "out.nc is the finished result that it was" in capsys.readouterr().err.splitlines()[-1]
     assert Path("out.nc").read_bytes() == before
     # a finished one takes its place
     solver.begin_again()

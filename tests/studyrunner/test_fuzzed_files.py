@@ -4,16 +4,16 @@ from collections import Counter
 
 import pytest
 
-from tests.studyrunner.fuzzing import FILES, answers, write_whole_files
+from tests.benchmarks.fuzz_files import answer, write_whole_files
 
 
 @pytest.mark.slow
-def test_fuzzed_files(tmp_path):
-    (tmp_path / "whole").mkdir()
-    write_whole_files(tmp_path / "whole")
-    found = answers(tmp_path / "whole", 1, range(12), tuple(FILES))
-    assert [answer.wrong for answer in found if answer.wrong] == []
+@pytest.mark.usefixtures("folder")
+def test_fuzzed_files():
+    write_whole_files()
+    found = [answer(1, number) for number in range(16)]
+    assert [each.wrong for each in found if each.wrong] == []
     # most of them are wrong, and not all
-    ended = Counter(answer.ended.split()[-1] for answer in found)
+    ended = Counter(each.ended.split()[-1] for each in found)
     assert ended["2"] > 1
     assert ended["0"] > 0

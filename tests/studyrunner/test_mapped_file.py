@@ -8,9 +8,6 @@ from studyrunner.mpi import mapped_file
 from studyrunner.mpi.mapped_file import open_mapped, ranks_that_see, write_mapped
 from studyrunner.scene.scene import describe_scene
 
-THINGS = {"c": np.arange(6.0).reshape(2, 3), "f": np.asfortranarray(np.eye(3)), "none": np.zeros((0, 2)), "n": None}
-THINGS["part"] = np.arange(10.0)[::2]
-
 
 def test_a_scene_is_the_same_with_its_arrays_in_a_file(tmp_path):
     model = build_scene("sdof_slider")
@@ -19,13 +16,15 @@ def test_a_scene_is_the_same_with_its_arrays_in_a_file(tmp_path):
 
 
 def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path):
-    written = write_mapped(THINGS, tmp_path / "things")
+    given = {"c": np.arange(6.0).reshape(2, 3), "f": np.asfortranarray(np.eye(3)), "none": np.zeros((0, 2)), "n": None}
+    given["part"] = np.arange(10.0)[::2]
+    written = write_mapped(given, tmp_path / "things")
     one, other = open_mapped(written), open_mapped(written)
     one["c"][0, 0] = 7.0
     assert other["c"][0, 0] == 0.0
     written.remove()
     for name in ("f", "none", "part"):
-        np.testing.assert_array_equal(other[name], THINGS[name])
+        np.testing.assert_array_equal(other[name], given[name])
     assert other["c"].flags.aligned
     assert other["f"].flags.f_contiguous
     assert other["n"] is None

@@ -1,5 +1,7 @@
 """Studies of nonlinear modes: axes.modal_amplitude in place of frequency, excitation and wear."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,15 +9,17 @@ import xarray as xr
 from solver import backbone
 from studies import build_scene
 from studyrunner.api import run_study
+from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.report.contents import draw_report
 from studyrunner.report.page.page import write_page
 from studyrunner.result.view import open_for_report
-from studyrunner.study.study import Study
-from studyrunner.study.study_file import format_study, read_study
+from studyrunner.study.study_file import read_study
+from tests.mpi.launching import results
 from tests.studyrunner.fakes import points_of
+from tests.studyrunner.small_studies import compute, words
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("folder")]
 
 # a mass on a rigid slider has its mode while it slides: above 1e-5 m sqrt(kg)
 SLIDER = """
@@ -32,29 +36,33 @@ sweep = "down"
 samples = 2
 friction_coefficient = {normal = {std = 0.03}}
 """
-SHAPE = {"mode": 2, "sweep": 1, "sample": 2, "modal_amplitude": 3, "cycle": 2}
 
 
 @pytest.fixture(scope="module")
-def study_file(tmp_path_factory):
-    path = tmp_path_factory.mktemp("modes") / "slider_modes.toml"
-    path.write_text(SLIDER, encoding="utf-8")
+def path(tmp_path_factory):
+    """A result; its study stands beside it."""
+    path = tmp_path_factory.mktemp("modes") / "out.nc"
+    path.with_suffix(".toml").write_text(SLIDER, encoding="utf-8")
+    run_study(path.with_suffix(".toml"), path, progress=False).close()
     return path
 
 
-@pytest.fixture(scope="module")
-def result(study_file):
-    return run_study(study_file, study_file.with_name("out.nc"), progress=False).load()
+@pytest.fixture
+def study(folder):
+    Path("modes.toml").write_text(SLIDER, encoding="utf-8")
+    return "modes.toml"
 
 
-def without_time(dataset):
-    return dataset.drop_vars(["run_time", "ended"]).drop_attrs(deep=False)
+@pytest.fixture
+def result(path):
+    return results(path)
 
 
 def test_the_result_has_its_axes_and_the_values_of_the_solver(result):
     """Amplitudes and worn joints in the order of the study file, each the same as in Python."""
     sizes = dict(zip(result.natural_frequency.dims, result.natural_frequency.shape, strict=True))
-    assert list(sizes.items()) == list(SHAPE.items())
+    expected = {"mode": 2, "sweep": 1, "sample": 2, "modal_amplitude": 3, "cycle": 2}
+    assert list(sizes.items()) == list(expected.items())
     np.testing.assert_array_equal(result.cycle, [1e4, 0.0])
     for variable in result.variables.values():
         assert {"units", "long_name"} <= variable.attrs.keys()
@@ -79,63 +87,49 @@ def test_the_result_has_its_axes_and_the_values_of_the_solver(result):
 
 
 def test_a_mode_that_is_not_there_says_so(result):
-    assert "followed down to the amplitude" in str(
-        result.message.sel(mode=1, modal_amplitude=1e-6, cycle=0)[0, 0].item()
-    )
-    assert "fewer linear modes" in str(result.message.sel(mode=3, cycle=0)[0, 0, 0].item())
+    said = result.message.isel(sweep=0, sample=0).sel(cycle=0)
+    assert "followed down to the amplitude" in said.sel(mode=1, modal_amplitude=1e-6).item()
+    assert "fewer linear modes" in said.sel(mode=3)[0].item()
     found = result.natural_frequency.sel(mode=1, modal_amplitude=[1e-4, 1e-3])
     first, third = result.fretwear.summary().modes
     assert (first.number, first.frequency) == (1, (found.min(), found.max()))
     assert (third.number, third.n_found, third.n_points) == (3, 0, 12)
-    assert "The mode may turn back before it (a fold)" in result.outcome.attrs["sentences"]
 
 
-def test_points_are_the_same_in_another_list(study_file, result, tmp_path):
+def test_points_are_the_same_in_another_list(study, result):
     """And a study with more amplitudes goes on from the points that are there."""
-    changes = {"scatter.samples": 1, "axes.mode": 1, "scene.worn": {"depth": 0.0, "cycle": 0}}
-    few = {**changes, "axes.modal_amplitude": [1e-4], "outputs.variables": ["slip_fraction"]}
-    more = {**changes, "axes.modal_amplitude": {"start": 1e-5, "stop": 1e-3, "num": 3, "spacing": "log"}}
-    with run_study(study_file, tmp_path / "out.nc", overrides=few, progress=False) as first:
-        assert "natural_frequency" not in first
-        assert first.fretwear.summary().modes[0].n_found == 1
-    found = run_study(study_file, tmp_path / "out.nc", overrides=more, progress=False, overwrite=True).load()
+    one = ("scatter.samples=1", "axes.mode=1", "scene.worn={depth=0.0, cycle=0}")
+    first = compute(study, "out.nc", *one, "axes.modal_amplitude=[1e-4]", "outputs.variables=['slip_fraction']")
+    assert "natural_frequency" not in first
+    assert first.fretwear.summary().modes[0].n_found == 1
+    more = words(*one, "axes.modal_amplitude={start=1e-5, stop=1e-3, num=3, spacing='log'}")
+    # the smallest amplitude has no mode
+    assert main([study, "-o", "out.nc", *more]) == 3
+    found = results()
     np.testing.assert_array_equal(found.modal_amplitude, [1e-5, 1e-4, 1e-3])
     for amplitude in (1e-4, 1e-3):
         where = {"modal_amplitude": [amplitude], "cycle": [0.0], "mode": [1], "sample": [0]}
-        xr.testing.assert_identical(without_time(found.sel(where)), without_time(result.sel(where)))
+        one, other = (each.sel(where).drop_attrs(deep=False) for each in (found, result))
+        xr.testing.assert_identical(one, other)
 
 
-def test_the_effective_study_is_the_same_study(study_file, tmp_path):
-    study = read_study(study_file)
-    text = format_study(study)
-    for name in ("slow_time", "[wear]", "frequency =", "scheme", "step"):
-        assert name not in text.replace("natural_frequency", "")
-    (tmp_path / "again.toml").write_text(text, encoding="utf-8")
-    assert read_study(tmp_path / "again.toml").dimensions == study.dimensions
-    assert format_study(read_study(tmp_path / "again.toml")) == text
-
-
-def test_points_of_a_line_share_a_task(study_file):
+def test_points_of_a_line_share_a_task(study):
     """Lines that are equal are followed once."""
-    study: Study = read_study(study_file, {"scene.worn.depth": [[0.0], [0.0]], "axes.sweep": ["up", "down"]})
-    plan = build_tasks(study, 2)
+    lines = read_study(study, ["scene.worn={depth=[[0.0], [0.0]], cycle=[1e4, 0]}", "axes.sweep=['up', 'down']"])
+    plan = build_tasks(lines, 2)
     assert plan.n_points == 2 * 2 * 2 * 3 * 2
-    assert [mode.amplitudes for mode in plan.results] == [(1e-6, 1e-4, 1e-3)] * len(plan.results)
+    assert {mode.amplitudes for mode in plan.results} == {(1e-6, 1e-4, 1e-3)}
     points = [point for mode in plan.results for point in points_of(mode)]
     assert len(set(points)) == len(points) == plan.n_points
 
 
-def test_the_report_draws_frequency_and_damping(result, study_file, tmp_path):
-    with open_for_report(study_file.with_name("out.nc")).dataset as dataset:
-        assert dataset.sizes == result.sizes
-    shown = open_for_report(study_file.with_name("out.nc"))
+def test_the_report_draws_frequency_and_damping(result, path, folder):
+    shown = open_for_report(path)
     items = {item.name: item for item in draw_report(shown)}
-    assert {"natural_frequency", "damping_ratio"} <= items.keys()
-    summary = write_page(shown, items.values(), tmp_path / "index.html")
-    assert summary.n_missing == 0
-    lines = items["damping_ratio"].figure.axes[0].get_lines()
-    found = [result.damping_ratio.sel(mode=1, cycle=cycle).isel(sweep=0, sample=0).values for cycle in (1e4, 0)]
-    drawn = {line.get_label(): line.get_ydata() for line in lines}
-    for label, values in zip(("mode 1, cycle 10\N{NO-BREAK SPACE}000", "mode 1, cycle 0"), found, strict=True):
-        np.testing.assert_allclose(drawn[label], values[[1, 2, 0]])
+    assert "natural_frequency" in items
+    assert write_page(shown, items.values(), folder / "index.html").n_missing == 0
+    drawn = {line.get_label(): line.get_ydata() for line in items["damping_ratio"].figure.axes[0].get_lines()}
+    for label, cycle in (("mode 1, cycle 10\N{NO-BREAK SPACE}000", 1e4), ("mode 1, cycle 0", 0)):
+        expected = result.damping_ratio.sel(mode=1, cycle=cycle).isel(sweep=0, sample=0).values[[1, 2, 0]]
+        np.testing.assert_allclose(drawn[label], expected)
     shown.dataset.close()

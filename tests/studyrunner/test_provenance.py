@@ -13,27 +13,21 @@ from studyrunner.user_error import UserError
 from tests.studyrunner.faked_runs import SMALL
 
 
-def attributes():
-    with netCDF4.Dataset("out.nc") as file:
-        return {name: file.getncattr(name) for name in file.ncattrs()}
-
-
-def git(folder, *arguments):
-    command = ["git", "-C", str(folder), "-c", "user.name=a", "-c", "user.email=b", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-
-
 def test_the_commit_is_that_of_git(tmp_path, monkeypatch):
+    def git(*arguments):
+        command = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=b", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", "/dev/null")
-    git(tmp_path, "init", "-q")
+    git("init", "-q")
     head = ""
     for text in ("one", "two"):
         (tmp_path / "a.py").write_text(text, encoding="utf-8")
-        git(tmp_path, "add", "a.py")
+        git("add", "a.py")
         assert not head or commit_of(tmp_path) == head + CHANGED
-        git(tmp_path, "commit", "-qm", text)
-        git(tmp_path, "tag", "-a", text, "-m", "a name is no commit")
-        head = git(tmp_path, "rev-parse", "HEAD")
+        git("commit", "-qm", text)
+        git("tag", "-a", text, "-m", "a name is no commit")
+        head = git("rev-parse", "HEAD")
         assert commit_of(tmp_path) == head
     assert commit_of(tmp_path.parent) == ""
 
@@ -63,17 +57,17 @@ def test_a_wrong_date_is_bad_input(capsys):
 
 @pytest.mark.usefixtures("folder")
 def test_date_and_software_stand_in_the_result_and_change_nothing_else(solver, monkeypatch):
-    there = {"software_commit": "b" * 40}
-    monkeypatch.setattr("studyrunner.result.provenance.commit_of", lambda _: "")
-    assert main(SMALL) == 0
-    without, n_results = attributes(), solver.n_results
-    solver.begin_again()
+    def run(*more, commit="b" * 40):
+        solver.begin_again()
+        monkeypatch.setattr("studyrunner.result.provenance.commit_of", lambda _: commit)
+        assert main([*SMALL, *more]) == 0
+        with netCDF4.Dataset("out.nc") as file:
+            return {name: file.getncattr(name) for name in file.ncattrs()}
+
+    there = run(commit="") | {"software_commit": "b" * 40}
     # what is finished is known by the same hashes whatever the date and the commit
-    monkeypatch.setattr("studyrunner.result.provenance.commit_of", lambda _: "b" * 40)
-    assert main([*SMALL, "--date=2026-11-23"]) == 0
-    assert attributes() == without | there | {"date_created": "2026-11-23"}
-    assert main([*SMALL, "--date"]) == 0
-    now = attributes()
+    assert run("--date=2026-11-23") == there | {"date_created": "2026-11-23"}
+    assert solver.n_results == 0
+    now = run("--date")
     assert str(now.pop("date_created")).endswith("Z")
-    assert now == without | there
-    assert solver.n_results == 0 < n_results
+    assert now == there

@@ -1,19 +1,26 @@
-"""[scatter]: its sentences, the designs, and the values that samples draw."""
-
-import re
+"""[scatter]: the designs, the values that samples draw, and studies of samples from the file to the result."""
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.stats import kstest, sobol_indices
 
-from studyrunner.scatter.draws import ScatteredPairs, drawn, unit_design
-from studyrunner.scatter.section import ScatterSection, flat_table
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.result.arrays import sample_coordinates
+from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn, flat_table, unit_design
+from studyrunner.scene.scene import build_study_scene, describe_scene
+from studyrunner.scene.scene_set import find_scenes
+from studyrunner.study.realisation import draw_inputs, realise
+from studyrunner.study.study_file import read_study
 from studyrunner.user_error import WrongValueError
+from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
 
-FRICTION = {"normal": {"mean": 0.5, "std": 0.03}}
-ANY_INPUT = {"friction_coefficient": FRICTION}
+pytestmark = pytest.mark.usefixtures("folder")
+NORMAL = {"normal": {"mean": 0.5, "std": 0.03}}
 PAIRS = ScatteredPairs(("left",) * 3 + ("right",) * 2, np.linspace(0.0, 1.0, 15).reshape(5, 3))
 OWN = {"friction_coefficient": 0.3, "gap": np.linspace(0.0, 4e-6, 5), "wear_coefficient": 1.1e-11, "area": 0.1 + 0.2}
+FRICTION = "scatter.friction_coefficient={normal={std=0.03}}"
+WEAR = "scatter.wear_coefficient={lognormal={factor=1.5}}"
 
 
 def read(**table):
@@ -22,20 +29,6 @@ def read(**table):
 
 def draw(pairs=PAIRS, **table):
     return drawn(read(**table), OWN, pairs)
-
-
-# --- the table ---
-
-
-def test_defaults_and_what_is_written_back():
-    section = read(**ANY_INPUT)
-    assert (section.samples, section.method, section.seed, section.realisations) == (64, "sobol", 1, 64)
-    assert section.model_dump(mode="json", exclude_none=True) == {
-        "samples": 64,
-        "method": "sobol",
-        "seed": 1,
-        "friction_coefficient": {**FRICTION, "of": "all pairs"},
-    }
 
 
 # --- the designs ---
@@ -99,18 +92,13 @@ def test_zero_width_is_the_own_value_to_the_last_bit(of, distribution):
     assert (found.apply(0.1 + 0.2) == 0.1 + 0.2).all()
 
 
-def test_draws_of_one_input_do_not_depend_on_the_pairs_of_another():
+def test_each_input_and_each_surface_has_a_draw():
     gap = {"normal": {"std": 1e-6}, "of": "each pair"}
-    alone = draw(**ANY_INPUT)["friction_coefficient"]
-    beside = draw(**ANY_INPUT, gap=gap)
+    alone = draw(friction_coefficient=NORMAL)["friction_coefficient"]
+    beside = draw(friction_coefficient=NORMAL, gap=gap)
     np.testing.assert_array_equal(beside["friction_coefficient"].score, alone.score)
     assert beside["gap"].apply(OWN["gap"]).shape == (64, 5)
-
-
-def test_each_surface_has_a_draw():
-    found = draw(friction_coefficient={**FRICTION, "of": "each surface"})["friction_coefficient"]
-    values = found.apply(0.3)
-    assert values.shape == (64, 5)
+    values = draw(friction_coefficient={**NORMAL, "of": "each surface"})["friction_coefficient"].apply(0.3)
     assert [len(np.unique(row)) for row in values] == [2] * 64
     assert (values[:, 0] == values[:, 2]).all()
 
@@ -127,34 +115,135 @@ def test_neighbouring_pairs_are_correlated_over_the_length():
     np.testing.assert_allclose(values.std(axis=0), 2.0, rtol=0.02)
 
 
-def test_a_correlation_length_needs_positions():
-    pairs = ScatteredPairs(PAIRS.surface, np.full((5, 3), np.nan))
-    gap = {"normal": {"std": 1e-6}, "of": "each pair", "correlation_length": 1e-3}
-    with pytest.raises(WrongValueError, match="where its contact pairs are") as caught:
-        draw(pairs, gap=gap)
-    assert caught.value.key == "scatter.gap.correlation_length"
-
-
 @pytest.mark.parametrize(
-    ("name", "distribution"),
+    ("own", "name", "given"),
     [
-        ("friction_coefficient", {"normal": {"std": 0.3}}),
-        ("wear_coefficient", {"normal": {"relative_std": 1.0}}),
-        ("area", {"uniform": {"low": -1e-3, "high": 1.0}}),
-        ("frequency", {"uniform": {"low": -1.0, "high": 1.0}}),
-        ("excitation_amplitude", {"normal": {"mean": 1.0, "std": 1.0}}),
+        # what physics forbids, of each value of an axis
+        ({}, "friction_coefficient", {"normal": {"std": 0.3}}),
+        ({}, "wear_coefficient", {"normal": {"relative_std": 1.0}}),
+        ({}, "area", {"uniform": {"low": -1e-3, "high": 1.0}}),
+        ({}, "frequency", {"uniform": {"low": -1.0, "high": 1.0}}),
+        ({}, "excitation_amplitude", {"normal": {"mean": 1.0, "std": 1.0}}),
+        ({"friction_coefficient": [[0.3], [0.1]]}, "friction_coefficient", {"uniform": {"half_width": 0.2}}),
+        # a share of nothing, a length without positions
+        ({"gap": np.zeros(5)}, "gap", {"normal": {"relative_std": 0.1}}),
+        ({}, "gap", {"normal": {"std": 1e-6}, "of": "each pair", "correlation_length": 1e-3}),
     ],
 )
-def test_draws_that_physics_forbids_are_refused(name, distribution):
-    with pytest.raises(WrongValueError, match=re.escape(f"which {name} cannot be")) as caught:
-        draw(**{name: distribution}, samples=10_000)
-    assert caught.value.key == f"scatter.{name}"
+def test_draws_that_cannot_be_are_refused(own, name, given):
+    nowhere = ScatteredPairs(PAIRS.surface, np.full((5, 3), np.nan))
+    with pytest.raises(WrongValueError) as caught:
+        drawn(read(**{name: given}, samples=8192), OWN | own, nowhere)
+    assert caught.value.key.startswith(f"scatter.{name}")
 
 
-def test_each_value_of_an_axis_is_looked_at_and_a_share_of_nothing_is_refused():
-    section = read(friction_coefficient={"uniform": {"half_width": 0.2}})
-    assert drawn(section, {"friction_coefficient": [[0.3], [0.4]]}, PAIRS)
-    with pytest.raises(WrongValueError, match="less width"):
-        drawn(section, {"friction_coefficient": [[0.3], [0.1]]}, PAIRS)
-    with pytest.raises(WrongValueError, match="own value is 0"):
-        drawn(read(gap={"normal": {"relative_std": 0.1}}), {"gap": np.zeros(5)}, PAIRS)
+# --- from the file to the result ---
+
+
+@pytest.mark.slow
+def test_a_scatter_without_width_is_the_point():
+    of_pairs = ("gap={normal={std=0}, of='each pair'}", "area={lognormal={factor=1}, of='each surface'}")
+    widths = (*of_pairs, "friction_coefficient={normal={std=0}, of='each pair'}", "mass={lognormal={factor=1}}")
+    drawn = ("outputs.variables=['default']", "scatter.samples=2", *(f"scatter.{one}" for one in widths))
+    samples = compute("sdof_slider", "w.nc", *CHEAP, *drawn)
+    names = [str(name) for name in samples.drop_vars("stuck_frequency").data_vars]
+    point = compute("sdof_slider", "p.nc", *CHEAP, f"outputs.variables={names}")
+    for sample in (0, 1):
+        same_values(samples.isel(sample=sample), point)
+
+
+@pytest.mark.slow
+def test_more_samples_go_on_from_those_there_are(capsys):
+    """Also where each sample has a scene of its own."""
+    scatter = (FRICTION, "scatter.stiffness={normal={std=100}}")
+    few = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=2", *scatter)
+    capsys.readouterr()
+    many = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=4", *scatter)
+    assert "2 of 4 points are there from an earlier run" in capsys.readouterr().err
+    same_values(many.isel(sample=slice(2)), few)
+    xr.testing.assert_identical(compute("sdof_slider", "n.nc", *CHEAP, "scatter.samples=4", *scatter), many)
+    assert len(np.unique(many.worn_volume[..., -1])) == 4
+
+
+@pytest.mark.slow
+def test_scatter_of_the_wear_coefficient_alone_is_one_history():
+    given = (*CHEAP, "axes.scheme=adaptive", "scatter.samples=64", WEAR)
+    study = read_study("sdof_slider", given)
+    plan = build_tasks(study, 2)
+    assert (len(plan.sweeps), len(plan.results), *plan.left_out.values()) == (1, 1, 63)
+    samples = compute("sdof_slider", "w.nc", *given)
+    assert samples.newton_iterations.min() == samples.newton_iterations.max()
+    value = float(samples.sample_wear_coefficient[40])
+    alone = compute("sdof_slider", "a.nc", *CHEAP, "axes.scheme=adaptive", f"axes.wear_coefficient={value!r}")
+    one, other = (each.worn_volume.values.squeeze() for each in (samples.isel(sample=40), alone))
+    # both within rtol of the true volume; the steps are those of the largest coefficient
+    np.testing.assert_allclose(one, other, rtol=1e-2)
+
+
+@pytest.mark.slow
+def test_a_sample_is_the_study_of_its_drawn_values():
+    scatter = ("scatter.frequency={normal={std=0.5}}", "scatter.mass={normal={std=1e-3}}")
+    asked = "outputs.variables=['worn_volume', 'exact']"
+    samples = compute("sdof_slider", "w.nc", *CHEAP, "scatter.samples=2", FRICTION, *scatter, asked)
+    for number in range(2):
+        sample = samples.isel(sample=number)
+        own = [
+            f"axes.frequency={float(sample.sample_frequency)!r}",
+            f"scene.friction_coefficient={float(sample.sample_friction_coefficient)!r}",
+            f"scene.mass={float(sample.sample_mass)!r}",
+        ]
+        same_values(sample, compute("sdof_slider", "a.nc", *CHEAP, *own, asked))
+    assert samples.sample_mass.attrs["units"] == "kg"
+    assert samples.sample_frequency.attrs["units"] == "Hz"
+
+
+@pytest.mark.slow
+def test_pairs_that_differ_between_samples_have_the_dimension():
+    """A scattered radius moves the strips; gaps are drawn around those of the scene of each sample."""
+    given = ("scene.strips=10", *UNWORN, "solver.harmonics=1")
+    gap = "scatter.gap={normal={std=0}, of='each pair'}"
+    samples = compute("cylinder_on_flat", "w.nc", *given, "scatter.samples=2", "scatter.R={normal={std=1e-4}}", gap)
+    assert samples.sample_gap.dims == ("sample", "contact")
+    gaps = [build_study_scene(each.study).contact.gap for each in realise(read_study("w.nc"))]
+    np.testing.assert_array_equal(samples.sample_gap, gaps)
+    assert samples.contact_x.dims == ("sample", "contact")
+    assert samples.contact_exists.all()
+    assert (samples.contact_area[0] != samples.contact_area[1]).all()
+
+
+@pytest.mark.slow
+def test_axes_and_samples_stand_side_by_side_and_the_result_is_the_study_again():
+    axes = ("axes.friction_coefficient=[0.4, 0.6]", "axes.threshold=[0, 5]")
+    given = (*CHEAP, "scatter.samples=2", FRICTION, WEAR, "wear.law=threshold", *axes)
+    first = compute("sdof_slider", "first.nc", *given)
+    assert first.worn_volume.dims[-4:] == ("friction_coefficient", "threshold", "sample", "cycle")
+    assert first.sample_friction_coefficient.dims == ("friction_coefficient", "sample")
+    variants = read_study("sdof_slider", given).variants
+    drawn = [draw_inputs(variant)["friction_coefficient"] for variant in variants[::2]]
+    np.testing.assert_array_equal(first.sample_friction_coefficient, drawn)
+    xr.testing.assert_identical(compute("first.nc", "second.nc").drop_attrs(), first.drop_attrs())
+
+
+@pytest.mark.slow
+def test_a_saltelli_design_of_wear_coefficient_and_factor_of_a_surface():
+    """The volume is k_w c N times a constant where nothing depends on wear."""
+    sliding = ("scene.normal_stiffness=0", "axes.wear_coefficient=1e-11", "wear.surfaces={support=0.5}")
+    surface = "scatter.surfaces={support={lognormal={factor=1.3}}}"
+    given = (*CHEAP, "axes.step=2000", *sliding, "scatter.method=saltelli", "scatter.samples=4", WEAR, surface)
+    assert len(build_tasks(read_study("sdof_slider", given), 2).sweeps) == 1, "all samples start from one state"
+    samples = compute("sdof_slider", "w.nc", *given)
+    assert samples.sizes["sample"] == 4 * 4
+    ratio = samples.worn_volume[..., -1] / (samples.sample_wear_coefficient * samples.sample_surfaces_support)
+    assert float(ratio.std() / ratio.mean()) < 1e-9
+    assert len(np.unique(samples.worn_volume[..., -1])) > 8
+
+
+def test_drawn_gaps_stand_along_the_axes_along_which_pairs_differ():
+    gap = "scatter={samples = 2, gap = {normal = {std = 1e-9}, of = 'each pair'}}"
+    axes = ("axes.strips=[20, 10]", "axes.E=[1e11, 2e11]", "scene.half_width=1e-3")
+    study = read_study("cylinder_on_flat", [*axes, gap])
+    scenes = find_scenes(study)
+    facts = [describe_scene(build_study_scene(each)) for each in scenes.studies]
+    (found,) = sample_coordinates(study, facts, scenes)
+    assert found.entry.dimensions == ("strips", "sample", "contact")
+    assert np.isfinite(found.values).sum(axis=-1).tolist() == [[10, 10], [5, 5]], "half of the strips, by symmetry"

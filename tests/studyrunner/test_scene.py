@@ -1,116 +1,160 @@
-"""For how many harmonics a scene is built, and how many one can be solved with, where their number is automatic."""
+"""The model of a study: computed once, written to scene files, sent to ranks; its harmonics and its pairs."""
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from solver.model import ReducedModel, needed_nodal_diameters
-from studies import build_scene
+from solver.model import ContactInterface, needed_nodal_diameters
+from solver.packing import Packed, pack
+from studies import build_scene, read_scene
+from studies.fe_models.from_files import scene as from_files
 from studies.scene_file import write_scene
+from studies.scenes import sector as sector_room
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
-from studyrunner.scene.scene import (
-    build_study_scene,
-    describe_scene,
-    largest_harmonics,
-    write_study_scene,
-)
+from studyrunner.scene import computed as computed_room
+from studyrunner.scene import scene as scene_room
+from studyrunner.scene.computed import InMemory
+from studyrunner.scene.edge_pairs import edge_pairs
+from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics, write_study_scene
 from studyrunner.scene_building import SceneModels
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.studies.scene_models import plain, sector
+from tests.studyrunner.small_studies import CHEAP, SLIDER, compute, same_values, words
 
-WAVE = ("scene.mesh=1", "scene.nodal_diameter=3", "scene.stuck_modes=2", "scene.stress_stiffening=false")
-STUDY = """
-[study]
-name = "s"
-[scene]
-model = "wave.h5"
-friction_coefficient = 0.3
-[axes]
-frequency = 200.0
-"""
+pytestmark = pytest.mark.usefixtures("folder")
 
 
-def holding(model, n_harmonics):
-    """The model with the nodal diameters that this number of harmonics needs, and no others."""
-    needed = needed_nodal_diameters(model.nodal_diameter, model.n_sectors, n_harmonics)
-    filled = next(iter(model.linear.values()))
-    return replace(model, linear={k: model.linear.get(k, filled) for k in needed})
+def digest_of(study, *overrides):
+    return describe_scene(build_study_scene(read_study(study, overrides))).digest
 
 
-@pytest.mark.parametrize("n_harmonics", [1, 2, 5])
-def test_nodal_diameters_that_are_held_bound_the_harmonics(n_harmonics):
-    wave = replace(sector(), n_sectors=47, nodal_diameter=4)
-    assert largest_harmonics(holding(wave, n_harmonics)) == n_harmonics
+# --- computed once ---
 
-
-@pytest.fixture(scope="module")
-def wave_scene(tmp_path_factory):
-    path = tmp_path_factory.mktemp("scene") / "wave.h5"
-    write_scene(holding(build_study_scene(read_study("dovetail", WAVE)), 3), path)
-    return path
+SCENES = {
+    "sector": ("dovetail", ["scene.mesh=1"]),
+    "travelling wave": ("dovetail", ["scene.mesh=1", "scene.nodal_diameter=3"]),
+    "finite-element model": ("blade_root", []),
+    "masses": ("two_masses", []),
+}
 
 
 @pytest.fixture
-def wave_file(wave_scene, tmp_path, monkeypatch):
-    """Study of a scene file with the nodal diameters of 3 harmonics."""
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(wave_scene, tmp_path)
-    (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
-    return "s.toml"
+def keep_all(monkeypatch):
+    """What takes no time is kept as well."""
+    monkeypatch.setattr(computed_room, "LEAST_SECONDS", -1.0)
+
+
+def memory(model):
+    """All that the last bits of a result depend on."""
+    arrays = [(name, np.asarray(value)) for name, value in _parts(model)]
+    return [(name, a.dtype.str, a.shape, a.strides, a.flags.c_contiguous, a.tobytes()) for name, a in arrays]
 
 
 @pytest.mark.slow
-def test_automatic_harmonics_go_as_far_as_the_scene_file(wave_file, capsys):
-    assert describe_scene(build_study_scene(read_study(wave_file))).largest_harmonics == 3
-    assert main([wave_file, "--plan"]) == 0
-    assert "harmonics automatic (at most 3, for which the scene holds the nodal diameters)" in capsys.readouterr().out
+@pytest.mark.usefixtures("keep_all")
+@pytest.mark.parametrize("case", SCENES)
+def test_what_takes_long_is_computed_once(case, monkeypatch):
+    study, kept = read_study(*SCENES[case]), InMemory()
+    built = build_study_scene(study, computed=kept)
+    monkeypatch.setattr(scene_room, "_build_here", pytest.fail)
+    monkeypatch.setattr(sector_room, "prepare_model", pytest.fail)
+    again = build_study_scene(read_study(*SCENES[case]), computed=kept)
+    assert memory(again) == memory(built)
+    assert list(again.linear) == list(built.linear)
+    assert describe_scene(again).digest == describe_scene(built).digest
+    assert type(again.contact.surface) is type(built.contact.surface)
 
 
-@pytest.mark.parametrize("override", ["solver.harmonics=4", "axes.harmonics=['auto', 4]"])
-def test_a_number_of_harmonics_needs_its_nodal_diameters(override, wave_file):
-    with pytest.raises(UserError, match=r"wave\.h5: nd/12: missing: give this group, .* fewer than 4 harmonics"):
-        build_study_scene(read_study(wave_file, [override]))
+def test_a_changed_file_or_source_makes_another_scene(monkeypatch):
+    def key():
+        return {computed_room.model_key(read_study("blade_root"))}
+
+    before = key()
+    with monkeypatch.context() as changed:
+        changed.setattr(from_files, "file_digest", lambda _: "of another file")
+        assert key() != before
+    assert key() == before
+    monkeypatch.setattr(computed_room, "package_digest", lambda package: f"another {package}")
+    assert key() != before
 
 
-@pytest.fixture
-def rough_file(tmp_path, monkeypatch):
-    """Study of a scene file with a friction coefficient for each pair."""
-    monkeypatch.chdir(tmp_path)
-    model = plain()
-    own = np.array([0.2, 0.3, 0.4])
-    write_scene(replace(model, contact=replace(model.contact, friction_coefficient=own)), tmp_path / "wave.h5")
-    (tmp_path / "s.toml").write_text(STUDY.replace("friction_coefficient = 0.3\n", ""), encoding="utf-8")
-    return "s.toml"
+def test_a_changed_scene_file_makes_another_scene():
+    tables = '[study]\nname = "s"\n[scene]\nmodel = "scene.h5"\nfriction_coefficient = 0.5\n[axes]\nfrequency = 1\n'
+    Path("s.toml").write_text(f"{tables}contact_stiffness = [1e9, 1e10]\n")
+    keys = []
+    for mass in (1.0, 2.0):
+        write_study_scene(read_study("two_masses", {"scene.mass_1": mass}), Path("scene.h5"))
+        keys += [computed_room.model_key(variant) for variant in read_study("s.toml").variants]
+    assert len(set(keys)) == 4
+
+
+@pytest.mark.usefixtures("keep_all")
+@pytest.mark.parametrize("wrong", [Packed("{", ()), pack(None), pack(((0, 1), "model"))])
+def test_what_is_no_model_is_built_again(wrong):
+    study, kept = read_study("two_masses"), InMemory()
+    built = build_study_scene(study, computed=kept)
+    (key,) = kept
+    kept[key] = wrong
+    assert memory(build_study_scene(study, computed=kept)) == memory(built)
+    assert kept[key] is not wrong
+
+
+# --- in a scene file ---
 
 
 @pytest.mark.slow
-def test_a_scene_file_gives_each_pair_its_friction_coefficient(rough_file):
-    study = read_study(rough_file)
+def test_a_scene_file_holds_the_contact_stiffness_or_gets_it_from_the_study():
+    rigid, soft = (build_scene("sdof_slider", **given) for given in ({}, {"contact_stiffness": 1e11}))
+    own = "scene.contact_stiffness=1e11"
+    for name, options in (("soft", words(own)), ("rigid", [])):
+        assert main(["sdof_slider", *options, "--write-scene", f"{name}.h5"]) == 0
+        study = SLIDER.replace('"sdof_slider"', f'"{name}.h5"\nfriction_coefficient = 0.5')
+        Path(f"{name}.toml").write_text(study, encoding="utf-8")
+    np.testing.assert_array_equal(read_scene("soft.h5").linear[0].stiffness, soft.linear[0].stiffness)
+    expected = describe_scene(soft).digest
+    assert digest_of("rigid.toml", own) == digest_of("soft.toml") == expected != describe_scene(rigid).digest
+    first = compute("rigid.toml", "first.nc", *CHEAP, own)
+    # the result holds the scene with its springs, which are not added once more
+    same_values(first, compute("first.nc", "again.nc"))
+    with pytest.raises(UserError, match=r"scene.contact_stiffness = 10+\.0: leave it out: the result holds"):
+        read_study("first.nc", ["scene.contact_stiffness=1e13"])
+    one_value = compute("rigid.toml", "axis.nc", *CHEAP, "axes.contact_stiffness=[1e11]")
+    same_values(one_value, compute("axis.nc", "again.nc"))
+    same_values(one_value.squeeze("contact_stiffness"), first)
+
+
+def test_a_scene_file_gives_each_pair_its_friction_coefficient():
+    contact = replace(plain().contact, friction_coefficient=np.array([0.2, 0.3, 0.4]))
+    write_scene(replace(plain(), contact=contact), Path("rough.h5"))
+    Path("s.toml").write_text(SLIDER.replace("sdof_slider", "rough.h5"), encoding="utf-8")
+    study = read_study("s.toml")
     assert study.friction_coefficient is None
     assert build_study_scene(study).contact.friction_coefficient.tolist() == [0.2, 0.3, 0.4]
     assert "friction_coefficient" not in format_study(study)
     write_study_scene(study, Path("again.h5"))
-    again = build_study_scene(read_study(rough_file, ["scene.model=again.h5"]))
-    assert describe_scene(again).digest == describe_scene(build_study_scene(study)).digest
+    assert digest_of("s.toml", "scene.model=again.h5") == digest_of("s.toml")
 
 
-def test_the_friction_coefficient_is_given_once(rough_file, capsys):
-    assert main([rough_file, "--plan", "--set", "scene.friction_coefficient=0.3"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "s.toml: scene.friction_coefficient = 0.3: remove it" in line
-    assert "contact/friction_coefficient" in line
-    write_scene(plain(), Path("wave.h5"))
-    assert main([rough_file, "--plan"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "s.toml: scene.friction_coefficient" in line
-    assert "missing: give it, or contact/friction_coefficient in the scene file" in line
+@pytest.mark.parametrize("n_harmonics", [1, 2, 5])
+def test_nodal_diameters_in_a_scene_file_bound_automatic_harmonics(n_harmonics, capsys):
+    wave = replace(sector(), n_sectors=47, nodal_diameter=4)
+    standing, travelling = wave.linear.values()
+    needed = needed_nodal_diameters(4, 47, n_harmonics)
+    held = replace(wave, linear={k: standing if k == 0 else travelling for k in needed})
+    assert largest_harmonics(held) == n_harmonics
+    write_scene(held, Path("wave.h5"))
+    text = SLIDER.replace('"sdof_slider"', '"wave.h5"\nfriction_coefficient = 0.3').replace("= 5", '= "auto"')
+    Path("s.toml").write_text(text, encoding="utf-8")
+    assert main(["s.toml", "--plan"]) == 0
+    assert f"harmonics automatic (at most {n_harmonics}, for which" in capsys.readouterr().out
 
+
+# --- sent to ranks ---
 
 STIFFNESSES = (1.6e5, 1.7e5, 1.8e5)
 
@@ -134,22 +178,20 @@ class Sent:
         return task.models[0] if task.models else None
 
 
-def test_ranks_that_see_the_files_get_one_copy_and_others_their_own(tmp_path):
-    sent = Sent(tmp_path)
+def test_ranks_that_see_the_files_get_one_copy_and_others_their_own(folder):
+    sent = Sent(folder)
     first, second = sent(0, 1), sent(1, 1)
     assert isinstance(first, MappedFile)
     assert first == second
     assert sent.read == [1]
-    model = open_mapped(first)
-    assert isinstance(model, ReducedModel)
-    assert describe_scene(model).digest == describe_scene(sent.models[1]).digest
-    assert sent(1, 1) is None
+    assert describe_scene(open_mapped(first)).digest == describe_scene(sent.models[1]).digest
     assert sent(2, 1) is sent.models[1]
-    assert sent(2, 1) is None
+    # each has it by now
+    assert [sent(rank, 1) for rank in (1, 2)] == [None, None]
 
 
-def test_a_file_goes_once_no_rank_holds_its_model(tmp_path):
-    sent = Sent(tmp_path)
+def test_a_file_goes_once_no_rank_holds_its_model(folder):
+    sent = Sent(folder)
     given = sent(0, 0)
     assert sent(1, 0) == given
     for scene in (1, 2):
@@ -162,3 +204,46 @@ def test_a_file_goes_once_no_rank_holds_its_model(tmp_path):
     assert sent.read == [0, 1, 2]
     assert isinstance(sent(0, 0), MappedFile)
     assert sent.read == [0, 1, 2, 0]
+
+
+# --- pairs at the edge of a surface ---
+
+
+def contact_in_a_plane(x, y):
+    """Pairs at these places of a plane that lies anywhere in space."""
+    axes, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    position = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3) @ axes + [0.3, -2.0, 0.1]
+    n = len(position)
+    dofs = np.stack([np.arange(n), np.full(n, -1), np.full(n, -1)], axis=1)
+    return ContactInterface(dofs, np.ones(n), np.zeros(n), np.zeros(n), position, ("",) * n)
+
+
+@pytest.mark.parametrize("side", [0.05, 1.0, 20.0])
+@pytest.mark.parametrize("skew", [0.0, 1.0])
+def test_a_structured_mesh_has_the_edge_of_its_rows_and_columns(side, skew):
+    i, j = np.meshgrid(np.arange(9.0), np.arange(5.0), indexing="ij")
+    expected = (i == 0) | (i == 8) | (j == 0) | (j == 4)
+    # round-off of a mesh of one's own leaves no edge straight
+    noise = 1e-9 * np.random.default_rng(1).normal(size=i.shape)
+    assert edge_pairs(contact_in_a_plane(i + skew * j + noise, side * j)).tolist() == expected.ravel().tolist()
+
+
+def test_an_unstructured_mesh_has_its_edge_and_its_hole():
+    random, kept = np.random.default_rng(0), []
+    for place in random.random((1500, 2)):
+        if all(np.hypot(*(place - other)) > 0.04 for other in kept) and np.hypot(*(place - 0.5)) > 0.2:
+            kept.append(place)
+    x, y = np.array(kept).T
+    found = edge_pairs(contact_in_a_plane(x, y))
+    from_side = np.minimum(np.minimum(x, 1.0 - x), np.minimum(y, 1.0 - y))
+    from_hole = np.hypot(x - 0.5, y - 0.5) - 0.2
+    assert found[from_side < 0.01].all()
+    assert found[from_hole < 0.01].mean() > 0.5
+    assert not found[(from_side > 0.08) & (from_hole > 0.08)].any()
+
+
+def test_a_scene_that_says_its_edge_is_believed():
+    contact = build_scene("cylinder_on_flat", strips=12).contact
+    assert edge_pairs(contact).tolist() == [False] * 5 + [True]
+    # along a line the ends are the edge
+    assert edge_pairs(replace(contact, edge=None)).tolist() == [True] + [False] * 4 + [True]

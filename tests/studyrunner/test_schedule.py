@@ -1,16 +1,39 @@
-"""The schedule on one rank, and the ranks without MPI."""
+"""The schedule on one rank, the ranks without MPI, and what a user sees while a study runs."""
 
+import io
+import itertools
 import sys
 import threading
+import time
 from dataclasses import dataclass
 from types import SimpleNamespace
 
 import pytest
 
+from studyrunner import task_runs
+from studyrunner.cli import main
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
+from studyrunner.study.study_file import read_study
+from studyrunner.system.progress import ProgressDisplay, Standing
+from studyrunner.task_runs import TaskProgress
+from tests.benchmarks.simulation import MemoryIndex
+from tests.studyrunner.fakes import fake_history, fake_sweep
+
+
+@dataclass(frozen=True)
+class Job:
+    kind: str
+    cost: float
+    n_results: int = 1
+    gives_starts: bool = False
+
+    @property
+    def cost_keys(self):
+        return (("all", self.kind),)
 
 
 def serve(tasks, run, take=lambda *_: []):
@@ -22,31 +45,27 @@ def serve(tasks, run, take=lambda *_: []):
 def test_long_tasks_go_first_and_results_make_new_ones():
     done: list[tuple[str, object]] = []
 
-    def run(job):
-        yield job.kind.upper()
-
     def take(job, result):
         done.append((job.kind, result))
         return [Job("a1", 1e5), Job("a2", 1e6)] if job.kind == "a" else []
 
-    serve([Job("b", 10.0), Job("a", 1.0, gives_starts=True)], run, take)
+    serve([Job("b", 10.0), Job("a", 1.0, gives_starts=True)], lambda job: iter([job.kind.upper()]), take)
     assert done == [("a", "A"), ("a2", "A2"), ("a1", "A1"), ("b", "B")]
 
 
 def test_results_arrive_while_their_task_goes_on():
-    taken = threading.Event()
+    taken, results = threading.Event(), []
 
-    def run(job):
+    def run(_):
         yield 1
         assert taken.wait(120.0)
         yield 2
 
-    def take(job, result):
-        taken.set()
+    def take(_, result):
         results.append(result)
+        taken.set()
         return []
 
-    results: list[object] = []
     serve([Job("a", 1.0, n_results=2)], run, take)
     assert results == [1, 2]
 
@@ -75,46 +94,23 @@ def test_what_the_launcher_says(environment, size, rank):
 def test_several_processes_without_mpi_are_refused(monkeypatch):
     monkeypatch.setenv("PMI_SIZE", "2")
     monkeypatch.setitem(sys.modules, "mpi4py", None)
-    with pytest.raises(LauncherError, match="2 processes were started that cannot talk"):
+    with pytest.raises(LauncherError, match="2 processes"):
         start_ranks()
 
 
-@dataclass(frozen=True)
-class Job:
-    kind: str
-    cost: float
-    n_results: int = 1
-    gives_starts: bool = False
-
-    @property
-    def cost_keys(self):
-        return (("all", self.kind),)
-
-
-def make(n_ranks, *jobs):
-    clock = SimpleNamespace(now=0.0)
-    dispatcher = Dispatcher(n_ranks, CostModel(), lambda: clock.now)
-    dispatcher.add(jobs)
-    return dispatcher, clock
-
-
-def handed_out(dispatcher):
-    return [(rank, assignment.number) for rank, assignment in dispatcher.assign()]
-
-
 def test_what_waits_is_bounded(monkeypatch):
-    """A branch does not go first where more waits than all ranks have use for."""
+    """A sweep does not go first where more waits than all ranks have use for."""
     monkeypatch.setattr(dispatch, "_WAITING", 10)
     monkeypatch.setattr(dispatch, "_WAITING_A_RANK", 0)
-    branches = [Job("branch", 1.0, 4, True)] * 50
-    dispatcher, _ = make(1, *branches)
+    dispatcher = Dispatcher(1, CostModel(), time.monotonic)
+    dispatcher.add([Job("sweep", 1.0, 4, True)] * 50)
     most, n_done, waiting = 0, 0, 0
     while not dispatcher.done:
         ((rank, assignment),) = dispatcher.assign()
         for _ in range(assignment.task.n_results):
             dispatcher.deliver(rank, assignment.number, 1.0)
             if assignment.task.gives_starts:
-                dispatcher.add([Job("march", 1.0)])
+                dispatcher.add([Job("history", 1.0)])
                 waiting += 1
         if not assignment.task.gives_starts:
             n_done, waiting = n_done + 1, waiting - 1
@@ -123,22 +119,83 @@ def test_what_waits_is_bounded(monkeypatch):
     assert most < 10 + 4
 
 
-def test_a_task_that_does_not_end_teaches_and_is_forgotten_when_it_does():
-    jobs = [Job("a", 2.0), *[Job("b", 2.0)] * 20, *[Job("a", 1.5)] * 20]
-    dispatcher, clock = make(2, *jobs)
-    first, (rank, number) = handed_out(dispatcher)
-    assert (jobs[first[1]].kind, jobs[number].kind) == ("a", "b")
-    clock.now = 99.0
-    dispatcher.deliver(rank, number, 2.0)
-    ((rank, number),) = handed_out(dispatcher)
-    assert jobs[number].kind == "b"
-    clock.now = 100.0
-    dispatcher.watch()
-    dispatcher.deliver(rank, number, 2.0)
-    ((_, number),) = handed_out(dispatcher)
-    assert jobs[number].kind == "a"
-    costs = dispatcher._costs
-    late = costs.correction((("all", "a"),))
-    dispatcher.deliver(first[0], first[1], 2.0)
-    assert costs.measured("a") == 2.0
-    assert costs.correction((("all", "a"),)) < 2.0 < late
+# --- what a user sees ---
+
+
+def test_a_line_every_half_minute_at_least(monkeypatch, capsys):
+    clock, looks = SimpleNamespace(now=1000.0), []
+    monkeypatch.setattr("studyrunner.system.progress.time.monotonic", lambda: clock.now)
+
+    def look():
+        looks.append(clock.now)
+        return Standing(5, 20, 0.25, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
+
+    with ProgressDisplay() as shown:
+        shown.say("computing")
+        for tenth in range(36_000):
+            clock.now = 1000.0 + 0.1 * tenth
+            shown.tick(look)
+    first, *lines = capsys.readouterr().err.splitlines()
+    assert first == "[    0 s] computing"
+    assert lines[0] == ("[    2 s] 5 of 20 points, 25 %, about 6 s left, running: sweep up to 211 Hz, 210 Hz implicit")
+    gaps = [later - before for before, later in itertools.pairwise(looks)]
+    assert len(lines) == len(looks)
+    assert 2.0 - 1e-6 <= min(gaps) <= max(gaps) <= 30.2
+    # not more often than that either
+    assert len(lines) < 3600 / 30 + 12
+
+
+def test_a_bar_on_a_terminal(monkeypatch):
+    screen = io.StringIO()
+    screen.isatty = lambda: True
+    monkeypatch.setattr(sys, "stderr", screen)
+    for name, value in (("TERM", "xterm"), ("COLUMNS", "160")):
+        monkeypatch.setenv(name, value)
+    with ProgressDisplay() as shown:
+        shown.say("computing")
+        shown.tick(lambda: Standing(5, 20, 0.25, 30.0, ("210 Hz implicit",)))
+        shown._bar.refresh()
+    assert "5 of 20 points, 25 %, about 30 s left, running: 210 Hz implicit" in screen.getvalue()
+
+
+@pytest.mark.parametrize("compiles", [True, False])
+def test_a_run_that_has_to_compile_says_so_once(compiles, solver, tmp_path, monkeypatch, capsys):
+    solver.disturb = lambda *_: time.sleep(0.05)
+    numbers = itertools.count(3) if compiles else itertools.repeat(3)
+    monkeypatch.setattr(task_runs, "n_compiled", lambda: next(numbers))
+    assert main(["sdof_slider", "--set", "axes.frequency=100", "-o", str(tmp_path / "out.nc")]) == 0
+    said = capsys.readouterr().err
+    assert said.count("the solver is compiled for this machine") == int(compiles)
+
+
+def plan_of():
+    axes = ("frequency={start=1, stop=2, num=8}", "wear_coefficient=[1e-12, 7e-12]", "step=1000", "scheme=implicit")
+    return build_tasks(read_study("sdof_slider", [f"axes.{each}" for each in (*axes, "sweep=['up', 'down']")]), 2)
+
+
+def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
+    plan = plan_of()
+    progress = TaskProgress(MemoryIndex(plan))
+    assert progress.look(()).seconds_left == pytest.approx(plan.cost)
+    histories = []
+    for sweep in plan.sweeps:
+        for start in fake_sweep(sweep):
+            progress.costs.learn(sweep.cost_keys, sweep.cost / sweep.n_results, 1.0)
+            histories.extend(progress.take(sweep, start))
+    for number, task in enumerate(histories, start=1):
+        progress.costs.learn(task.cost_keys, task.cost, 2.0 * task.cost)
+        progress.take(task, fake_history(task))
+        left = 2.0 * sum(history.cost for history in histories[number:])
+        if number > 8:
+            assert progress.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
+    assert progress.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
+    assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
+
+
+def test_a_sweep_says_where_it_is():
+    """What a sweep sends on its way, by `Keep`, stands behind its name."""
+    progress = TaskProgress(MemoryIndex(plan_of()))
+    (sweep, *_) = progress.begin()
+    progress.keep(sweep, "at 211.5 Hz, 3 of 48 pairs slip or open")
+    (running,) = progress.look([(sweep, sweep.n_results, 1.0)]).running
+    assert running.endswith("(at 211.5 Hz, 3 of 48 pairs slip or open)")

@@ -9,7 +9,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from studyrunner.cli import main
-from studyrunner.study.keys import key_list
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.study.toml_text import format_toml, read_toml
@@ -117,12 +116,6 @@ def test_the_effective_study_is_the_same_study(text, overrides):
     assert [each.scene for each in again.variants] == [each.scene for each in study.variants]
 
 
-def test_a_title_does_not_reach_the_terminal_raw(capsys):
-    Path("s.toml").write_text(SLIDER.replace('name = "s"', 'name = "s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
-    assert main(["s.toml", "--plan"]) == 0
-    assert "\x1b" not in capsys.readouterr().out
-
-
 VALUES = (
     *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
     *("{}", "[[1]]", '""', '"auto"', '"\\u001b[2J"', "'../../x'", "[1, 'a']", "{start = 1, stop = 2, num = 1e9}", "="),
@@ -198,11 +191,6 @@ def test_every_example_is_a_study(text, capsys):
         Path("s.toml").write_text(text, encoding="utf-8")
         assert main(["s.toml", "--plan"]) == 0
         assert "points" in capsys.readouterr().out
-
-
-def test_the_list_of_keys_is_that_of_the_program():
-    page = (ROOT / "studyrunner" / "STUDY_FILE.md").read_text("utf-8")
-    assert key_list() in page, "python -m studyrunner.study.keys"
 
 
 def test_a_new_study_is_planned_and_its_comments_are_its_defaults(folder):

@@ -1,4 +1,4 @@
-"""A scene file and a result file are each enough to have the same result again."""
+"""A scene file, and a result file, are each enough to have the same result again."""
 
 import shutil
 from pathlib import Path
@@ -12,20 +12,23 @@ import xarray as xr
 from studies.scene_file import read_mesh, read_scene
 from studyrunner.cli import main
 from studyrunner.result import provenance
+from studyrunner.scene import scene as scene_room
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
-from tests.mpi.launching import results
+from tests.mpi.launching import options, results
+
+pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
 
 COARSE = ("scene.mesh=1", "axes.frequency=[211.5, 212.0]", "axes.scheme=implicit", "slow_time.cycles=500")
 OUTPUTS = ("slow_time.outputs=2", 'outputs.variables=["default"]', "outputs.loops=[3]", "solver.rtol=0.1")
-WAVE = ("scene.nodal_diameter=3", "scene.n_sectors=20", "solver.harmonics=2", "solver.samples=64")
-
+LEVELS = ("solver.harmonics=2", "solver.samples=64")
+WAVE = ("scene.nodal_diameter=3", "scene.n_sectors=20")
 STUDY = """
 [study]
 name = "dovetail"
 title = "Fretting wear of a dovetail root around the first bending mode"
 [scene]
-model = "files/scene.h5"
+model = "scene.h5"
 friction_coefficient = 0.5
 [axes]
 scheme = "implicit"
@@ -39,140 +42,119 @@ rtol = 0.1
 [outputs]
 loops = [3]
 """
-SLIDER = """
-[study]
-name = "slider"
-[scene]
-model = "slider.h5"
-friction_coefficient = 0.5
-[axes]
-frequency = [150, 160]
-excitation_amplitude = 10
-[slow_time]
-cycles = 2000
-outputs = 3
-[outputs]
-variables = ["default", "outcome"]
-"""
-
-
-def options(*overrides):
-    return [part for text in overrides for part in ("--set", text)]
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """A folder with a scene file and its result."""
-    path = tmp_path_factory.mktemp("made")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(path)
-        assert main(["sdof_slider", "--write-scene", "slider.h5"]) == 0
-        Path("slider.toml").write_text(SLIDER, encoding="utf-8")
-        assert main(["slider.toml"]) == 0
-    return path
+SLIDER = ["sdof_slider", *options("axes.frequency=[150, 160]", "slow_time.cycles=2000", "slow_time.outputs=3")]
+SLIDER += options("outputs.variables=['default', 'exact']")
+KEEP = options("outputs.scene=true")
 
 
 @pytest.fixture
-def slider(made, folder):
-    """A result of a scene file, which is not here."""
-    return Path(shutil.copy(made / "slider.nc", folder))
+def not_built(monkeypatch):
+    """From when it is called on, bundled scenes cannot be built."""
+
+    def refuse(*_):
+        raise AssertionError("built again")
+
+    return lambda: monkeypatch.setattr(scene_room, "build_scene", refuse)
 
 
 def groups(path):
     """What the group of the scene holds."""
     found: dict[str, object] = {}
+
+    def note(name, item):
+        if isinstance(item, h5py.Dataset) and not item.is_scale:
+            found[name] = repr(item[()].tolist())
+
     with h5py.File(path) as file:
-
-        def note(name, item):
-            if isinstance(item, h5py.Dataset) and not item.is_scale:
-                found[name] = item[()].tolist()
-
         file["scene"].visititems(note)
-        found |= {
-            name: file["scene"].attrs[name] for name in ("n_sectors", "nodal_diameter") if name in file["scene"].attrs
-        }
-    return found
+        return found | {name: value for name, value in file["scene"].attrs.items() if name.startswith("n")}
 
 
-@pytest.mark.slow
-def test_a_written_scene_gives_the_same_result(folder):
+# --- of a scene file ---
+
+
+def test_a_written_scene_gives_the_same_result():
     assert main(["dovetail", "-o", "own.nc", *options(*COARSE, *OUTPUTS)]) == 0
-    Path("files").mkdir()
-    assert main(["dovetail", "--write-scene", "files/scene.h5", *options(*COARSE, *OUTPUTS)]) == 0
+    assert main(["dovetail", "--write-scene", "scene.h5", *options(*COARSE, *OUTPUTS)]) == 0
     Path("s.toml").write_text(STUDY, encoding="utf-8")
     assert main(["s.toml", "-o", "file.nc"]) == 0
     own, file = results("own.nc"), results("file.nc")
     assert "mesh_quad" in own
     assert list(own.variables) == list(file.variables)
-    differing = {name for name in own.attrs if own.attrs[name] != file.attrs[name]}
     # a scene file does not say which mesh it is from
-    assert differing == {"study", "id", "summary"}
+    assert {name for name in own.attrs if own.attrs[name] != file.attrs[name]} == {"study", "id", "summary"}
     own.attrs = file.attrs = {}
     xr.testing.assert_identical(own, file)
-
     # and the result alone is enough, wherever it is
     Path("elsewhere").mkdir()
     shutil.move("file.nc", "elsewhere/moved.nc")
-    shutil.rmtree("files")
+    Path("scene.h5").unlink()
     assert main(["elsewhere/moved.nc", "-o", "again.nc"]) == 0
     xr.testing.assert_identical(results("again.nc"), results("elsewhere/moved.nc"))
     assert groups("again.nc") == groups("elsewhere/moved.nc")
 
 
-@pytest.mark.slow
-def test_mesh_and_model_come_back_bit_by_bit(folder):
-    study = read_study("dovetail", (*COARSE, *WAVE))
-    assert main(["dovetail", "--write-scene", "wave.h5", *options(*COARSE, *WAVE)]) == 0
-    mesh = read_mesh("wave.h5")
-    Path("wave.toml").write_text(STUDY.replace("files/scene.h5", "wave.h5"), encoding="utf-8")
-    assert main(["wave.toml", "-o", "out.nc", *options("slow_time.cycles=0", "slow_time.outputs=1", *WAVE[2:])]) == 0
-    kept = read_mesh("out.nc", "scene")
-    assert np.array_equal(kept.nodes, mesh.nodes)
-    assert np.array_equal(kept.quads, mesh.quads)
-    assert kept.parts == mesh.parts
-    digest = describe_scene(build_study_scene(study)).digest
-    assert describe_scene(read_scene("wave.h5", 2)).digest == digest
-    assert describe_scene(read_scene("out.nc", 2, "scene")).digest == digest
-    with netCDF4.Dataset("out.nc") as file:
-        assert file["scene/nd/3/stiffness"].datatype.name == "complex"
-    assert main(["out.nc", "--write-scene", "again.h5"]) == 0
-    assert describe_scene(read_scene("again.h5", 2)).digest == digest
-    assert main(["out.nc", "--plan"]) == 0
+# --- of a bundled scene that is kept in the result ---
 
 
-def change(path, work):
-    with h5py.File(path, "r+") as file:
-        work(file)
+def test_the_result_is_enough(not_built):
+    assert main([*SLIDER, "-o", "plain.nc"]) == 0
+    assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
+    plain, kept = results("plain.nc"), results("kept.nc")
+    assert {name for name in kept.attrs if kept.attrs[name] != plain.attrs[name]} == {"study", "id"}
+    xr.testing.assert_identical(kept.drop_attrs(), plain.drop_attrs())
+    with netCDF4.Dataset("plain.nc") as file:
+        assert "scene" not in file.groups
+    not_built()
+    assert main(["kept.nc", "-o", "again.nc"]) == 0
+    xr.testing.assert_identical(results("again.nc"), kept)
+    assert groups("kept.nc") == groups("again.nc")
+    assert main(["again.nc", "--write-scene", "slider.h5"]) == 0
+    assert describe_scene(read_scene("slider.h5")).digest == kept.attrs["scene_sha256"]
 
 
-@pytest.mark.slow
-def test_another_scene_or_solver_is_said_and_computed_all_the_same(slider, capsys, monkeypatch):
-    capsys.readouterr()
+def test_it_is_the_model_in_the_file_that_is_run_and_another_scene_or_solver_is_said(not_built, monkeypatch, capsys):
+    """Twice all masses, stiffnesses and forces, and half the wear coefficient: the same motion and the same wear."""
+    assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
+    with h5py.File("kept.nc", "r+") as file:
+        for name in ("mass", "damping", "stiffness", "load/static", "load/harmonic", "contact/normal_load"):
+            file[f"scene/{name}"][...] *= 2.0
+    not_built()
     monkeypatch.setattr(provenance, "solver_digest", lambda: "another")
-    change(slider, lambda file: file["scene/contact/area"].write_direct(np.array([1.1e-4])))
-    assert main(["slider.nc", "-o", "again.nc"]) == 0
-    warned = [line for line in capsys.readouterr().err.splitlines() if "] slider.nc: " in line]
-    assert len(warned) == 2
-    assert "another scene" in warned[0]
-    assert "computed by another solver" in warned[1]
-    assert "fretwear" in warned[1]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("work", "words"),
-    [
-        (lambda file: file.attrs.__delitem__("study"), ("the attribute study", "missing")),
-        (lambda file: file.attrs.__setitem__("study", "[study"), ("slider.nc", "valid TOML")),
-        (lambda file: file.__delitem__("scene"), ("scene.model", "no such file")),
-        (lambda file: file["scene"].__setitem__("mass2", h5py.ExternalLink("o.h5", "/")), ("mass2", "a link")),
-    ],
-)
-def test_a_result_file_that_was_tampered_with(work, words, slider, capsys):
-    change(slider, work)
     capsys.readouterr()
-    assert main(["slider.nc", "-o", "x.nc"]) == 2
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1
-    for word in words:
-        assert word in said[0]
+    one = results("kept.nc")
+    half = options(f"axes.wear_coefficient={0.5 * one.wear_coefficient.item()!r}")
+    assert main(["kept.nc", *half, "-o", "twice.nc"]) == 0
+    warned = [line for line in capsys.readouterr().err.splitlines() if "] kept.nc: " in line]
+    assert ["another scene" in warned[0], "another solver" in warned[1], len(warned)] == [True, True, 2]
+    twice = results("twice.nc")
+    assert float(one.worn_volume.max()) > 0.0
+    for name, factor in (("response_amplitude", 1.0), ("worn_volume", 1.0), ("mean_pressure", 2.0)):
+        np.testing.assert_allclose(twice[name].values, factor * one[name].values, rtol=1e-6)
+
+
+@pytest.mark.parametrize("wave", [(), WAVE], ids=["standing", "travelling"])
+def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave, not_built):
+    given = ("scene.mesh=1", "scene.stuck_modes=5", "axes.frequency=211.5", "slow_time.cycles=0", "outputs.scene=true")
+    given += ("axes.scheme=implicit", "outputs.loops=[]", "outputs.variables=['worn_volume', 'mesh']", *wave, *LEVELS)
+    study = read_study("dovetail", given)
+    model = build_study_scene(study)
+    digest = describe_scene(model).digest
+    assert main(["dovetail", *options(*given), "-o", "kept.nc"]) == 0
+    not_built()
+    kept = read_study("kept.nc")
+    assert describe_scene(build_study_scene(kept)).digest == digest
+    assert "mesh" in kept.scene.offers
+    assert kept.scene.parameters == study.scene.parameters
+    assert main(["kept.nc", "--write-scene", "root.h5"]) == 0
+    assert describe_scene(read_scene("root.h5", 2)).digest == digest
+    mesh, again = read_mesh("kept.nc", "scene"), read_mesh("root.h5")
+    assert (mesh.nodes.tobytes(), mesh.quads.tobytes(), mesh.parts) == (
+        again.nodes.tobytes(),
+        again.quads.tobytes(),
+        again.parts,
+    )
+    with h5py.File("root.h5") as file:
+        assert "mesh/quad" in file
+        assert set(file.get("nd", ())) == ({str(number) for number in model.linear} if wave else set())
+        assert not wave or {0, 3, 6} <= set(model.linear)

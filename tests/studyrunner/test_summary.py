@@ -1,6 +1,5 @@
 """The summary of a result as data: what wears most, why nothing wore, what failed; and that its text is short."""
 
-import itertools
 import math
 from dataclasses import replace
 
@@ -8,14 +7,15 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
-from studyrunner.advice import Used, advise, advise_error
-from studyrunner.percent import show_percent, show_rtol
+from studyrunner.advice import Used
 from studyrunner.result.certainty import settings_of
-from studyrunner.result.view import Result, as_history
+from studyrunner.result.opening import as_history
+from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import SMALL, ModeRange, Samples, summary
 from studyrunner.summary.lines import MOST_LINES, summary_lines
 from studyrunner.summary.wear import MeshChange, MostWear, NothingWore, compare_meshes
+from studyrunner.units import show_percent, show_rtol
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.results import made_result
 
@@ -60,24 +60,23 @@ def test_of_numerical_settings_the_best_known_is_told():
 
 
 @pytest.mark.parametrize(
-    ("given", "n_left_out"),
+    ("name", "value", "known"),
     [
-        ({"outcome": lambda p: SENSITIVE if p[0] == 2 else 0}, 1),
-        ({"outcome": lambda p: FAILED if p[0] == 2 else 0}, 1),
-        ({"error_estimate": lambda p: 0.7 if p[0] == 2 else 0.01}, 1),
-        ({"error_estimate": lambda p: math.nan if p[0] == 2 else 0.01}, 1),
+        ("outcome", SENSITIVE, 0),
+        ("outcome", FAILED, 0),
+        ("error_estimate", 0.7, 0.01),
+        ("error_estimate", math.nan, 0.01),
     ],
 )
-def test_what_is_not_known_is_no_result(given, n_left_out):
+def test_what_is_not_known_is_no_result(name, value, known):
     """The last frequency would wear most."""
+    given = {name: lambda p: value if p[0] == 2 else known}
     dataset = wearing(*GRID, volume=lambda p: 1e-9 * (1.0 + p[0]), **given)
     found = summary(dataset)
     assert found.wear.volume.value == pytest.approx(2e-9)
-    assert found.wear.n_left_out == n_left_out
-    assert "may wear more" in summary_lines(found)[0]
+    assert found.wear.n_left_out == 1
     nothing = summary(dataset.assign(outcome=dataset["outcome"] * 0 + FAILED))
-    assert nothing.wear is None
-    assert nothing.n_complete == 0
+    assert (nothing.wear, nothing.n_complete) == (None, 0)
     assert not any("mm3" in line for line in summary_lines(nothing))
 
 
@@ -109,15 +108,6 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
 
 
 # --- nothing wore ---
-
-
-def test_a_failure_of_a_single_point_names_its_reason_and_no_axes():
-    reason = "no step was short enough at cycle 3000"
-    study = ("axes.frequency=190", "axes.scheme=adaptive")
-    made = wearing(*study, outcome=lambda _: FAILED, message=lambda _: reason, last_cycle=lambda _: 3000.0)
-    (line, _) = summary_lines(summary(made))
-    assert line.endswith(reason[1:])
-    assert "190" not in line
 
 
 def test_a_joint_that_does_not_move_has_no_amplitude_of_round_off():
@@ -244,14 +234,8 @@ def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
     made = wearing(*GRID, volume=lambda p: 1e-9 * (3 * p[0] + p[4]), slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
     whole = summary(made)
     for n_values in (1, 7, 50, 100):
-        monkeypatch.setattr("studyrunner.result.points._AT_ONCE", n_values)
+        monkeypatch.setattr("studyrunner.result.view._AT_ONCE", n_values)
         assert str(summary(made)) == str(whole)
-        largest = []
-        result_of(made).over_points(
-            "slip_range", lambda values, seen=largest: seen.append(values.size) or values[:, 0, 0]
-        )
-        # no less than one point at once, of 21 counts and 2 pairs
-        assert max(largest) <= max(n_values, 42)
 
 
 # --- meshes ---
@@ -259,27 +243,24 @@ def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
 MESHES = ("axes.frequency='resonance'", "loading.between=[205, 216]", "axes.scheme=adaptive")
 
 
-def meshed(meshes, volumes, *overrides):
+def meshed(volumes, *overrides):
     """The comparison of meshes; volumes: by mesh and wear coefficient, mm3."""
-    given = overrides or MESHES
-    study = read_study("dovetail", (*given, f"axes.mesh={meshes}", "axes.wear_coefficient=[1e-12, 1e-11]"))
+    given = (*(overrides or MESHES), f"axes.mesh={list(volumes)}", "axes.wear_coefficient=[1e-12, 1e-11]")
+    study = read_study("dovetail", given)
     mesh, wear = (list(study.dimensions).index(name) for name in ("mesh", "wear_coefficient"))
     share = np.linspace(0.0, 1.0, len(study.cycles_kept))
-    made = made_result(
-        study,
-        worn_volume=lambda p: 1e-9 * volumes[study.dimensions["mesh"][p[mesh]]][p[wear]] * share,
-    )
-    return compare_meshes(result_of(made))
+    worn = list(volumes.values())
+    return compare_meshes(result_of(made_result(study, worn_volume=lambda p: 1e-9 * worn[p[mesh]][p[wear]] * share)))
 
 
 def test_meshes_are_compared_at_the_resonance_alone():
-    found = meshed([2, 3], {2: [2.0, 1.0], 3: [1.0, 1.1]})
+    found = meshed({2: [2.0, 1.0], 3: [1.0, 1.1]})
     assert found.meshes == (2.0, 3.0)
     assert found.median == pytest.approx((0.5 + 0.1 / 1.1) / 2.0)
     assert found.largest == pytest.approx(0.5)
-    assert meshed([2, 3], {2: [0.0, 0.0], 3: [0.0, 0.0]}) is None
+    assert meshed({2: [0.0, 0.0], 3: [0.0, 0.0]}) is None
     # at one frequency they would be at two distances to the resonance
-    assert meshed([2, 3], {2: [2.0, 1.0], 3: [1.0, 1.1]}, "axes.frequency=211.5", "axes.scheme=adaptive") is None
+    assert meshed({2: [2.0, 1.0], 3: [1.0, 1.1]}, "axes.frequency=211.5", "axes.scheme=adaptive") is None
     assert compare_meshes(result_of(wearing("axes.frequency=1"))) is None
 
 
@@ -299,35 +280,6 @@ def test_wear_that_is_not_small_is_pointed_out():
 def test_frequencies_in_radians_are_asked_about(frequencies, asked):
     made = wearing(f"axes.frequency={frequencies}").assign(stuck_frequency=25.0)
     assert any("rad/s" in doubt for doubt in summary(made).doubts) is asked
-
-
-# --- advice ---
-
-SCHEMES, SWEEPS = ("adaptive", "implicit", "explicit", "final"), ("up", "down", "ramp")
-ALL = [
-    Used(scheme, sweep, harmonics, samples, schemes=(scheme, *more), sweeps=(sweep,), by_depth=by_depth)
-    for scheme, sweep, harmonics, samples, more, by_depth in itertools.product(
-        SCHEMES, SWEEPS, ("auto", 3), ("auto", 64), ((), ("adaptive", "implicit")), (False, True)
-    )
-]
-"""Everything that a point may be computed with."""
-
-
-def texts_on(used):
-    """All that may be advised on a point."""
-    errors = [advise_error(error, rates, used) for error in (0.013, 0.5) for rates in ([], [0.01, 0.3], [0.0, 0.0])]
-    return [*(advise(outcome.meaning, used) for outcome in Outcome), *errors]
-
-
-def test_nothing_is_advised_that_is_in_use_or_not_used():
-    for used, text in ((each, text) for each in ALL for text in texts_on(each)):
-        in_use = [f'scheme = "{scheme}"' for scheme in used.schemes] + [f'sweep = "{sweep}"' for sweep in used.sweeps]
-        in_use += [f'{key} = "auto"' for key in ("harmonics", "samples") if getattr(used, key) == "auto"]
-        if used.scheme in ("adaptive", "final"):
-            in_use += ["a smaller step", "largest_depth"]
-        if used.by_depth and used.scheme == "explicit":
-            in_use.append("smaller step")
-        assert not [each for each in in_use if each in text], (used, text)
 
 
 def test_settings_of_a_point_are_its_own():

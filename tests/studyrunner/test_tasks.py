@@ -1,15 +1,24 @@
-"""Which tasks a study has, which points share one, and what the plan says of it."""
+"""Which tasks a study has, which points share one, what the plan says of it, and what a run makes of their results."""
 
 import itertools
 from collections import Counter
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from solver.outcome import Outcome
+from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import StartResult
+from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study_file import read_study
-from tests.studyrunner.fakes import points_of
+from studyrunner.variables import ASKED, USUAL
+from tests.mpi.launching import results
+from tests.studyrunner.fakes import changed, points_of, totals_of, without_values
+from tests.studyrunner.histories import history
+from tests.studyrunner.small_studies import words
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")
 GRID = (
@@ -37,10 +46,9 @@ def assert_every_point_once(study, plan):
 
 def test_one_sweep_along_a_line_of_frequencies():
     study, plan = plan_of(*GRID)
-    assert len(plan.sweeps) == 2 * 2 * 2
-    assert {branch.frequencies for branch in plan.sweeps} == {(150.0, 155.0, 160.0)}
-    lines = {(task.excitation_amplitude, task.direction, task.settings.harmonics) for task in plan.sweeps}
-    assert lines == set(itertools.product((1.0, 2.0), ("up", "down"), (1, 5)))
+    lines = [(sweep.excitation_amplitude, sweep.direction, sweep.settings.harmonics) for sweep in plan.sweeps]
+    assert sorted(lines) == sorted(itertools.product((1.0, 2.0), ("up", "down"), (1, 5)))
+    assert {sweep.frequencies for sweep in plan.sweeps} == {(150.0, 155.0, 160.0)}
     assert_every_point_once(study, plan)
 
 
@@ -49,7 +57,6 @@ def test_a_ramp_is_a_task_at_each_frequency():
     study, plan = plan_of("axes.frequency=[160, 150, 155]", "axes.sweep=['ramp', 'up']", *SHARED)
     ramps = [sweep for sweep in plan.sweeps if sweep.direction == "ramp"]
     assert [sweep.frequencies for sweep in ramps] == [(150.0,), (155.0,), (160.0,)]
-    assert [sweep.frequencies for sweep in plan.sweeps if sweep.direction == "up"] == [(150.0, 155.0, 160.0)]
     assert [sweep.number for sweep in plan.sweeps] == list(range(4))
     assert all(0.0 < sweep.cost < plan.sweeps[-1].cost for sweep in ramps)
     for sweep in ramps:
@@ -96,10 +103,7 @@ def test_histories_cost_little_and_go_last_where_nothing_moves():
 
 
 def printed_plan(overrides, capsys, study="sdof_slider"):
-    arguments = [study, "--plan"]
-    for override in overrides:
-        arguments += ["--set", override]
-    assert main(arguments) == 0
+    assert main([study, "--plan", *words(*overrides)]) == 0
     captured = capsys.readouterr()
     assert captured.err == ""
     return {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
@@ -132,3 +136,107 @@ def test_plan_is_printed(capsys):
 def test_estimates_hold_to_a_factor_of_two(study, n_displacements, used):
     planned = build_tasks(read_study(study), n_displacements).cost
     assert 0.5 * used < planned < 2.0 * used
+
+
+# --- from results of tasks to the exit status ---
+
+RUN = ["sdof_slider", *words("axes.frequency=[100, 110, 120]", "axes.scheme=implicit"), "-o", "out.nc"]
+
+
+def at_the_second_frequency(change):
+    """Of the stand-in for the solver: another result there."""
+    return lambda task, result: change(result) if task.position == 1 else result
+
+
+def test_points_that_failed(folder, solver, capsys):
+    solver.change = at_the_second_frequency(lambda result: without_values(result, int(Outcome.MARCH_FAILED)))
+    assert main(RUN) == 3
+    first, *_, failed, certainty = capsys.readouterr().out.splitlines()
+    assert "2 computed, 1 failed" in first
+    assert failed.startswith("failed ")
+    assert "110 Hz" in failed
+    assert "2 of 3 worn volumes" in certainty
+    result = results().squeeze()
+    assert result.outcome.values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
+    assert result.worn_volume.isnull().all("cycle").values.tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("outcome", [Outcome.INACCURATE, Outcome.SENSITIVE])
+def test_points_above_rtol_are_computed_points(outcome, folder, solver, capsys):
+    """Exit status 0; their values are kept, and they are named with what there is to say of them."""
+    message = "from cycle 31 000 on the wear rate is known to 2.6 % only"
+    values = {"outcome": int(outcome), "error_estimate": 0.15, "message": message}
+    solver.change = at_the_second_frequency(lambda result: changed(result, **values))
+    assert main(RUN) == 0
+    first, *_, uncertain, certainty = capsys.readouterr().out.splitlines()
+    assert "3 points, 3 computed, 0 failed" in first
+    for line, words_of in ((certainty, ("certainty", "15 %", "110 Hz")), (uncertain, ("uncertain", "110 Hz"))):
+        assert all(word in line for word in words_of)
+    there = results().sel(frequency=110.0).squeeze()
+    assert there.worn_volume.notnull().all()
+    assert (there.outcome, there.message) == (int(outcome), message)
+
+
+@pytest.mark.slow
+def test_unexpected_failure_keeps_the_old_file(folder, solver, monkeypatch, capsys):
+    def fail(*_):
+        raise ZeroDivisionError("a bug")
+
+    assert main(RUN) == 0
+    earlier = (folder / "out.nc").read_bytes()
+    (folder / "out.nc.progress").unlink()
+    with monkeypatch.context() as broken:
+        broken.setattr(task_runs.StudyRun, "take", fail)
+        assert main(RUN) == 1
+    assert "ZeroDivisionError: a bug" in capsys.readouterr().err
+    assert (folder / "out.nc").read_bytes() == earlier
+    assert sorted(path.name for path in folder.iterdir()) == ["out.nc", "out.nc.progress"]
+    assert main(RUN) == 0
+
+
+def history_task(*overrides):
+    study = read_study("sdof_slider", ["axes.frequency=100", "axes.scheme=implicit", *overrides])
+    return build_tasks(study, 2).results[0]
+
+
+def ended_at(last, at, outcome=Outcome.CERTIFICATE_FAILED):
+    """The history as it is where the march has ended there."""
+    behind = at.cycles > last
+    changed = {}
+    for name, values in vars(at).items():
+        if isinstance(values, np.ndarray) and name != "cycles":
+            cut = values.copy()
+            cut[behind] = np.nan if values.dtype.kind in "fc" else 0
+            changed[name] = cut
+    return replace(at, outcome=outcome, last_cycle=last, error_estimate=0.03, **changed)
+
+
+def test_what_was_computed_of_a_point_that_failed_is_kept():
+    failed = ended_at(50.0, history([0.0, 40.0, 80.0, 1e5]))
+    task = history_task("slow_time.outputs=[0, 40, 80, 20000]")
+    result = build_result(task, task.integrated[0], failed)
+    assert totals_of(result, "outcome", "last_cycle", "error_estimate") == [7, 50.0, 0.03]
+    for name in set(USUAL) - {"wear_rate_error"}:
+        values = result.values[name]
+        there = np.isfinite(values) if ASKED[name].dtype == "float64" else values != 0
+        assert there[:2].all(), name
+        assert not there[2:].any(), name
+    assert result.values["worn_volume"][:2].tolist() == [0.0, 1.0]
+    assert result.values["largest_wear_depth"] == 1.0
+    assert totals_of(result, "branch", "fold_frequency", "newton_iterations") == [2, 101.5, 7]
+    assert result.values["message"] == "computed up to cycle 50 of 20 000, the worn volume there to 3 %"
+
+
+def test_loops_are_read_at_the_counts_of_a_point():
+    task = history_task("slow_time.outputs=[10, 20]", "outputs.loops=[0]")
+    assert task.loops == (0,)
+    loops = np.arange(3 * 2 * 3.0).reshape(3, 1, 2, 3)
+    result = build_result(task, task.integrated[0], history([0.0, 10.0, 20.0], loops=loops))
+    assert np.array_equal(result.values["loop_displacement"], loops[1:])
+    assert np.array_equal(result.values["loop_force"], -loops[1:])
+    failed = build_result(task, task.integrated[0], ended_at(10.0, history([0.0, 10.0, 20.0], loops=loops)))
+    assert np.array_equal(failed.values["loop_force"][0], -loops[1])
+    assert np.isnan(failed.values["loop_force"][1]).all()
+    unworn = history_task("slow_time.outputs=[10, 20]", "outputs.loops=[0]", "axes.wear_coefficient=0")
+    at_rest = build_result(unworn, unworn.integrated[0], history([0.0], loops=loops[:1]))
+    assert np.array_equal(at_rest.values["loop_force"], -loops[[0, 0]])

@@ -15,11 +15,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from studyrunner.report.panels import FloatArray, add_colour_bar, add_map, is_narrow, label_outer, new_panels
-from studyrunner.result.grid import Grid, find_grid
-from studyrunner.result.scene_pairs import contact_pairs
-from studyrunner.result.units import Scale
+from studyrunner.result.pairs import Grid, contact_pairs, find_grid
 from studyrunner.result.view import Result
 from studyrunner.system.progress import count
+from studyrunner.units import Scale
 
 JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
 """The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
@@ -144,17 +143,24 @@ def _edges(at: FloatArray, share: FloatArray, length: float, lone: float) -> Flo
 
 
 def most_of_flanks(result: Result, *values: FloatArray) -> tuple[tuple[Flank, ...], str]:
-    """Surfaces with the largest values (n_contact,), as many as fit side by side; how they are drawn, in sentences."""
+    """Surfaces with the largest values (n_contact,), as many as fit side by side; how they are drawn, in sentences.
+
+    No surfaces where the file has no positions of the pairs.
+    """
     flanks = find_flanks(result)
+    if any(flank.seen is None for flank in flanks):
+        return (), ""
     largest = [max(float(np.nanmax(value[flank.pairs])) for value in values) for flank in flanks]
     kept = tuple(flanks[number] for number in sorted(np.argsort(largest)[::-1][:_MOST_FLANKS]))
-    others = len(flanks) - len(kept)
-    said = "The file has no positions of the pairs: they stand by their index"
-    if all(flank.seen is not None for flank in kept):
-        said = "The pairs lie on no grid: one dot is one contact pair"
-    if all(flank.cells is not None for flank in kept):
-        said = "One cell is one contact pair, as large as its area"
+    others, on_grid = len(flanks) - len(kept), all(flank.cells is not None for flank in kept)
+    said = "One cell is one contact pair, as large as its area"
+    said = said if on_grid else "The pairs lie on no grid: one dot is one contact pair"
     return kept, f"{said}. {count(others, 'more surface')} with lower values in the file" if others else said
+
+
+def largest_pair(result: Result, values: FloatArray, scale: Scale) -> str:
+    """The largest of values (n_contact,) in words, with its pair."""
+    return f"{scale.show(float(np.nanmax(values)))} at pair {result.dataset['contact'].values[np.nanargmax(values)]}"
 
 
 def map_height(flanks: Sequence[Flank]) -> float:
@@ -184,10 +190,10 @@ def draw_field(panel: Axes, flank: Flank, values: NDArray[Any], norm: Normalize,
         # cells as they are in the flank, unless it is so slender that too little would be seen
         panel.set_aspect("equal" if flank.height_over_width > (_LOW if is_narrow() else _SLENDER) else "auto")
     elif flank.seen is not None:
-        dots: dict[str, Any] = {"edgecolors": "0.3", "linewidths": 0.4}
+        look = {"edgecolors": "0.3", "linewidths": 0.4, "s": 160 if look else 60, **look}
         panel.grid(visible=False)
         x, y = 1e3 * flank.seen.T
-        panel.scatter(x, y, 160 if look else 60, values, norm=norm, label="pairs", **(dots | look))
+        panel.scatter(x, y, c=values, norm=norm, label="pairs", **look)
         panel.margins(0.12)
         panel.set_aspect("equal", adjustable="datalim")
     panel.set_xlabel(f"{flank.directions[0]} (mm)")

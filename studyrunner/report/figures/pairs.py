@@ -17,15 +17,15 @@ from studyrunner.report.figures.flanks import (
     draw_field,
     draw_fields,
     find_flanks,
+    largest_pair,
     map_height,
     most_of_flanks,
 )
 from studyrunner.report.panels import COLOURS, FloatArray
-from studyrunner.report.selection import choose, labelled
-from studyrunner.result.scars import Scar, find_scar
-from studyrunner.result.scene_pairs import NO_DEPTH, depths, last_depth, tells_depth
-from studyrunner.result.units import Scale, scale_for
+from studyrunner.report.selection import choose, course_axis, labelled
+from studyrunner.result.pairs import NO_DEPTH, Scar, depths, find_scar, has_depths, last_depth
 from studyrunner.result.view import Result
+from studyrunner.units import Scale, scale_for
 
 _MOST_SERIES, _MOST_PROFILES = 4, 5
 _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _SLENDER, _LONGEST_NAME = 150, 4, 120, 0.12, 20
@@ -33,47 +33,36 @@ _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _SLENDER, _LONGEST_NAME = 150, 4, 12
 
 def _worn_depth(result: Result) -> FloatArray | None:
     """Wear depths (n_contact,), m, of the shown point at its last count; None where nothing is worn."""
-    depth = last_depth(result, result.shown_point()) if tells_depth(result) else np.zeros(1)
+    depth = last_depth(result, result.shown_point()) if has_depths(result) else np.zeros(1)
     return depth if len(result.cycles) > 1 and float(depth.max()) > NO_DEPTH else None
-
-
-def _largest(result: Result, values: FloatArray, scale: Scale) -> str:
-    return f"{scale.show(float(np.nanmax(values)))} at pair {result.dataset['contact'].values[np.nanargmax(values)]}"
 
 
 def draw_depths(result: Result) -> Drawn:
     """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
-    if not tells_depth(result):
+    if not has_depths(result):
         return result.lacks("wear_depth")
     if _worn_depth(result) is None or result.dataset.sizes["contact"] == 1:
         return None
-    shown, course = result.shown_point(), result.course_axis
+    shown, course = result.shown_point(), course_axis(result)
     choice = choose(result, [course] if course else [], _MOST_SERIES)
     series = {label: last_depth(result, {**shown, **point}) for point, label in choice}
     series = {label: depth for label, depth in series.items() if not np.isnan(depth).all()}
-    scale = scale_for("m", *series.values())
-    figure, panel = _draw_stems(result, {label: scale(depth) for label, depth in series.items()})
-    panel.set_ylabel(scale.label(f"wear depth {result.when(result.last_kept(shown))}"))
-    if "contact_surface" in result.dataset.coords:
-        _name_surfaces(panel, result)
-    deepest = [labelled(_largest(result, depth, scale), label) for label, depth in series.items()]
-    return figure, f"Deepest: {', '.join(deepest)}", choice.sentence
-
-
-def _draw_stems(result: Result, series: Mapping[str, FloatArray]) -> tuple[Figure, Axes]:
-    """Values per pair (n_contact,), as shown, each on a line from zero."""
     (figure, panel), pairs = plot.new_panel(3.3), result.dataset["contact"].values
-    apart = 0.8 / len(series) if len(pairs) <= _MANY_PAIRS else 0.0
-    for number, (label, values) in enumerate(series.items()):
+    scale, apart = scale_for("m", *series.values()), 0.8 / len(series) if len(pairs) <= _MANY_PAIRS else 0.0
+    for number, (label, depth) in enumerate(series.items()):
         at = pairs + (number - 0.5 * (len(series) - 1)) * apart
         style = plot.line_style(number) | {"linestyle": "none", "markevery": 1}
-        panel.vlines(at, 0.0, values, color=style["color"], linewidth=1.2)
-        panel.plot(at, values, label=label or "computed", **style)
-    plot.set_from_zero(panel, max(float(np.nanmax(values, initial=0.0)) for values in series.values()))
+        panel.vlines(at, 0.0, scale(depth), color=style["color"], linewidth=1.2)
+        panel.plot(at, scale(depth), label=label or "computed", **style)
+    plot.set_from_zero(panel, scale(max(float(np.nanmax(depth, initial=0.0)) for depth in series.values())).item())
     panel.set(xlim=(pairs[0] - 0.8, pairs[-1] + 0.8), xlabel="contact pair")
+    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(result.last_kept(shown))}"))
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
-    return figure, panel
+    if "contact_surface" in result.dataset.coords:
+        _name_surfaces(panel, result)
+    deepest = [labelled(largest_pair(result, depth, scale), label) for label, depth in series.items()]
+    return figure, f"Deepest: {', '.join(deepest)}", choice.sentence
 
 
 def _name_surfaces(panel: Axes, result: Result) -> None:
@@ -100,12 +89,11 @@ def draw_pressure(result: Result) -> Drawn:
     if scar is not None:
         figure, panel, said = _draw_scar(scar, fields, scale, "mean pressure")
         plot.set_from_zero(panel)
-    elif all(flank.seen is None for flank in flanks):
-        figure, panel = _draw_stems(result, {label: scale(values) for label, values in fields.items()})
-        panel.set_ylabel(scale.label("mean pressure"))
-    else:
+    elif flanks:
         figure = draw_fields(flanks, fields, scale, "mean pressure")
-    largest = [labelled(_largest(result, values, scale), label) for label, values in fields.items()]
+    else:
+        return "The file has no positions of the contact pairs."
+    largest = [labelled(largest_pair(result, values, scale), label) for label, values in fields.items()]
     return figure, f"Mean over a period. Largest: {', '.join(largest)}", said
 
 
@@ -116,17 +104,16 @@ def draw_profile(result: Result) -> Drawn:
         return None
     if scar is not None:
         return _draw_scar_depth(result, scar, depth)
-    # without positions there is nothing that the wear depth per pair does not show
-    if any(flank.seen is None for flank in find_flanks(result)):
-        return None
-    last, scale = result.last_kept(result.shown_point()), scale_for("m", depth)
     flanks, said = most_of_flanks(result, depth)
-    on_grid = all(flank.cells is not None for flank in flanks)
-    if on_grid:
+    if not flanks:
+        # without positions there is nothing that the wear depth per pair does not show
+        return None
+    when, scale = result.cycle_label(result.last_kept(result.shown_point())), scale_for("m", depth)
+    if all(flank.cells is not None for flank in flanks):
         figure = _draw_profiles(flanks, depth, scale)
     else:
-        figure = draw_fields(flanks, {result.cycle_label(last): depth}, scale, "wear depth")
-    return figure, f"{result.when(last, 'after').capitalize()}. Deepest: {_largest(result, depth, scale)}", said
+        figure = draw_fields(flanks, {when: depth}, scale, "wear depth")
+    return figure, f"After {when}. Deepest: {largest_pair(result, depth, scale)}", said
 
 
 def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -> Figure:
@@ -195,7 +182,7 @@ def _draw_scar_depth(result: Result, scar: Scar, after: FloatArray) -> Drawn:
         # a measured profile may have piled-up edges above the surface
         panel.plot(along(measured.x), scale(measured.depth), color=COLOURS[2], linewidth=1.2, label="measured")
     panel.invert_yaxis()
-    deepest = f"{result.when(last, 'after').capitalize()}. Deepest: {scale.show(float(np.nanmax(after)))}"
+    deepest = f"After {result.cycle_label(last)}. Deepest: {scale.show(float(np.nanmax(after)))}"
     return figure, deepest, said, f"Measured: {measured.name}" if measured else ""
 
 

@@ -1,31 +1,47 @@
-"""All points of a study at once: trends along its axes, how the points ended, how right their states are."""
+"""All points of a study at once: trends along its axes, what samples say, how points ended, how right they are."""
 
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
 from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn, Table
+from studyrunner.report.drawing import Drawn, Table, as_sentences
 from studyrunner.report.panels import COLOURS, FloatArray
-from studyrunner.report.selection import choose, find_course, spans_decades
-from studyrunner.result.points import CONVERGED
-from studyrunner.result.units import scale_for, show_cycles, show_number, units_of
-from studyrunner.result.view import Result, as_sentences
+from studyrunner.report.selection import Course, choose, find_course, slow_time, spans_decades
+from studyrunner.result.view import CONVERGED, NO_VOLUME, Result
 from studyrunner.statistics.samples import SAMPLE
+from studyrunner.statistics.study_statistics import describe_ranking, measure_of
+from studyrunner.system.progress import count
+from studyrunner.units import Scale, scale_for, show_cycles, show_number, units_of
 from studyrunner.variables import CERTIFICATE
 
 _PLAIN = ("frequency", "scheme", SAMPLE)
 _MOST_AXES, _SMALL = 6, 7.5
 _LONG = 9  # characters that stand side by side under a small panel
 _MOST_ROWS, _MOST_CELLS, _LABEL_WIDTH = 24, 400, 20
+_MOST_PANELS, _MOST_LINES = 4, 3  # of samples
+_LOWEST, _HIGHEST = 0, 1  # places along the dimension `bound`
+# quantiles between which a band lies, how dark it is, and what it is called
+_BANDS: tuple[tuple[int, int, float, str], ...] = ((0, 4, 0.18, "5 to 95 %"), (1, 3, 0.32, "25 to 75 %"))
+_MIDDLE = 2
+_NOT_NEGLIGIBLE = 1e-3
+_EXCEEDED = (
+    ("worn_volume_exceedance", "exceeded_volume", "m3", "worn volume"),
+    ("wear_depth_exceedance", "exceeded_depth", "m", "largest wear depth"),
+)
 # what was computed to the end is light, so that what failed stands out
 _CONVERGED_COLOUR, _OTHERS = "#dfe7ef", (COLOURS[1], COLOURS[0], *COLOURS[2:], "#7f7f7f", "#F0E442")
+
+
+# --- trends along the axes ---
 
 
 def draw_trends(result: Result) -> Drawn:
@@ -68,7 +84,7 @@ def find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArr
         worn = np.where(result.computed, result.worn, np.nan)
         found.append(("worn volume\nin the end", "m3", worn, result.errors * worn))
     if result.has("response_amplitude"):
-        amplitude = result.read("response_amplitude").isel(response=0, cycle=-1).transpose(*result.axes)
+        amplitude = result.dataset["response_amplitude"].isel(response=0, cycle=-1).transpose(*result.axes)
         units, of = str(amplitude.attrs.get("units", "m")), f"response\nof {result.responses[0]}"
         values = np.where(result.computed, amplitude.values, np.nan)
         if "frequency" in result.varying:
@@ -105,6 +121,158 @@ def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, erro
         panel.set_xticks(at, texts, **(turned if sum(map(len, texts)) > _LONG else {}))
     else:
         panel.locator_params(axis="x", nbins=3)
+
+
+# --- what samples say ---
+
+
+def _ends(statistics: xr.Dataset, name: str, *dims: str) -> FloatArray:
+    """A statistic (dims..., 2): its lowest and its highest value."""
+    return np.asarray(statistics[name].transpose(*dims, "bound").values, dtype=float)
+
+
+def _largest(*values: FloatArray) -> float:
+    return max((float(each[np.isfinite(each)].max(initial=0.0)) for each in values), default=0.0)
+
+
+def _statistics(result: Result) -> xr.Dataset | None:
+    """What the samples say; None where a result has none, or nothing is worn."""
+    if SAMPLE not in result.varying or not result.has("worn_volume"):
+        return None
+    return result.statistics if float(result.dataset["worn_volume"].max()) > NO_VOLUME else None
+
+
+def _choose(
+    result: Result, statistics: xr.Dataset, free: Collection[str] = (), limit: int = _MOST_PANELS
+) -> tuple[list[xr.Dataset], list[str], str]:
+    """Statistics of combinations of the axes beside samples and `free`, their labels, a sentence on the others."""
+    choice = choose(result, [SAMPLE, *free], limit)
+    return (
+        [statistics.isel(point, missing_dims="ignore") for point in choice.points],
+        list(choice.labels),
+        choice.sentence,
+    )
+
+
+def draw_bands(result: Result) -> Drawn:
+    """5, 25, 50, 75 and 95 % of the samples over the cycles."""
+    statistics = _statistics(result)
+    return None if statistics is None or statistics.sizes["cycle"] < 2 else _draw_bands(result, statistics, None)
+
+
+def draw_bands_over_course(result: Result) -> Drawn:
+    """5, 25, 50, 75 and 95 % of the samples at the last count over the course."""
+    statistics, course = _statistics(result), find_course(result)
+    if statistics is None or course is None:
+        return None
+    return _draw_bands(result, statistics.isel({"cycle": -1, course.axis: course.index}), course)
+
+
+def _draw_bands(result: Result, statistics: xr.Dataset, course: Course | None) -> Drawn:
+    name, axis = "worn_volume_quantile", course.axis if course else "cycle"
+    shown, labels, left_out = _choose(result, statistics, [course.axis] if course else [])
+    cycles = scale_for(result.counted, statistics["cycle"].values.astype(float))
+    at = course.values if course else cycles(statistics["cycle"].values)
+    volumes = [_ends(point, name, axis, "quantile") for point in shown]
+    wrong = [_ends(point, f"{name}_error", axis, "quantile") for point in shown]
+    known = _largest(*(each[..., _LOWEST] for each in volumes))
+    scale = scale_for("m3", known)
+    figure, panels = plot.panel_grid(labels, 3.0, sharex=True)
+    for panel, volume, error in zip(panels.flat, volumes, wrong, strict=True):
+        _draw_band(panel, at, volume, error, scale)
+        panel.set(xlabel=slow_time(result, cycles), ylabel=scale.label("worn volume"))
+        if course:
+            course.set_axis(panel)
+    plot.label_outer(panels)
+    panels[0, 0].set_xlim(at.min(), at.max())
+    # errors and what is open count to twice what is known
+    plot.set_from_zero(panels[0, 0], scale(min(max(known, _largest(*wrong, *volumes)), 2.0 * known)).item())
+    n_without = max(int(point["n_without_value"].max()) for point in shown)
+    hatched = f"Hatched: what {count(n_without, 'sample')} without a value to be trusted leave open"
+    return figure, _n_samples(statistics), hatched if n_without else "", left_out
+
+
+def _n_samples(statistics: xr.Dataset) -> str:
+    confidence = 100.0 * float(statistics.attrs["confidence"])
+    return f"{count(int(statistics['n_samples']), 'sample')}, intervals of {confidence:g} % confidence"
+
+
+def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArray, scale: Scale) -> None:
+    """Bands and median along an axis; dashed the outer ends with the numerical error, hatched what is open."""
+    drawn = scale(np.minimum(volume, 10.0 * max(_largest(volume), 1e-30)))
+    for low, high, alpha, label in _BANDS:
+        style: dict[str, Any] = {"color": COLOURS[0], "alpha": alpha, "lw": 0.0, "label": label}
+        panel.fill_between(at, drawn[:, low, _LOWEST], drawn[:, high, _HIGHEST], **style)
+        for place, bound in ((low, _LOWEST), (high, _HIGHEST)):
+            panel.plot(at, drawn[:, place, bound], color=COLOURS[0], lw=0.5, alpha=0.5, label=f"_{label}")
+    panel.plot(at, drawn[:, _MIDDLE, _LOWEST], color=COLOURS[0], marker="o" if at.size <= 12 else "", label="median")
+    for number in np.flatnonzero((volume[..., _HIGHEST] > volume[..., _LOWEST]).any(axis=0)).tolist():
+        style = {"facecolor": "none", "edgecolor": "0.45", "hatch": "////", "lw": 0.0, "label": "left open"}
+        panel.fill_between(at, drawn[:, number, _LOWEST], drawn[:, number, _HIGHEST], **style)
+    moved = np.abs(wrong - volume)[np.isfinite(wrong) & np.isfinite(volume)]
+    if (moved > _NOT_NEGLIGIBLE * _largest(volume)).any():
+        style = {"color": COLOURS[1], "linestyle": (0, (4, 2)), "linewidth": 1.0}
+        panel.plot(at, scale(wrong[:, 0, _LOWEST]), **style, label="with numerical error")
+        panel.plot(at, scale(np.where(np.isfinite(wrong), wrong, np.nan)[:, -1, _HIGHEST]), **style)
+
+
+def draw_exceedance(result: Result) -> Drawn:
+    """Probability of more than a volume, and of deeper than a depth, with its confidence band."""
+    statistics = _statistics(result)
+    if statistics is None:
+        return None
+    last = statistics.isel(cycle=-1)
+    shown, labels, left_out = _choose(result, last, limit=_MOST_LINES)
+    exceeded = [one for one in _EXCEEDED if one[0] in last]
+    figure, panels = plot.new_panels(1, len(exceeded), 3.2, sharey=True)
+    for panel, (name, dimension, units, words) in zip(panels[0], exceeded, strict=True):
+        scale = scale_for(units, last[dimension].values)
+        for number, (label, point) in enumerate(zip(labels, shown, strict=True)):
+            at, style = scale(point[dimension].values), plot.line_style(number)
+            value, interval = (_ends(point, f"{name}{each}", dimension) for each in ("", "_interval"))
+            panel.fill_between(at, *interval.T, color=style["color"], alpha=0.18, lw=0.0)
+            for bound in (_LOWEST, _HIGHEST) if (np.ptp(value, axis=1) > 0.0).any() else (_LOWEST,):
+                own = {"color": style["color"], "linestyle": style["linestyle"]}
+                panel.plot(at, value[:, bound], **own, label="_" if bound else label or "samples")
+        panel.set(xlabel=scale.label(words), ylabel="probability of more", ylim=(0.0, 1.02))
+        panel.set_xlim(0.0, scale(last[dimension].values[-1]).item())
+    plot.label_outer(panels)
+    return figure, _n_samples(last), left_out
+
+
+def draw_deciding_inputs(result: Result) -> Drawn:
+    """What each input decides at the last cycle count: Sobol' indices, or rank correlations, with their intervals."""
+    statistics = _statistics(result)
+    if statistics is None or "input" not in statistics.dims:
+        return None
+    last = statistics.isel(cycle=-1)
+    measure = measure_of(last)
+    if measure is None or not last[measure].notnull().any():
+        return "The file holds too few samples to say what decides, or samples that do not differ: raise samples."
+    shares = measure == "first_index"
+    bars = {"first_index": "alone", "total_index": "with the others"} if shares else {measure: "rank correlation"}
+    shown, labels, left_out = _choose(result, last)
+    figure, panels = plot.panel_grid(labels, 2.9, sharex=True)
+    for panel, point in zip(panels.flat, shown, strict=True):
+        for place, (name, words) in enumerate(bars.items()):
+            value, interval = (_ends(point, f"{name}{each}", "input") for each in ("", "_interval"))
+            width = 0.72 / len(bars)
+            at, middle = np.arange(len(value)) + (place - 0.5 * (len(bars) - 1)) * 1.1 * width, value.mean(axis=1)
+            panel.bar(at, np.nan_to_num(middle), width, color=COLOURS[place])
+            panel.plot(at, middle, color=COLOURS[place], marker="s", linestyle="none", label=words)
+            sides = np.maximum(np.stack([middle - interval[:, _LOWEST], interval[:, _HIGHEST] - middle]), 0.0)
+            panel.errorbar(at, middle, yerr=np.nan_to_num(sides), fmt="none", ecolor="0.2", elinewidth=1.0, capsize=3.0)
+        panel.set_xticks(range(len(value)), [str(name).replace("_", "\n") for name in point["input"].values])
+        panel.set_ylim(0.0 if shares else -1.02, 1.02)
+        panel.set_ylabel("share of the variance" if shares else "rank correlation")
+        panel.grid(visible=False, axis="x")
+    plot.label_outer(panels)
+    said = [(label, describe_ranking(point)) for label, point in zip(labels, shown, strict=True)]
+    decides = (f"{label}: {says}" if label else says[0].upper() + says[1:] for label, says in said if says)
+    return figure, as_sentences(*decides), _n_samples(last), left_out
+
+
+# --- how far the points are to be trusted ---
 
 
 def draw_outcomes(result: Result) -> Drawn:
@@ -144,7 +312,7 @@ def list_certificates(result: Result) -> Drawn:
     rows = []
     for name, words in CERTIFICATE.items():
         if result.has(name) and "cycle" in result.dataset[name].dims:
-            values = result.read(name).transpose(*result.axes, "cycle").values
+            values = result.dataset[name].transpose(*result.axes, "cycle").values
             values = np.where(result.computed[..., None] & np.isfinite(values), values, 0.0)
             *place, cycle = map(int, np.unravel_index(int(np.argmax(values)), values.shape))
             point = result.point_at(place)

@@ -9,17 +9,15 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from studyrunner.percent import show_percent
-from studyrunner.report.drawing import Drawn
+from studyrunner.report.drawing import Drawn, as_sentences
 from studyrunner.report.panels import FloatArray, add_legend, line_style, new_panels, set_log
-from studyrunner.result.units import show_number
-from studyrunner.result.view import NO_VOLUME, Result, as_sentences
+from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.system.progress import count
+from studyrunner.units import show_number, show_percent
 
 KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
 """Axes along which only the numbers change and not what is computed."""
@@ -36,7 +34,7 @@ _COMPARED = (
     *("computed", "run_time", "worn_volume", "response_amplitude", "exact_worn_volume", "exact_response_amplitude"),
     *("error_estimate", "response_error", "harmonics_used"),
 )
-_MOST_POINTS, _SHAPES = 3, "os^DvPX<>p"
+_MOST_POINTS, _SHAPES, _SHAPED = 3, "os^DvPX<>p", ("harmonics", "rtol", "samples", "tolerance", "step")
 _NO_LINE: dict[str, Any] = {"linestyle": "none", "markersize": 5.5}
 _RING = {**_NO_LINE, "marker": "o", "markersize": 11, "markerfacecolor": "none", "markeredgecolor": "black"}
 
@@ -106,20 +104,20 @@ def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
     keys, others = ([name for name in result.axes if (name in KEYS) == each] for each in (True, False))
     found = _list_settings(result, keys)
     settings, rows = tuple(found), list(found.values())
-    unknown = xr.full_like(result.dataset["outcome"], np.nan, float)
+    dataset = result.dataset.assign(computed=(result.axes, result.computed)).isel(cycle=-1, missing_dims="ignore")
 
-    def read(name: str) -> FloatArray:
-        """Values (n_points, n_setting, ...) at the last count; NaN where the file has none."""
-        values = unknown.copy(data=result.computed) if name == "computed" else unknown
-        values = result.read(name).isel(cycle=-1, missing_dims="ignore") if result.has(name) else values
-        table = values.stack(point=others, setting=keys, create_index=False).isel(setting=rows)
-        return np.asarray(table.transpose("point", "setting", ...).values, dtype=float)
+    def read(name: str, at: Mapping[str, int]) -> FloatArray:
+        """Values (n_setting, ...) of a point at the last count; NaN where the file has none."""
+        if name not in dataset:
+            return np.full(len(rows), np.nan)
+        table = dataset[name].isel(at).stack(setting=keys, create_index=False).isel(setting=rows)
+        return np.asarray(table.transpose("setting", ...).values, dtype=float)
 
-    tables = {name: read(name) for name in _COMPARED}
     points = []
-    for number, place in enumerate(itertools.product(*(range(result.dataset.sizes[name]) for name in others))):
-        label = result.describe(dict(zip(others, place, strict=True)), set(result.varying) - set(KEYS))
-        points.append(_compare(label, settings, {name: table[number] for name, table in tables.items()}))
+    for place in itertools.product(*(range(dataset.sizes[name]) for name in others)):
+        at = dict(zip(others, place, strict=True))
+        label = result.describe(at, set(result.varying) - set(KEYS))
+        points.append(_compare(label, settings, {name: read(name, at) for name in _COMPARED}))
     most = max(int(np.isfinite(each).sum()) for point in points for each in point.errors.values())
     return tuple(points) if most > 1 else ()
 
@@ -136,22 +134,20 @@ def _compare(label: str, settings: tuple[Setting, ...], own: Mapping[str, FloatA
         return -error, harmonics, -(setting.step or 0.0)
 
     computed, worn, response = own["computed"] == 1.0, own["worn_volume"], own["response_amplitude"]
-    answer = [np.atleast_1d(own[f"exact_{name}"][0]) for name in ("worn_volume", "response_amplitude")]
+    volume_there, response_there = (own[f"exact_{name}"][0] for name in ("worn_volume", "response_amplitude"))
     reference, uncertainty = None, dict.fromkeys(QUANTITIES, 0.0)
-    if not all(np.isfinite(each).all() for each in answer):
+    if not (np.isfinite(volume_there) and np.isfinite(response_there).all()):
+        uncertainty = dict.fromkeys(QUANTITIES, math.inf)
         reference = max(np.flatnonzero(computed).tolist(), key=rank, default=None)
-        if reference is None:
-            nothing = dict.fromkeys(QUANTITIES, np.full(len(settings), np.nan))
-            unknown = dict.fromkeys(QUANTITIES, math.inf)
-            return ComparedPoint(label, settings, own["run_time"], 0.0 * worn, nothing, None, unknown)
-        answer = [np.atleast_1d(each[reference]) for each in (worn, response)]
-        estimates = (own[name][reference] for name in ("error_estimate", "response_error"))
-        known = (float(np.nan_to_num(each, nan=math.inf)) for each in estimates)
-        uncertainty = dict(zip(QUANTITIES, known, strict=True))
+        if reference is not None:
+            volume_there, response_there = worn[reference], response[reference]
+            estimates = (own[name][reference] for name in ("error_estimate", "response_error"))
+            known = (float(np.nan_to_num(each, nan=math.inf)) for each in estimates)
+            uncertainty = dict(zip(QUANTITIES, known, strict=True))
     volume = np.where(worn > NO_VOLUME, np.inf, np.nan)
-    if not answer[0][0] <= NO_VOLUME:
-        volume = np.abs(worn - answer[0]) / answer[0]
-    away = np.linalg.norm(response - answer[1], axis=-1) / (float(np.linalg.norm(answer[1])) or np.nan)
+    if not volume_there <= NO_VOLUME:
+        volume = np.abs(worn - volume_there) / volume_there
+    away = np.linalg.norm(response - response_there, axis=-1) / (float(np.linalg.norm(response_there)) or np.nan)
     compared = computed & (np.arange(len(settings)) != reference)
     errors = {name: np.where(compared, each, np.nan) for name, each in zip(QUANTITIES, (volume, away), strict=True)}
     worn = np.where(computed, worn, np.nan)
@@ -190,24 +186,22 @@ def draw_precision(result: Result) -> Drawn:
     """One row a point, one column a quantity; nothing where no settings are compared."""
     points = compare_settings(result)
     clear = [point for point in points if any(point.is_clear(name).any() for name in QUANTITIES)]
-    if points and not clear:
-        return "No error is clearly larger than the uncertainty of the reference: give finer values of a key."
     if not clear:
-        return None
+        said = "No error is clearly larger than the uncertainty of the reference: give finer values of a key."
+        return said if points else None
     # those that wear most
     order = np.argsort([-float(np.nanmax(point.worn, initial=0.0)) for point in clear], kind="stable")
     shown = [clear[number] for number in sorted(order[:_MOST_POINTS].tolist())]
     quantities = [name for name in QUANTITIES if any(point.is_clear(name).any() for point in shown)]
     figure, panels = new_panels(len(shown), len(quantities), 0.3 + 2.4 * len(shown))
     settings = points[0].settings
-    styles = {scheme: line_style(n) for n, scheme in enumerate(dict.fromkeys(each.scheme for each in settings))}
-    lines = {scheme: {key: look[key] for key in ("color", "linestyle")} for scheme, look in styles.items()}
+    lines = {scheme: line_style(n) for n, scheme in enumerate(dict.fromkeys(each.scheme for each in settings))}
+    lines = {scheme: {key: look[key] for key in ("color", "linestyle")} for scheme, look in lines.items()}
     # the first other key that varies has the shapes
-    key = next(
-        (key for key in ("harmonics", "rtol", "samples", "tolerance", "step") if key in result.varying), "scheme"
-    )
-    values = sorted({getattr(each, key) for each in settings if key != "scheme"} - {None}, key=_number)
-    shapes = dict(zip(values, itertools.cycle(_SHAPES), strict=False))
+    key = next((key for key in _SHAPED if key in result.varying), "scheme")
+    values = {getattr(each, key) for each in settings if key != "scheme"} - {None}
+    ordered = sorted(values, key=lambda value: math.inf if isinstance(value, str) else value)
+    shapes = dict(zip(ordered, itertools.cycle(_SHAPES), strict=False))
     markers = [shapes.get(getattr(each, key), "h") for each in settings]
     for row, point in zip(panels, shown, strict=True):
         for panel, quantity in zip(row, quantities, strict=True):
@@ -217,12 +211,13 @@ def draw_precision(result: Result) -> Drawn:
         row[0].set_title(point.label, loc="left")
     for panel in panels[-1]:
         panel.set_xlabel("CPU time of one point (s)")
-    meaning: list[tuple[str, dict[str, Any]]] = [(scheme or "all", look) for scheme, look in lines.items()]
-    for value, shape in shapes.items():
-        meaning.append((Setting(**{key: value}).describe(), {"marker": shape, "color": "0.3", **_NO_LINE}))
-    meaning.append(("cheapest for its error", _RING))
-    add_legend(figure, [Line2D([], [], label=label, **look) for label, look in meaning])
-    references = []
+    meaning = {scheme or "all": look for scheme, look in lines.items()}
+    meaning |= {
+        Setting(**{key: each}).describe(): {"marker": s, "color": "0.3", **_NO_LINE} for each, s in shapes.items()
+    }
+    meaning["cheapest for its error"] = _RING
+    add_legend(figure, [Line2D([], [], label=label, **look) for label, look in meaning.items()])
+    references, left = [], len(points) - len(shown)
     for point in shown:
         said = "errors are those against the exact answer"
         if point.reference is not None:
@@ -230,20 +225,15 @@ def draw_precision(result: Result) -> Drawn:
             finest = settings[point.reference].describe()
             said = f"errors are those against the finest setting ({finest}), known to {' and '.join(each)}"
         references.append(f"{point.label or 'Reference'}: {said}")
-    left = len(points) - len(shown)
     return figure, as_sentences(*references), f"{count(left, 'other point')} not drawn" if left else ""
-
-
-def _number(value: float | str) -> float:
-    return math.inf if isinstance(value, str) else value
 
 
 def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, lines: Mapping[Any, Any], markers: list[str]) -> None:
     """lines: look of each scheme. markers: of each setting."""
     errors, time, clear = point.errors[quantity], point.time, point.is_clear(quantity)
     if not clear.any():
-        panel.text(0.5, 0.5, "the same for all settings", ha="center", va="center", transform=panel.transAxes)
-        panel.set(xticks=[], yticks=[])
+        # the same for all settings
+        panel.set_axis_off()
         return
     least = RESOLVED * point.uncertainty[quantity]
     bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > _ROUND_OFF) & np.isfinite(errors)])

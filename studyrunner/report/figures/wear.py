@@ -1,4 +1,6 @@
-"""Worn volume and wear rate: over slow time (Fig. 4 of the paper), in the end (Fig. 8), as maps (Figs. 6, 7)."""
+"""Worn volume and wear rate: over slow time (Fig. 4 of the paper), in the end (Fig. 8), as maps (Figs. 6, 7); and of
+missions by block, with the vibration of each block.
+"""
 
 from __future__ import annotations
 
@@ -6,46 +8,54 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from studyrunner.percent import show_percent
 from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn
-from studyrunner.report.panels import FloatArray
-from studyrunner.report.selection import Choice, Course, cell_edges, choose, find_course, labelled, slow_time
+from studyrunner.report.drawing import Drawn, Table
+from studyrunner.report.panels import COLOURS, FloatArray
+from studyrunner.report.selection import (
+    Choice,
+    Course,
+    cell_edges,
+    choose,
+    course_axis,
+    find_course,
+    labelled,
+    slow_time,
+)
 from studyrunner.result.certainty import show_error
-from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import NO_VOLUME, Point, Result
+from studyrunner.units import Scale, scale_for, show_number, show_percent
 
 _MOST_LINES, _MOST_MAPS = 6, 4
 _LARGE: dict[str, Any] = {"linestyle": "none", "markersize": 9, "markerfacecolor": "none", "color": "black"}
+_ENDS = {"response_amplitude_begin": "begin", "response_amplitude": "end"}
+
+
+# --- over slow time ---
 
 
 def draw_history(result: Result) -> Drawn:
     """Worn volume over cycles at the shown point, one line a scheme; a sentence where there is no history."""
     if len(result.cycles) == 1:
         return f"The file holds {result.cycle_label(0)} only: set [slow_time]."
-    largest = float(np.nanmax(result.read("worn_volume").values, initial=0.0))
-    wears = largest > NO_VOLUME
-    free = [result.course_axis] if result.course_axis else []
-    scale, choice = scale_for("m3", largest if wears else 0.0), _choose_lines(result, *free)
+    largest = float(np.nanmax(result.dataset["worn_volume"].values, initial=0.0))
+    wears, axis = largest > NO_VOLUME, course_axis(result)
+    scale, choice = scale_for("m3", largest if wears else 0.0), _choose_lines(result, *([axis] if axis else []))
     (figure, panel), cycles = plot.new_panel(3.4), scale_for(result.counted, result.cycles)
     highest, ends = _draw_over_cycles(result, panel, "worn_volume", choice, scale), []
     for number, (point, label) in enumerate(choice):
         worn = result.at("worn_volume", point).values
         if np.isfinite(worn[-1]):
-            ends.append(labelled(f"{scale.show(float(worn[-1]), 4)}{_show_error(result, point)}", label))
+            ends.append(labelled(f"{scale.show(float(worn[-1]), 4)}{_with_error(result, point)}", label))
         _mark_events(result, panel, point, cycles, scale, plot.line_style(number)["color"])
     panel.set_xlim(0.0, panel.dataLim.xmax)
     panel.set_ylabel(scale.label("worn volume"))
     plot.set_from_zero(panel, highest if wears else 0.0)
-    when = "at the end" if result.has("cycle_count") else result.when(-1)
-    return (
-        figure,
-        f"Worn {when}: {', '.join(ends)}" if wears else "Nothing is worn at the counts kept",
-        choice.sentence,
-    )
+    said = f"Worn {_at_the_end(result)}: {', '.join(ends)}" if wears else "Nothing is worn at the counts kept"
+    return figure, said, choice.sentence
 
 
 def draw_excitation(result: Result) -> Drawn:
@@ -56,6 +66,10 @@ def draw_excitation(result: Result) -> Drawn:
     _draw_over_cycles(result, panel, "excitation_frequency", choice, Scale(1.0, "Hz"))
     panel.set_ylabel("frequency (Hz)")
     return figure, f"The excitation follows the {result.followed}", choice.sentence
+
+
+def _at_the_end(result: Result) -> str:
+    return "at the end" if result.has("cycle_count") else f"at {result.cycle_label(-1)}"
 
 
 def _choose_lines(result: Result, *free: str) -> Choice:
@@ -96,14 +110,16 @@ def _mark_events(result: Result, panel: Axes, point: Point, cycles: Scale, scale
         panel.plot(cycles(counts), scale(exact), color="0.5", linewidth=4, alpha=0.4, zorder=1, label="exact")
 
 
-def _show_error(result: Result, point: Point) -> str:
+def _with_error(result: Result, point: Point) -> str:
     """The error of a final worn volume in words: " ± 3 %", with what is to be said where it is above rtol."""
     place = tuple(point[name] for name in result.axes)
-    error = float(result.errors[place])
-    if not result.computed[place] or not np.isfinite(error) or error <= 0.0:
+    if not result.computed[place] or not 0.0 < result.errors[place] < np.inf:
         return ""
     remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
-    return f" ± {show_error(result, place)}{remark}"
+    return f" ± {show_error(result, point)}{remark}"
+
+
+# --- over an axis of the study ---
 
 
 def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[Choice, list[FloatArray]]:
@@ -135,27 +151,22 @@ def draw_final(result: Result) -> Drawn:
     scale, (figure, panel) = scale_for("m3", largest), plot.new_panel(3.4)
     top, errors = scale(max(largest)).item(), []
     highest = top
-    for number, (point, field) in enumerate(zip(choice.points, fields, strict=True)):
+    for number, ((point, label), field) in enumerate(zip(choice, fields, strict=True)):
         error = course.read(result, "error_estimate", point) if result.has("error_estimate") else np.zeros(len(field))
         errors.append(error)
-        style = course.line_style(number) | {"label": choice.labels[number] or "computed"}
-        reach = plot.add_line(panel, course.values, scale(field[:, -1]), scale(error * field[:, -1]), **style)
+        look = course.line_style(number) | {"label": label or "computed"}
+        reach = plot.add_line(panel, course.values, scale(field[:, -1]), scale(error * field[:, -1]), **look)
         highest = max(highest, min(reach, 2.0 * top))
     _mark_care(result, panel, course, choice, scale(reached))
     plot.set_from_zero(panel, highest)
     crosses = plot.mark_failed(panel, course.values, failed)
     course.set_axis(panel)
-    panel.set_ylabel(scale.label(f"worn volume {'at the end' if result.has('cycle_count') else result.when(-1)}"))
+    panel.set_ylabel(scale.label(f"worn volume {_at_the_end(result)}"))
     number = int(np.argmax(largest))
     place = int(np.nanargmax(reached[number]))
     known = f" ± {show_percent(errors[number][place])}" if errors[number][place] > 0.0 else ""
     text = f"Largest: {scale.show(largest[number], 4)}{known} at {course.at(result, place)}"
-    return (
-        figure,
-        labelled(text, choice.labels[number]),
-        crosses,
-        choice.sentence,
-    )
+    return figure, labelled(text, choice.labels[number]), crosses, choice.sentence
 
 
 def _mark_care(result: Result, panel: Axes, course: Course, choice: Choice, fields: FloatArray) -> None:
@@ -194,9 +205,86 @@ def draw_map(result: Result, name: str) -> Drawn:
     plot.add_colour_bar(figure, panels, norm, scale.label(name.replace("_", " ")))
     number = int(np.argmax(largest))
     place, cycle = map(int, np.unravel_index(int(np.nanargmax(fields[number])), fields[number].shape))
-    at = f"{course.at(result, place)}, {result.cycle_label(cycle)}"
-    return (
-        figure,
-        labelled(f"Largest: {scale.show(largest[number], 4)} at {at}", choice.labels[number]),
-        choice.sentence,
+    text = f"{scale.show(largest[number], 4)} at {course.at(result, place)}, {result.cycle_label(cycle)}"
+    return figure, labelled(f"Largest: {text}", choice.labels[number]), choice.sentence
+
+
+# --- of missions, by block ---
+
+
+def _read_blocks(result: Result) -> xr.Dataset:
+    """What belongs to blocks at the shown point."""
+    assert result.blocks is not None
+    return result.blocks.isel(result.shown_point(), missing_dims="ignore")
+
+
+def list_blocks(result: Result) -> Drawn:
+    """Frequency, cycles, worn volume with its error, and share of each block at the last number of missions."""
+    blocks = _read_blocks(result)
+    nothing = np.full((len(result.cycles), blocks.sizes["block"]), np.nan)
+    worn, wrong = (
+        blocks[name].values if name in blocks else nothing for name in ("block_worn_volume", "block_worn_volume_error")
     )
+    reached = np.flatnonzero(np.isfinite(worn).all(axis=1))
+    last = int(reached[-1]) if reached.size else 0
+    scale, total, rows = scale_for("m3", worn[last]), float(worn[last].sum()), []
+    names = ("excitation_frequency_begin", "excitation_frequency", "block_cycles", "sweep_rate")
+    numbers = [blocks[name].values if name in blocks else nothing[0] for name in names]
+    for name, volume, error, begin, end, cycles, rate in zip(
+        blocks["block"].values, worn[last].tolist(), wrong[last].tolist(), *numbers, strict=True
+    ):
+        frequency = " to ".join(dict.fromkeys(map(show_number, (float(begin), float(end)))))
+        amount = scale.show(volume, 4) if reached.size else "-"
+        amount += f" ± {show_percent(error)}" if error > 0.0 else ""
+        share = show_percent(volume / total) if total > NO_VOLUME else "-"
+        passage = f"{rate:.2g}" if rate > 0.0 else "-"
+        rows.append((str(name), frequency, show_number(float(cycles), 4), amount, share, passage))
+    columns = ("block", "frequency (Hz)", "cycles", "worn volume", "share", "rate over (zeta f)²")
+    return Table(columns, tuple(rows), f"Wear after {result.cycle_label(last)}." if reached.size else "")
+
+
+def _draw_blocks(result: Result, panel: Axes, blocks: xr.Dataset, values: FloatArray, scale: Scale, error: str) -> None:
+    """A line a block of values (n_missions, n_blocks), with bands of their relative errors of this name."""
+    for place, name in enumerate(blocks["block"].values):
+        own = scale(values[:, place])
+        wrong = blocks[error].values[:, place] * own if error in blocks else None
+        look = plot.line_style(place, len(own)) | {"label": str(name)}
+        plot.add_line(panel, result.cycles, own, wrong, band=True, **look)
+    plot.set_from_zero(panel, float(np.nanmax(scale(values), initial=0.0)))
+
+
+def draw_shares(result: Result) -> Drawn:
+    """Above, the shares of the blocks in the wear of one mission, on top of each other; below, their worn volumes."""
+    blocks = _read_blocks(result)
+    worn, shares = blocks["block_worn_volume"].values, blocks["block_share"].values
+    if len(result.cycles) == 1 or not np.nanmax(worn, initial=0.0) > NO_VOLUME:
+        return None
+    figure, ((above,), (below,)) = plot.new_panels(2, 1, 5.2, sharex=True)
+    colours = [COLOURS[place % len(COLOURS)] for place in range(shares.shape[1])]
+    patches = above.stackplot(result.cycles, 100.0 * np.nan_to_num(shares).T, colors=colours, alpha=0.75)
+    for patch in patches[len(COLOURS) :]:
+        # beyond the colours there are, the same ones with hatches
+        patch.set_hatch("///")
+    above.set(ylabel="share in a mission (%)", ylim=(0.0, 100.0), xlim=(0.0, result.cycles[-1]))
+    scale = scale_for("m3", worn)
+    _draw_blocks(result, below, blocks, worn, scale, "block_worn_volume_error")
+    below.set(ylabel=scale.label("worn volume"), xlabel="missions")
+    plot.add_legend(figure, below.get_lines())
+    return (figure,)
+
+
+def draw_block_responses(result: Result) -> Drawn:
+    """Amplitude of the first response over the missions, at the begin of each block and at its end."""
+    if len(result.cycles) == 1:
+        return None
+    blocks = _read_blocks(result)
+    ends = [name for name in _ENDS if name in blocks]
+    figure, panels = plot.new_panels(1, len(ends), 3.6, sharey=True)
+    amplitudes = [blocks[name].isel(response=0).values for name in ends]
+    scale = scale_for("m", *amplitudes)
+    for panel, amplitude, end in zip(panels[0], amplitudes, ends, strict=True):
+        _draw_blocks(result, panel, blocks, amplitude, scale, "response_error")
+        panel.set(title=f"at the {_ENDS[end]} of the block", xlabel="missions", xlim=(0.0, result.cycles[-1]))
+    plot.set_from_zero(panels[0, 0], max(float(np.nanmax(scale(each), initial=0.0)) for each in amplitudes))
+    panels[0, 0].set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
+    return figure, f"{len(result.responses) - 1} more responses are in the file" if len(result.responses) > 1 else ""

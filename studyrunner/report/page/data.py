@@ -11,13 +11,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from studyrunner.report.figures.loops import find_loops
-from studyrunner.report.root.surface import read_root
-from studyrunner.report.root.views import body_colours, find_views
-from studyrunner.result.scene_pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
-from studyrunner.result.units import Scale, scale_for, units_of
+from studyrunner.report.figures.response import find_loops
+from studyrunner.report.root import body_colours, find_views, read_root
+from studyrunner.report.selection import course_axis
+from studyrunner.result.pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import DRAWN
+from studyrunner.units import Scale, scale_for, units_of
 from studyrunner.variables import CERTIFICATE
 
 _CHARACTERS_A_FLOAT = 16.0 / 3.0
@@ -174,7 +174,7 @@ def _start(result: Result, arrays: Mapping[str, xr.DataArray]) -> dict[str, str]
     name = next(iter((*usual, *arrays)))
     sizes = arrays[name].sizes
     several = [str(dim) for dim in sizes if sizes[dim] > 1]
-    over = [dim for dim in (result.course_axis, "cycle") if dim in several]
+    over = [dim for dim in (course_axis(result), "cycle") if dim in several]
     across = str(next(iter((*over, *several, *sizes))))
     colours = [dim for dim in _COLOURED if dim in several and dim != across and sizes[dim] <= _LINES]
     return {"variable": name, "x": across, "colour": colours[0] if colours else ""}

@@ -22,13 +22,12 @@ from xml.etree import ElementTree
 from studyrunner.coordinates import COORDINATES
 from studyrunner.report.drawing import Drawing, Item, Missing, Table
 from studyrunner.report.page.data import build_page_data, build_root_numbers
-from studyrunner.result.certainty import advise_ended, describe_ended, tell_ends
-from studyrunner.result.points import CONVERGED
-from studyrunner.result.units import show_number, units_of
-from studyrunner.result.view import Result
+from studyrunner.result.certainty import advise_ended, describe_ended, describe_ends
+from studyrunner.result.view import CONVERGED, Result
 from studyrunner.summary.answer import summarise
 from studyrunner.summary.lines import summary_rows
 from studyrunner.system.progress import count
+from studyrunner.units import show_number, units_of
 from studyrunner.user_error import show_text
 
 DATA_LIMIT = 5e6
@@ -44,7 +43,7 @@ _MOST_VALUES = 12
 
 @dataclass(frozen=True)
 class Shown:
-    """A drawing as it stands on the page: SVG elements for wide and for narrow windows, and names of its files."""
+    """A drawing as it stands on the page: SVG elements for wide and narrow windows, and names of its files."""
 
     name: str
     title: str
@@ -128,16 +127,16 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
     blocks: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
     loader = PackageLoader("studyrunner.report.page", ".")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
-    notes: list[str] = []
+    notes, own = list[str](), resources.files("studyrunner.report.page") / "browser"
     data = build_page_data(result, DATA_LIMIT, notes)
     if data is not None:
         data["root"] = build_root_numbers(result, notes)
     return environment.get_template("page.html").render(
         title=result.title,
         file=show_text(result.path.name),
-        css=_own_file("page.css"),
+        css=own.joinpath("page.css").read_text("utf-8"),
         answer=summary_rows(summarise(result)),
-        ends=tell_ends(result),
+        ends=describe_ends(result),
         endings=_endings(result),
         facts=_facts(result),
         study=result.dataset.attrs.get("study"),
@@ -146,12 +145,8 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
         notes=notes,
         # nothing in it ends the script element that it stands in
         data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c") if data else "",
-        scripts=[get_plotlyjs(), "\n".join(map(_own_file, _SCRIPTS))] if data else [],
+        scripts=[get_plotlyjs(), "\n".join(own.joinpath(name).read_text("utf-8") for name in _SCRIPTS)] if data else [],
     )
-
-
-def _own_file(name: str) -> str:
-    return resources.files("studyrunner.report.page").joinpath("browser", name).read_text(encoding="utf-8")
 
 
 def _endings(result: Result) -> list[tuple[str, list[str]]]:

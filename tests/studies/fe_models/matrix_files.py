@@ -10,16 +10,17 @@ import numpy as np
 from scipy import io, sparse
 
 
-def chain(nodes: tuple[int, ...] = (1, 2, 10)):
-    """Matrices (dense, definite) of some nodes, and their rows."""
-    n = 3 * len(nodes)
+def chain(nodes: tuple[int, ...] = (1, 2, 10), n_modes: int = 0):
+    """Matrices (dense, definite) of some nodes and modes, and their rows; modes have the dof 0."""
+    n = 3 * len(nodes) + n_modes
     generator = np.random.default_rng(5)
     stiffness = generator.normal(size=(n, n))
     stiffness = 1e9 * (stiffness + stiffness.T + n * np.eye(n))
     mass = np.diag(np.arange(1.0, n + 1)) * 1e-3
     mass[0, 1] = mass[1, 0] = 2e-4
     named = {"stiffness": stiffness, "mass": mass, "damping": mass, "load": np.arange(float(n))}
-    return named, np.stack([np.repeat(nodes, 3), np.tile([1, 2, 3], len(nodes))], axis=1)
+    rows = [[node, dof] for node in nodes for dof in (1, 2, 3)]
+    return named, np.array(rows + [[9001 + mode, 0] for mode in range(n_modes)])
 
 
 def entries(matrix, triangles="upper"):

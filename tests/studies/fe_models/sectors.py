@@ -1,4 +1,4 @@
-"""A small bladed sector and a lap joint in any kind of element, meshes matching or not. A helper of the tests."""
+"""A small bladed sector in any kind of element, meshes matching or not."""
 
 import numpy as np
 
@@ -15,12 +15,17 @@ OMEGA_SQUARED = 2.5e5
 Z = np.array([0.0, 0.0, 1.0])
 
 
+HALF = np.tan(np.pi / N_SECTORS)
+
+
+def wedge_shape(points, begin=0.2):
+    """A wedge from x = begin, 0.1 m long: in place of blades, a ring whose joint runs through the cut faces."""
+    x = begin + 0.1 * points[:, 0]
+    return np.stack([x, x * HALF * (2.0 * points[:, 1] - 1.0), 0.04 * points[:, 2]], axis=1)
+
+
 def disk_shape(points):
-    """A wedge of a disk from x = 0.1 to 0.2 m whose outer face is flat."""
-    x = 0.1 + 0.1 * points[:, 0]
-    half = np.tan(np.pi / N_SECTORS)
-    # skewed along z, so that waves of positive and negative direction differ
-    return np.stack([x, x * half * (2.0 * points[:, 1] - 1.0), 0.04 * points[:, 2]], axis=1)
+    return wedge_shape(points, 0.1)
 
 
 def blade_shape(points):
@@ -30,13 +35,6 @@ def blade_shape(points):
     across, along = 0.036 * (y - 0.5), 0.03 * (z - 0.5)
     turned = across * np.cos(angle) - along * np.sin(angle), along * np.cos(angle) + across * np.sin(angle)
     return np.stack([0.2 + 0.1 * x, turned[0], 0.02 + turned[1]], axis=1)
-
-
-def wedge_shape(points):
-    """The disk goes on to x = 0.3 m: a ring in place of blades, whose joint runs through the cut faces."""
-    x = 0.2 + 0.1 * points[:, 0]
-    half = np.tan(np.pi / N_SECTORS)
-    return np.stack([x, x * half * (2.0 * points[:, 1] - 1.0), 0.04 * points[:, 2]], axis=1)
 
 
 def faces_where(mesh: SolidMesh, inside):
@@ -50,6 +48,11 @@ def faces_where(mesh: SolidMesh, inside):
     return np.array(elements, dtype=np.int64), np.array(faces, dtype=np.int64)
 
 
+def surface_where(mesh: SolidMesh, name, inside):
+    """The surface of these faces."""
+    return surface_of_faces(mesh, name, *faces_where(mesh, inside))
+
+
 class Sector:
     """Mesh, sets and faces of the sector; `joint` gives what is done with it."""
 
@@ -60,9 +63,7 @@ class Sector:
         self.mesh = joined(first, second)
         x, y, _ = self.mesh.coordinates.T
         of_blade = np.arange(self.mesh.n_nodes) >= first.n_nodes
-        half = np.tan(np.pi / N_SECTORS)
-        self.left = np.flatnonzero(np.abs(y + half * x) < 1e-9)
-        self.right = np.flatnonzero(np.abs(y - half * x) < 1e-9)
+        self.left, self.right = (np.flatnonzero(np.abs(y + sign * HALF * x) < 1e-9) for sign in (1.0, -1.0))
         self.bore = np.flatnonzero(~of_blade & (np.abs(x - 0.1) < 1e-9))
         self.tip = np.flatnonzero(of_blade & (np.abs(x - 0.3) < 1e-9))
         self.disk_faces = faces_where(self.mesh, ~of_blade & (np.abs(x - 0.2) < 1e-9))

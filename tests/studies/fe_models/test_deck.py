@@ -1,14 +1,12 @@
 """Decks come out as they are written: meshes, sets, instances, contact, loads; and what of a deck is skipped."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import studies
 from studies.fe_models.deck.contents import ContactPair, Material, SolidSection, Tie
-from studies.fe_models.deck.read import HARMLESS, KEYWORDS, read_deck
+from studies.fe_models.deck.read import read_deck
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import BLOCKS, CUBES, PART, prepared_deck, write
 
@@ -276,19 +274,3 @@ def test_removed_elements_and_pairs(tmp_path):
     assert not read_deck(write(tmp_path, BLOCKS + pair)).contact_pairs
     written = pair.replace("*STATIC", "*FREQUENCY, SOLVER=MATRIXSTORAGE")
     assert len(read_deck(write(tmp_path, BLOCKS + written)).contact_pairs) == 1
-
-
-def lists_of_keywords():
-    """What the page says of keywords: which are read with which parameters, and which are skipped."""
-    rows = ["| read | parameters that are acted upon | parameters that are skipped |", "|---|---|---|"]
-    procedures = [name for name, each in KEYWORDS.items() if "*" in each.parameters]
-    for name, each in sorted(KEYWORDS.items()):
-        if name not in procedures:
-            own = [" ".join(sorted(names)) for names in (each.parameters, each.harmless)]
-            rows.append(f"| `{name}` | {own[0]} | {own[1]} |")
-    rows += ["", "Procedures, with any parameters: " + ", ".join(f"`{name}`" for name in procedures) + ".", ""]
-    return "\n".join([*rows, "Skipped: " + ", ".join(f"`{name}`" for name in sorted(HARMLESS)) + "."])
-
-
-def test_the_page_has_the_lists():
-    assert lists_of_keywords() in (Path(studies.__path__[0]) / "fe_models/README.md").read_text()

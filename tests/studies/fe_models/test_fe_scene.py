@@ -1,5 +1,7 @@
 """Reduced models against dense linear algebra, the bundled dovetail and closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg
@@ -18,10 +20,10 @@ from studies.finite_element.joint_model import (
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.finite_element.solid_mesh import Rotation, assemble_mass, assemble_stiffness, spin_softening
-from studies.finite_element.surfaces import surface_of_faces, surface_of_nodes
+from studies.finite_element.surfaces import surface_of_nodes
 from studies.model_check import check_model
 from studies.scene_error import SceneError
-from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, wedge_shape
+from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, surface_where, wedge_shape
 from tests.studies.fe_models.solid_meshes import block, joined
 
 
@@ -123,15 +125,16 @@ def test_pairs_on_cut_faces_and_planes_of_symmetry():
     check_model(scene.model)
 
 
-def plates(lower="C3D10", upper="C3D8", prestress=False):
+def plates():
     """Two plates that lap over each other along x, the lower one clamped; no cyclic symmetry."""
-    first, _ = block(lower, (4, 2, 1), lambda points: points * [0.1, 0.03, 0.004])
-    second, _ = block(upper, (6, 3, 1), lambda points: points * [0.05, 0.03, 0.004] + [0.05, 0.0, 0.004])
+    first, _ = block("C3D10", (4, 2, 1), lambda points: points * [0.1, 0.03, 0.004])
+    second, _ = block("C3D8", (6, 3, 1), lambda points: points * [0.05, 0.03, 0.004] + [0.05, 0.0, 0.004])
     mesh = joined(first, second)
     x, _, z = mesh.coordinates.T
     upper_nodes = np.arange(mesh.n_nodes) >= first.n_nodes
-    low = surface_of_faces(mesh, "LOW", *faces_where(mesh, ~upper_nodes & (np.abs(z - 0.004) < 1e-9) & (x > 0.049)))
-    up = surface_of_faces(mesh, "UP", *faces_where(mesh, upper_nodes & (np.abs(z - 0.004) < 1e-9)))
+    touching = np.abs(z - 0.004) < 1e-9
+    low = surface_where(mesh, "LOW", ~upper_nodes & touching & (x > 0.049))
+    up = surface_where(mesh, "UP", upper_nodes & touching)
     held = np.zeros((mesh.n_nodes, 3), dtype=bool)
     held[x < 1e-9] = True
     end = SetMotion(np.flatnonzero(upper_nodes & (x > 0.0999)), np.array([0.0, 0.0, 1.0]))
@@ -170,7 +173,7 @@ def bars(lift, load=0.0):
     second, b = block("C3D8", (2, 2, 3), lambda points: points + [0.0, 0.0, 1.0 + lift], material=soft)
     mesh = joined(first, second)
     z = np.append(a[:, 2], 10.0 + b[:, 2])
-    surfaces = (surface_of_faces(mesh, name, *faces_where(mesh, z == at)) for name, at in (("LOW", 1.0), ("UP", 10.0)))
+    surfaces = (surface_where(mesh, name, z == at) for name, at in (("LOW", 1.0), ("UP", 10.0)))
     held = np.repeat(((z == 0.0) | (z == 11.0))[:, None], 3, axis=1)
     end = SetMotion(np.flatnonzero(z == 10.0), -Z)
     joint = JointDefinition((ContactSurfaces(*surfaces, 0.1, with_gaps=True),), held, end, {"end": end})
@@ -256,12 +259,8 @@ def test_reduced_frequencies_come_down_to_the_exact_ones():
 
 def test_retainer_acts_on_the_mean_relative_displacement():
     model, joint = plates()
-    direction = np.array([2.0, 0.0, 0.0])
-    retained = JointDefinition(
-        joint.contacts, joint.held, joint.load, joint.responses, retainer=Retainer(5e6, direction)
-    )
-    options = ReductionOptions(n_modes=3)
-    with_it, without = (build_fe_scene(model, each, options, 1) for each in (retained, joint))
+    retained = replace(joint, retainer=Retainer(5e6, np.array([2.0, 0.0, 0.0])))
+    with_it, without = (build_fe_scene(model, each, ReductionOptions(n_modes=3), 1) for each in (retained, joint))
     added = with_it.model.linear[0].stiffness - without.model.linear[0].stiffness
     shift = np.zeros(len(added))
     shift[: 3 * without.pairs.n_contact] = (without.pairs.frames @ np.array([0.25, 0.1, -3.0])).ravel()
@@ -271,9 +270,8 @@ def test_retainer_acts_on_the_mean_relative_displacement():
 
 def test_what_cannot_be_is_said():
     model, joint = plates()
-    loose = JointDefinition(joint.contacts, np.zeros_like(joint.held), joint.load, joint.responses)
     with pytest.raises(SceneError, match="nothing holds the glued structure"):
-        build_fe_scene(model, loose, ReductionOptions(), 1)
+        build_fe_scene(model, replace(joint, held=np.zeros_like(joint.held)), ReductionOptions(), 1)
     with pytest.raises(SceneError, match=r"nodal_diameter: 2; only a cyclic sector has one"):
         build_fe_scene(model, joint, ReductionOptions(nodal_diameter=2), 1)
     sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 2, 1))

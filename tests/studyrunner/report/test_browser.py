@@ -22,7 +22,6 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
 ]
-PHONE = {"width": 420, "height": 800, "deviceScaleFactor": 1, "mobile": True}
 PATIENCE = 120.0  # s
 EVIL = "</script><img src=x onerror='window.hurt=1'><script>window.hurt=2</script>"
 FAILED = 5  # frequency 191 Hz, the first wear coefficient, explicit
@@ -39,14 +38,6 @@ const slider = document.querySelector(`input[name='${arguments[0]}']`);
 slider.value = String(arguments[1]);
 slider.dispatchEvent(new Event("input"));
 requestAnimationFrame(() => requestAnimationFrame(() => arguments[2]()));"""
-PIXEL = """
-const [plot, index, colour] = arguments;
-plot.scrollIntoView({block: "center", behavior: "instant"});
-const box = plot.getBoundingClientRect(), { xaxis, yaxis } = plot._fullLayout;
-const trace = plot.data.find((each) => each.customdata && each.customdata[0][1] === colour);
-const at = trace.customdata.findIndex((each) => each[0] === index);
-const [x, y] = [xaxis._offset + xaxis.d2p(trace.x[at]), yaxis._offset + yaxis.d2p(trace.y[at])];
-return [x - box.width / 2, y - box.height / 2];"""
 
 
 @pytest.fixture(scope="module")
@@ -165,21 +156,9 @@ def test_the_panel_draws_the_numbers_of_the_file_with_their_errors(page, dataset
     np.testing.assert_allclose(values / values.max(), expected / expected.max(), rtol=1e-6)
 
 
-def test_a_click_and_a_slider_pick_the_point(page, dataset):
-    slide(page, "wear_coefficient", 0)
-    plot, (index, colour) = page.find_element(By.ID, "panel"), (2, 1)
-
-    def hover(_):
-        # a click is one on what the plot has found under the mouse before, which it does in its own time
-        x, y = page.execute_script(PIXEL, plot, index, colour)
-        ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2).move_by_offset(3, -2).perform()
-        found = page.execute_script("return (arguments[0]._hoverdata || []).map((each) => each.customdata)", plot)
-        return [index, colour] in found
-
-    WebDriverWait(page, PATIENCE, poll_frequency=0.1).until(hover)
-    ActionChains(page).click().perform()
-    WebDriverWait(page, PATIENCE).until(lambda _: "scheme explicit" in text_of(page, "picked"))
-    assert at(page, "frequency", "scheme") == {"frequency": index, "scheme": colour}
+def test_sliders_pick_the_point(page, dataset):
+    for name, place in (("wear_coefficient", 0), ("frequency", 2), ("scheme", 1)):
+        slide(page, name, place)
     picked = text_of(page, "picked").replace("\u00a0", " ")
     assert picked.startswith("frequency 192.5 Hz, wear coefficient 1e-11 1/Pa, scheme explicit: ")
     script = "return document.querySelector(\"[data-name='run_time'] dd\").textContent"
@@ -226,21 +205,6 @@ def test_the_root_is_coloured_and_worn_as_the_file_says_and_turns(page, dataset)
     choose(page, "root view", "1")
     choose(page, "root shape", "")
     assert "times" not in text_of(page, "root-title")
-
-
-def test_the_page_fits_a_phone_and_follows_the_dark_mode(browser, address):
-    dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
-    try:
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", PHONE)
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
-        load(browser, address)
-        assert browser.execute_script("return document.documentElement.scrollWidth") <= PHONE["width"]
-        shown = "return [...document.querySelectorAll('figure > div')].map((each) => each.getClientRects().length)"
-        assert browser.execute_script(shown) == [0, 1]
-        assert browser.execute_script("return document.getElementById('panel').layout.paper_bgcolor") == "#181818"
-    finally:
-        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
 def test_other_files_load_without_errors(browser, tmp_path):

@@ -1,8 +1,5 @@
 """The command `study-report`: what it writes, what it says, how it ends."""
 
-import subprocess
-import sys
-
 import pytest
 
 from studyrunner.report import contents
@@ -72,13 +69,3 @@ def test_failures_have_a_traceback_and_signals_have_none(draw, capsys):
     draw(KeyboardInterrupt())
     assert main(["results/worn.x.nc", "--no-compute"]) == INTERRUPTED
     assert capsys.readouterr().err == "study-report: interrupted\n"
-
-
-def test_help_does_not_load_the_libraries(capsys):
-    code = (
-        "import sys; from studyrunner.report.cli import main; main(['--help']);"
-        "sys.exit(bool({'matplotlib', 'plotly', 'xarray', 'numpy'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert "study-report dovetail.nc" in done.stdout
-    assert "exit status" in done.stdout

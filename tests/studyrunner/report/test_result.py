@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from studyrunner.api import open_result
-from studyrunner.report.cli import main
+from studyrunner.report.contents import draw_report
 from studyrunner.report.page.page import write_page
 from studyrunner.report.selection import choose
 from studyrunner.result.certainty import certainty_of, describe_ended
-from studyrunner.result.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.result.view import open_for_report
+from studyrunner.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure
 from tests.studyrunner.results import build_file, fail, make_result
@@ -125,7 +125,7 @@ def test_a_result_of_version_0_4_is_opened_and_reported(tmp_path):
     old["outcome"].attrs = {"flag_values": np.arange(14, dtype=np.int8), "flag_meanings": " ".join(words)}
     old.attrs["study"] += "[outputs]\nloops = [0, 1]\n"
     old.to_netcdf(tmp_path / "old.nc")
-    assert main([str(tmp_path / "old.nc"), "-o", str(tmp_path / "report")]) == 0
+    assert len(list(draw_report(open_for_report(tmp_path / "old.nc")))) > 10
     with open_result(tmp_path / "old.nc") as opened:
         assert opened.fretwear.outcomes().values.ravel()[3] == "march_failed"
         assert opened["loop_contact"].values.tolist() == [0, 1]

@@ -3,16 +3,13 @@
 import math
 from xml.etree import ElementTree
 
-import matplotlib as mpl
 import meshio
 import numpy as np
 import pytest
-from matplotlib.collections import PolyCollection
 
+from studyrunner.report import vtu
 from studyrunner.report.cli import BAD_INPUT, main
-from studyrunner.report.root import vtu
-from studyrunner.report.root.surface import face_normals, read_root
-from studyrunner.report.root.views import find_views
+from studyrunner.report.root import face_normals, read_root
 from tests.studyrunner.report.cases import dovetail, dovetail_file, draw_figure
 from tests.studyrunner.results import as_result, build_file
 
@@ -114,34 +111,6 @@ def test_the_figures_of_the_dovetail(result, surface):
     assert f"{surface.exaggeration(float(depth.max())):g} times" in worn.caption.replace("\u00a0", "")
     written = [text.get_text() for panel in numbers.figure.axes for text in panel.texts]
     assert sorted(map(int, written)) == list(range(16))
-
-
-def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(result, surface):
-    """Shares of red, green and blue: the light on a face, which differs, makes all of them larger or smaller."""
-
-    def shares(colours):
-        return np.asarray(colours[..., :3] / colours[..., :3].sum(axis=-1, keepdims=True))
-
-    def of_faces(name, flank):
-        """Of a variable of pairs: a face has four of them at its corners."""
-        pairs = shown.fretwear.flank(name, flank).values
-        return np.asarray(0.25 * (pairs[1:, 1:] + pairs[1:, :-1] + pairs[:-1, 1:] + pairs[:-1, :-1])).ravel()
-
-    views = {view.title: view.frame for view in find_views(surface)}
-    shown = result.dataset.isel(result.shown_point()).isel(cycle=-1)
-    panels = draw_figure(result, "worn_root").figure.axes[1:3]
-    for panel, flank in zip(panels, shown.fretwear.surfaces, strict=True):
-        assert flank in panel.get_title()
-        faces = next(item for item in panel.collections if isinstance(item, PolyCollection))
-        drawn = shares(np.asarray(faces.get_facecolors()))
-        wanted = shares(mpl.colormaps["cividis"](of_faces("wear_depth", flank) / float(shown.wear_depth.max())))
-        centres = np.stack([of_faces(f"contact_{axis}", flank) for axis in "xyz"], axis=1)
-        right, up, _ = views[panel.get_title()]
-        for colour, centre in zip(wanted, centres, strict=True):
-            alike = np.flatnonzero(np.abs(drawn - colour).max(axis=1) < 1e-3)
-            places = np.array([faces.get_paths()[each].vertices[:4].mean(axis=0) for each in alike])
-            # in mm; the worn shape is moved by some of them, and faces are 13 mm long
-            assert np.linalg.norm(places - 1e3 * np.array([centre @ right, centre @ up]), axis=1).min() < 5.0
 
 
 # --- for ParaView ---

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studyrunner.result.scars import find_scar, read_profile
+from studyrunner.result.pairs import find_scar, read_profile
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure
 from tests.studyrunner.results import make_result

@@ -11,10 +11,10 @@ from studies.scene_answers import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.page.data import build_page_data, build_root_numbers
-from studyrunner.report.root.surface import read_root
-from studyrunner.report.root.vtu import find_writer
+from studyrunner.report.root import read_root
+from studyrunner.report.vtu import find_writer
 from studyrunner.result.opening import check_dataset
-from studyrunner.result.scene_pairs import last_depth, of_scene, of_shown_scene
+from studyrunner.result.pairs import last_depth, of_scene, of_shown_scene
 from studyrunner.result.view import Result
 from tests.studyrunner.report.cases import with_mesh
 from tests.studyrunner.report.test_page import decode

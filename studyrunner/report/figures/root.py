@@ -13,12 +13,24 @@ from matplotlib.ticker import MaxNLocator
 
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
+from studyrunner.report.figures.flanks import largest_pair
 from studyrunner.report.panels import COLOURS, MAP, FloatArray
-from studyrunner.report.root.surface import MESH, RootSurface, face_normals, read_mesh, read_root
-from studyrunner.report.root.views import View, draw_scale_bar, find_views, from_aslant, paint_faces, rgb
-from studyrunner.result.scene_pairs import NO_DEPTH, last_depth, tells_depth
-from studyrunner.result.units import Scale, scale_for, show_number
+from studyrunner.report.root import (
+    MESH,
+    RootSurface,
+    View,
+    draw_scale_bar,
+    face_normals,
+    find_views,
+    from_aslant,
+    paint_faces,
+    read_mesh,
+    read_root,
+    rgb,
+)
+from studyrunner.result.pairs import NO_DEPTH, has_depths, last_depth
 from studyrunner.result.view import Result
+from studyrunner.units import Scale, scale_for, show_number
 
 OF_SECTOR = (*MESH, "mesh_part", "natural_frequency")
 """Variables that the figure of the sector shows."""
@@ -37,10 +49,10 @@ def _read_surface(result: Result) -> RootSurface | None:
 def draw_root(result: Result) -> Drawn:
     """The worn shape of the shown point, coloured with its wear depth; the mean pressure where nothing is worn."""
     shown, surface = result.shown_point(), _read_surface(result)
-    if surface is None or not (tells_depth(result) or result.has("mean_pressure")):
+    if surface is None or not (has_depths(result) or result.has("mean_pressure")):
         return None
     last = result.last_kept(shown)
-    depth = last_depth(result, shown) if tells_depth(result) else np.zeros(result.dataset.sizes["contact"])
+    depth = last_depth(result, shown) if has_depths(result) else np.zeros(result.dataset.sizes["contact"])
     name, values, units = "wear depth", depth, "m"
     if result.has("mean_pressure") and not float(depth.max()) > NO_DEPTH:
         name, values, units = "mean pressure", result.at("mean_pressure", shown, last).values, "Pa"
@@ -49,7 +61,8 @@ def draw_root(result: Result) -> Drawn:
     factor, scale = surface.exaggeration(float(depth.max())), scale_for(units, values)
     return (
         _paint(surface, surface.worn(depth, factor), values, scale, name),
-        f"{name.capitalize()} {result.when(last, 'after')}{_largest(result, values, scale)}",
+        f"{name.capitalize()} after {result.cycle_label(last)}",
+        f"Largest: {largest_pair(result, values, scale)}" if values.max() > 0.0 else "",
         f"The wear depth is taken off each surface, {show_number(factor)} times exaggerated" if factor > 1.0 else "",
     )
 
@@ -62,12 +75,8 @@ def draw_fraction(result: Result, name: str) -> Drawn:
     if not np.isfinite(values).all():
         return "No point has a state."
     label, scale = f"fraction of the period {'in slip' if name == 'slip_fraction' else 'open'}", scale_for("1", values)
-    return _paint(surface, surface.nodes, values, scale, label), label.capitalize() + _largest(result, values, scale)
-
-
-def _largest(result: Result, values: FloatArray, scale: Scale) -> str:
-    pair = result.dataset["contact"].values[int(np.argmax(values))]
-    return f". Largest: {scale.show(float(values.max()), 3)} at pair {pair}" if float(values.max()) > 0.0 else ""
+    largest = f"Largest: {largest_pair(result, values, scale)}" if values.max() > 0.0 else ""
+    return _paint(surface, surface.nodes, values, scale, label), label.capitalize(), largest
 
 
 def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale: Scale, label: str) -> Figure:

@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from studyrunner.report.root.surface import RootSurface, read_root
-from studyrunner.result.scene_pairs import depths, of_shown_scene, tells_depth
+from studyrunner.report.root import RootSurface, read_root
+from studyrunner.result.pairs import depths, has_depths, of_shown_scene
 from studyrunner.result.view import Result
 from studyrunner.user_error import UserError, Verbatim
 
@@ -54,7 +54,7 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> int:
     import meshio
 
     shown = result.shown_point()
-    fields = {"wear_depth": depths(result, shown)} if tells_depth(result) else {}
+    fields = {"wear_depth": depths(result, shown)} if has_depths(result) else {}
     fields |= {name: result.at(name, shown).values for name in FIELDS if name not in fields and result.has(name)}
     units = {name: str(result.dataset[name].attrs.get("units", "1")) for name in fields if result.has(name)}
     triangle = surface.faces[:, 2] == surface.faces[:, 3]

@@ -1,23 +1,26 @@
-"""Numbers with units as a reader wants them: a prefix that fits the largest value, few digits.
+"""Numbers as a reader wants them: a prefix that fits the largest value, few digits, errors in percent.
 
 By hand: `EngFormatter` of matplotlib and `to_compact` of pint choose a prefix for each number.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
-from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.coordinates import COORDINATES
 
-_LARGE = 1e7
-"""From here on, numbers that were rounded are shown with an exponent."""
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
 
-_ROUND_OFF = 1e-12
-"""Of the largest value that is shown."""
+_LARGE = 1e7  # from here on, numbers that were rounded are shown with an exponent
+_ROUND_OFF = 1e-12  # of the largest value that is shown
+_SPACE = "\N{NO-BREAK SPACE}"
+_DIGITS = range(2, 13)
 
 # Of each unit in SI: smallest value that is shown so, factor, unit; from large to small, the last for all below.
 _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
@@ -43,7 +46,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True)
 class Scale:
-    """How values in SI are shown: times `factor`, in `unit`. The unit is empty for plain numbers.
+    """How values in SI are shown: times `factor`, in `unit`, which is empty for plain numbers.
 
     least: in SI; smaller magnitudes are round-off, and shown as zero.
     """
@@ -81,10 +84,15 @@ def show_number(value: float, digits: int = 6) -> str:
     """A number in few digits; thousands set apart. Whole numbers keep all of theirs."""
     text = f"{value:.{digits}g}"
     if float(value).is_integer() and 1e4 <= abs(value) < 1e15:
-        return f"{value:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
+        return f"{value:,.0f}".replace(",", _SPACE)
     if "e+" in text and abs(value) < _LARGE:
         return f"{float(text):.0f}" if abs(value) < 1e4 else show_number(float(text))
     return text
+
+
+def show_count(cycle: float) -> str:
+    """A cycle count in messages: "31 000"."""
+    return show_number(cycle).replace(_SPACE, " ")
 
 
 def show_cycles(value: float, counted: str = "cycles") -> str:
@@ -92,6 +100,39 @@ def show_cycles(value: float, counted: str = "cycles") -> str:
     if value == np.inf:
         return "the final state"
     return f"{show_number(value, 4)} {counted.removesuffix('s') if value == 1 else counted}"
+
+
+def show_percent(fraction: float, rtol: float | None = None) -> str:
+    """A relative error in percent: "2.6 %"; more than ten times the whole in short.
+
+    With `rtol`, the error that was asked for, it has as many digits as show on which side of `rtol` it is: an error
+    just above 1 % is not shown as 1 %.
+    """
+    if fraction >= 1.0:
+        return f"{100.0 * fraction:.0f} %" if fraction < 10.0 else f"{100.0 * fraction:.0e} %"
+    shown = 100.0 * fraction
+    limit = math.inf if rtol is None else float(f"{100.0 * rtol:.12g}")
+    for digits in _DIGITS:
+        shown = float(f"{100.0 * fraction:.{digits}g}")
+        if rtol is None or (shown <= limit) == (fraction <= rtol):
+            break
+    return f"{shown:.12g} %"
+
+
+def show_rtol(rtol: float) -> str:
+    """The error that was asked for, as it was given: "1 %"."""
+    return f"{100.0 * rtol:.6g} %"
+
+
+def describe_reach(last: float, end: float, error: float) -> str:
+    """How far a history was computed that ends early, and the relative error of its last worn volume.
+
+    end: count that was asked for, inf where there is none.
+    """
+    reached = f"computed up to cycle {show_count(last)}" + (f" of {show_count(end)}" if end < math.inf else "")
+    # before the first count that was asked for nothing has worn, and that is known exactly
+    known = last > 0.0 and 0.0 < error < math.inf
+    return f"{reached}, the worn volume there to {show_percent(error)}" if known else reached
 
 
 def units_of(axis: xr.DataArray) -> str:

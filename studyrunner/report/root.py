@@ -1,0 +1,312 @@
+"""The mesh of a scene in three dimensions: outer faces of the bodies, the contact pairs on them, and views of both.
+
+A result file holds outer faces and positions of pairs, but not which face belongs to which pair: faces all of whose
+corners are nodes at which pairs stand are in contact. Where the meshes of two bodies do not match, those are the faces
+of one of them.
+
+By hand: `mplot3d` leaves a wide margin, and draws both sides of a face alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from studyrunner.result.pairs import contact_pairs
+from studyrunner.result.view import Result
+
+MESH = ("mesh_x", "mesh_y", "mesh_z", "mesh_quad")
+
+Floats = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+_DEEPEST = 0.04  # worn depth as it is drawn, over the size of the contact surfaces
+_CORNERS = 4
+_SAME = 1e-6  # distance of a node and its pair, over the size of the mesh
+
+MOST_VIEWS = 8
+
+_AROUND = 0.16  # of a close-up: how much is seen around the contact surfaces, over their size
+_BEFORE = 0.06  # what stands before a contact surface is cut off from here on, over the same size
+_WHOLE = np.array([0.35, -0.6, -0.72])  # to the eye, where upwards is x
+_ASLANT, _FROM_ABOVE = 0.55, 0.3
+# colours of the bodies in their order: their lightness differs, in print as well
+_BODIES, _NAMED = ("#d9b38c", "#9ecae1", "#c7c7c7", "#b5d99c"), {"blade": "#9ecae1", "disk": "#d9b38c"}
+_INSIDE, _EDGEWAYS = 0.42, 1e-9
+
+
+@dataclass(frozen=True)
+class ContactFaces:
+    """Faces in contact and the pairs at their nodes.
+
+    flank (n_faces,): number of the contact surface that a face belongs to, -1 for those not in contact. nodes
+    (n_own,): of the faces in contact, ascending. pairs (n_own,): contact pair at each of these nodes. normals
+    (n_own, 3): unit vectors out of the body.
+    """
+
+    flank: Places
+    nodes: Places
+    pairs: Places
+    normals: Floats
+
+
+@dataclass(frozen=True)
+class RootSurface:
+    """Outer faces of the bodies of a joint, and what its contact pairs are on them.
+
+    nodes (n_nodes, 3): m. faces (n_faces, 4): nodes anticlockwise from outside; triangles repeat their last one.
+    body (n_faces,): index into `bodies`, whose faces hang together by their nodes. contact: the faces in contact.
+    flanks: labels of the contact surfaces.
+    """
+
+    nodes: Floats
+    faces: Places
+    body: Places
+    bodies: tuple[str, ...]
+    contact: ContactFaces
+    flanks: tuple[str, ...]
+
+    def worn(self, depth: Floats, factor: float) -> Floats:
+        """Nodes (n_nodes, 3), m, with the wear depth (n_contact,), m, of the pairs times a factor taken off.
+
+        The depth of a pair is that of both its surfaces together: it is drawn into each of them. NaN counts as no wear.
+        """
+        worn = self.nodes.copy()
+        worn[self.contact.nodes] -= factor * np.nan_to_num(depth[self.contact.pairs])[:, None] * self.contact.normals
+        return worn
+
+    def near_contact(self, most_faces: int) -> RootSurface:
+        """The surface with at most so many faces: those in contact, and those nearest to them."""
+        if len(self.faces) <= most_faces:
+            return self
+        distance, _ = cKDTree(self.nodes[self.contact.nodes]).query(self.nodes[self.faces].mean(axis=1))
+        of_contact = self.contact.flank >= 0
+        order = np.argsort(np.where(of_contact, -1.0, distance), kind="stable")
+        kept = np.sort(order[: max(most_faces, int(of_contact.sum()))])
+        used, places = np.unique(self.faces[kept], return_inverse=True)
+        nodes, faces = np.searchsorted(used, self.contact.nodes), places.reshape(-1, _CORNERS)
+        contact = replace(self.contact, flank=self.contact.flank[kept], nodes=nodes)
+        return replace(self, nodes=self.nodes[used], faces=faces, body=self.body[kept], contact=contact)
+
+    @property
+    def well_seen(self) -> float:
+        """Depth, m, that is well seen beside the size of the contact surfaces."""
+        return _DEEPEST * float(np.linalg.norm(np.ptp(self.nodes[self.contact.nodes], axis=0)))
+
+    def exaggeration(self, deepest: float) -> float:
+        """Factor 1, 2 or 5 times a power of ten with which a depth, m, is well seen; 1 where nothing is worn."""
+        if not deepest > 0.0 or not math.isfinite(deepest) or not self.well_seen > 0.0:
+            return 1.0
+        wanted = self.well_seen / deepest
+        power = 10.0 ** math.floor(math.log10(wanted))
+        return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= wanted * (1.0 + 1e-9))
+
+
+def read_root(result: Result) -> RootSurface | None:
+    """The faces of a file; None where it has no mesh, no positions of pairs, or no pairs on its mesh."""
+    pairs = contact_pairs(result, result.shown_point())
+    if not np.isfinite(pairs.position).all() or not result.has(*MESH):
+        return None
+    nodes, faces, parts = read_mesh(result)
+    if not len(faces) or faces.shape[1] != _CORNERS:
+        return None
+    flanks = tuple(dict.fromkeys(pairs.surface.tolist()))
+    flank = np.array([flanks.index(label) for label in pairs.surface.tolist()])
+    # bodies are counted in the order of their faces
+    rows, columns = faces[:, [0, 0, 0]].ravel(), faces[:, 1:].ravel()
+    joined = sparse.coo_matrix((np.ones(rows.size), (rows, columns)), shape=(len(nodes), len(nodes)))
+    _, component = connected_components(joined, directed=False)
+    _, first, body = np.unique(component[faces[:, 0]], return_index=True, return_inverse=True)
+    body = np.argsort(np.argsort(first))[body].astype(np.int64)
+    contact = find_contact_faces(nodes, faces, pairs.position, flank)
+    return RootSurface(nodes, faces, body, _name_bodies(body, parts), contact, flanks) if len(contact.nodes) else None
+
+
+def read_mesh(result: Result) -> tuple[Floats, Places, NDArray[np.str_]]:
+    """Nodes (n, 3), m, faces (n_faces, 4) and their parts (n_faces,), "" where the file names none."""
+    nodes = np.stack([result.dataset[f"mesh_{axis}"].values for axis in "xyz"], axis=1).astype(float)
+    faces = result.dataset["mesh_quad"].values.astype(np.int64)
+    parts = result.dataset["mesh_part"].values.astype(np.str_) if result.has("mesh_part") else np.full(len(faces), "")
+    return nodes, faces, parts
+
+
+def _name_bodies(body: Places, parts: NDArray[np.str_]) -> tuple[str, ...]:
+    """The part most of its faces belong to; with a number where bodies share it."""
+    names = [Counter(parts[body == number].tolist()).most_common(1)[0][0] for number in range(int(body.max()) + 1)]
+    count = Counter(names)
+    return tuple(
+        name if name and count[name] == 1 else f"{name or 'body'} {names[: place + 1].count(name)}"
+        for place, name in enumerate(names)
+    )
+
+
+def face_normals(nodes: Floats, faces: Places) -> Floats:
+    """Outward normals (n_faces, 3) of the length of the area of the faces (n_faces, 4), m2."""
+    corners = nodes[faces]
+    return np.asarray(0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
+
+
+def find_contact_faces(nodes: Floats, faces: Places, positions: Floats, flank: Places) -> ContactFaces:
+    """Faces in contact of a mesh.
+
+    nodes (n_nodes, 3), m. faces (n_faces, 4): nodes anticlockwise from outside; triangles repeat their last one.
+    positions (n_contact, 3) of the pairs, m. flank (n_contact,): number of the contact surface of each pair.
+    """
+    distance, nearest = cKDTree(positions).query(nodes)
+    stands = distance <= _SAME * np.linalg.norm(np.ptp(nodes, axis=0))
+    found = np.where(stands[faces].all(axis=1), flank[nearest[faces[:, 0]]], -1)
+    found[(flank[nearest[faces]] != found[:, None]).any(axis=1)] = -1
+    own, normals = faces[found >= 0], np.zeros_like(nodes)
+    np.add.at(normals, own, face_normals(nodes, own)[:, None, :])
+    used = np.unique(own)
+    normals = normals[used] / np.maximum(np.linalg.norm(normals[used], axis=1, keepdims=True), 1e-300)
+    return ContactFaces(found, used, nearest[used], normals)
+
+
+# --- from where it is looked at ---
+
+
+@dataclass(frozen=True)
+class View:
+    """Faces that are seen and the direction they are seen from.
+
+    title: in words. faces (n_faces,): which are seen. to_eye, up (3,): unit vectors. body: the one in the view, -1 for
+    all.
+    """
+
+    title: str
+    faces: NDArray[np.bool_]
+    to_eye: Floats
+    up: Floats
+    body: int = -1
+
+    @property
+    def frame(self) -> tuple[Floats, Floats, Floats]:
+        """Unit vectors to the right and upwards on paper, and to the eye."""
+        up = self.up - (self.up @ self.to_eye) * self.to_eye
+        up /= np.linalg.norm(up)
+        return np.cross(up, self.to_eye), up, self.to_eye
+
+    def seen(self, places: Floats) -> Floats:
+        """Places (..., 3), m, on paper (..., 2), mm."""
+        right, up, _ = self.frame
+        return 1e3 * np.stack([places @ right, places @ up], axis=-1)
+
+
+def find_views(surface: RootSurface) -> tuple[View, ...]:
+    """Close-ups of each contact surface of each body, the outermost body first, then the whole."""
+    up, contact = _upwards(surface.nodes), surface.contact.flank >= 0
+    # by where they are along the direction upwards
+    height = {
+        body: float((surface.nodes[np.unique(surface.faces[surface.body == body])] @ up).mean())
+        for body in np.unique(surface.body[contact]).tolist()
+    }
+    closer = [
+        _close_up(surface, body, flank, up)
+        for body in sorted(height, key=lambda body: -height[body])
+        for flank in np.unique(surface.contact.flank[(surface.body == body) & contact]).tolist()
+    ]
+    return (*closer[: MOST_VIEWS - 1], from_aslant(surface.nodes, len(surface.faces)))
+
+
+def from_aslant(nodes: Floats, n_faces: int) -> View:
+    """All faces of a mesh of these nodes (n_nodes, 3), from aslant."""
+    up = _upwards(nodes)
+    place = int(np.argmax(np.abs(up)))
+    to_eye = np.roll(_WHOLE, place) * np.where(np.arange(3) == place, up[place], 1.0)
+    return View("whole mesh", np.ones(n_faces, dtype=np.bool_), to_eye / np.linalg.norm(to_eye), up)
+
+
+def _close_up(surface: RootSurface, body: int, flank: int, up: Floats) -> View:
+    """The faces of a body around its contact surfaces, without those that stand before the one looked at."""
+    own = surface.body == body
+    inside = surface.nodes[np.unique(surface.faces[own & (surface.contact.flank >= 0)])]
+    looked_at = own & (surface.contact.flank == flank)
+    normal = face_normals(surface.nodes, surface.faces[looked_at]).sum(axis=0)
+    normal /= max(float(np.linalg.norm(normal)), 1e-300)
+    size = float(np.linalg.norm(np.ptp(inside, axis=0)))
+    low, high = inside.min(axis=0) - _AROUND * size, inside.max(axis=0) + _AROUND * size
+    near = ((surface.nodes >= low) & (surface.nodes <= high)).all(axis=1)[surface.faces].any(axis=1)
+    on_it = surface.nodes[np.unique(surface.faces[looked_at])]
+    centre = surface.nodes[surface.faces].mean(axis=1)
+    behind = centre @ normal <= float((on_it @ normal).max()) + _BEFORE * size
+    # looked at from a side and from above
+    aside = np.cross(up, normal)
+    if np.linalg.norm(aside) < 0.1:
+        # a surface that looks upwards or downwards
+        other = np.eye(3)[np.argmin(np.abs(up))]
+        aside, up = np.cross(other, normal), other
+    to_eye = normal + _ASLANT * aside / np.linalg.norm(aside) + _FROM_ABOVE * up
+    title = f"{surface.bodies[body]}: {surface.flanks[flank] or 'contact'}"
+    return View(title, own & near & behind | looked_at, to_eye / np.linalg.norm(to_eye), up, body)
+
+
+def _upwards(nodes: Floats) -> Floats:
+    """Along the longest axis of the mesh, away from the origin: outwards in a sector whose blade stands on an axis."""
+    up = np.zeros(3)
+    place = int(np.argmax(np.round(np.ptp(nodes, axis=0), 9)))
+    up[place] = -1.0 if nodes[:, place].mean() < 0.0 else 1.0
+    return up
+
+
+# --- on paper ---
+
+
+def body_colours(names: tuple[str, ...]) -> tuple[str, ...]:
+    """One colour a body; blade and disk have those of the other pictures of the mesh."""
+    return tuple(_NAMED.get(name.lower(), _BODIES[number % len(_BODIES)]) for number, name in enumerate(names))
+
+
+def rgb(names: tuple[str, ...], which: Places) -> Floats:
+    """Colours (n, 3) of bodies of these names and places among them (n,)."""
+    return np.array([to_rgb(colour) for colour in body_colours(names)])[which]
+
+
+def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View, *, lines: float = 0.2) -> None:
+    """Faces (n, 4) with their colours (n, 3) as seen in a view, darker where they turn away from the eye, in mm.
+
+    The inner side of a face, which is seen where a mesh is cut, is grey. lines: width of the edges, points; 0 for none.
+    """
+    order = np.argsort(nodes[faces].mean(axis=1) @ view.to_eye, kind="stable")
+    normals = face_normals(nodes, faces)
+    turned = normals @ view.to_eye / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    lit = np.where((turned < -_EDGEWAYS)[:, None], _INSIDE, colours * (0.55 + 0.45 * np.abs(turned))[:, None])
+    painted = PolyCollection(
+        list(view.seen(nodes)[faces[order]]),
+        facecolors=lit[order],
+        edgecolors="0.25" if lines else "none",
+        linewidths=lines,
+        # smooth edges of neighbouring faces would let what is behind them shine through
+        antialiaseds=lines > 0.0,
+        rasterized=True,
+    )
+    panel.add_collection(painted)
+    panel.set_aspect("equal")
+    panel.autoscale_view()
+    panel.grid(visible=False)
+    panel.set_axis_off()
+
+
+def draw_scale_bar(panel: Axes, nodes: Floats, view: View) -> None:
+    """A bar of a round length under what is seen, in place of axes."""
+    seen = view.seen(nodes)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    size = float((high - low).max())
+    if not size > 0.0:
+        return
+    length = 10.0 ** np.floor(np.log10(0.4 * size))
+    length *= max(factor for factor in (1.0, 2.0, 5.0) if factor * length <= 0.4 * size or factor == 1.0)
+    bottom = low[1] - 0.05 * size
+    panel.fill_between([low[0], low[0] + length], bottom - 0.006 * size, bottom + 0.006 * size, color="0.1", lw=0.0)
+    panel.text(low[0] + 0.5 * length, bottom - 0.02 * size, f"{length:g} mm", ha="center", va="top")
+    panel.set_ylim(bottom - 0.1 * size, high[1] + 0.02 * size)

@@ -1,0 +1,268 @@
+"""Contact pairs of one scene: where they lie, how deep they are worn, and the grid in which those of a flank stand.
+
+Where the scenes of a study differ in their pairs, a figure shows one scene. Of a cylinder or a sphere on a flat a part
+of the contact is computed: the whole of it can be compared with a measured profile.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.result.view import Point, Result
+from studyrunner.user_error import UserError, Verbatim
+
+NO_DEPTH = 1e-15
+"""Wear depth, m, below which it is round-off: far less than an atom."""
+
+OF_PAIRS = (*(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)), *SCENE["mesh"])
+"""Variables that say where the pairs are."""
+
+_EXISTS = "contact_exists"
+_ALIGNED = 0.05  # of the smallest distance between two pairs: pairs are on a line of the grid if they miss it by less
+_MIRRORED = {"cylinder_on_flat": 1, "sphere_on_flat": 2}
+"""Of bundled scenes with pairs of one half or one quarter of the contact: how many planes mirror them, x = 0 first."""
+
+_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+_HEADER = re.compile(r"\s*(x|depth)\s*[_(\[ ]\s*(m|mm|um|µm)\s*[)\]]?\s*", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """The contact pairs of one point. position (n, 3): m, and area (n,): m2, NaN where the file has none. surface (n,):
+    labels, "contact" where the file has none.
+    """
+
+    position: NDArray[np.float64]
+    area: NDArray[np.float64]
+    surface: NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The pairs of a surface as a grid. pair (n_across, n_along): positions in the list of pairs.
+
+    across (n_across,), along (n_along,): m, distances from the first line of the grid, which is at 0.
+    """
+
+    pair: NDArray[np.intp]
+    across: NDArray[np.float64]
+    along: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scar:
+    """The whole contact. pairs (n,): index along `contact`, each pair as often as it is mirrored. x, y (n,): m.
+
+    line (k,): places in `pairs` of those along x through the middle, x ascending. width: of a square patch, m; 0 for
+    strips.
+    """
+
+    pairs: NDArray[np.intp]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    line: NDArray[np.intp]
+    width: float
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A measured profile. name: of its file. x, depth (n,): m, depth positive where material is missing."""
+
+    name: str
+    x: NDArray[np.float64]
+    depth: NDArray[np.float64]
+
+
+# --- the pairs of one scene ---
+
+
+def contact_pairs(result: Result, point: Point) -> Pairs:
+    """Where the pairs of a point are."""
+
+    def read(name: str, missing: object) -> NDArray[Any]:
+        found = result.at(name, point).values if result.has(name) else missing
+        return np.broadcast_to(np.asarray(found), (result.dataset.sizes["contact"],))
+
+    position = np.stack([read(f"contact_{axis}", np.nan) for axis in "xyz"], axis=1).astype(float)
+    surface = read("contact_surface", "contact").astype(np.str_)
+    return Pairs(position, read("contact_area", np.nan).astype(float), surface)
+
+
+def axes_of_scenes(result: Result, names: Collection[str] = OF_PAIRS) -> tuple[str, ...]:
+    """Axes along which variables of the scene differ; none where the file has one scene."""
+    found = {axis for name in names if result.has(name) for axis in result.dataset[name].dims}
+    return tuple(axis for axis in result.axes if axis in found)
+
+
+def of_scene(result: Result, point: Point, names: Collection[str] = OF_PAIRS) -> Result:
+    """The points whose scene is the one of `point` as far as these variables say, with its contact pairs alone."""
+    axes = axes_of_scenes(result, names)
+    if not axes and not result.has(_EXISTS):
+        return result
+    dataset = result.dataset.isel({axis: [point[axis]] for axis in axes})
+    for name in filter(result.has, names):
+        variable = dataset[name]
+        dataset[name] = variable.isel({axis: 0 for axis in axes if axis in variable.dims}, drop=True)
+    fixed = {axis: result.dataset.sizes[axis] for axis in axes if axis in result.varying}
+    if _EXISTS in names and result.has(_EXISTS):
+        dataset = dataset.isel(contact=pairs_of_scene(result, point)).drop_vars(_EXISTS)
+    return replace(result, dataset=dataset, fixed={**result.fixed, **fixed})
+
+
+def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
+    """As `of_scene`, of the point that figures of a single point show."""
+    return of_scene(result, result.shown_point(), names)
+
+
+def pairs_of_scene(result: Result, point: Point) -> NDArray[np.intp]:
+    """Places along `contact` of the pairs that the scene of a point has."""
+    if not result.has(_EXISTS):
+        return np.arange(result.dataset.sizes["contact"])
+    return np.flatnonzero(result.at(_EXISTS, point).values)
+
+
+def has_depths(result: Result) -> bool:
+    """Whether the file holds wear depths of the pairs, be it of the last count only."""
+    return result.has("wear_depth") or result.has("wear_depth_last")
+
+
+def depths(result: Result, point: Point) -> NDArray[np.float64]:
+    """Wear depth (n_cycles, n_contact), m, of one point; NaN at the counts of which the file holds none."""
+    if result.has("wear_depth"):
+        return np.asarray(result.at("wear_depth", point).values, dtype=float)
+    found = np.full((len(result.cycles), result.dataset.sizes["contact"]), np.nan)
+    found[result.last_kept(point)] = last_depth(result, point)
+    return found
+
+
+def last_depth(result: Result, point: Point) -> NDArray[np.float64]:
+    """Wear depth (n_contact,), m, of one point at the last count that it has reached."""
+    if result.has("wear_depth"):
+        return np.asarray(result.at("wear_depth", point, result.last_kept(point)).values, dtype=float)
+    return np.asarray(result.at("wear_depth_last", point).values, dtype=float)
+
+
+# --- the grid in which the pairs of a flank lie ---
+
+
+def find_grid(position: NDArray[np.float64]) -> Grid:
+    """The grid in which points (n, 3), m, lie, in any order and any orientation: equal straight lines side by side.
+
+    The lines may be unequally spaced, shifted and on a curved surface. ValueError: the points are no such grid.
+    """
+    if not np.isfinite(position).all():
+        raise ValueError("the positions of its contact pairs are not known.")
+    if len(position) == 1:
+        return Grid(np.zeros((1, 1), dtype=np.intp), np.zeros(1), np.zeros(1))
+    spacing = cKDTree(position).query(position, k=2)[0][:, 1].min()
+    if spacing <= 1e-9 * np.ptp(position, axis=0).max():
+        raise ValueError("two of its contact pairs are in one place.")
+    away = position - position[0]
+    found: list[tuple[float, float, int, NDArray[np.float64], NDArray[np.intp]]] = []
+    # A line of the grid through the first point passes through others. Far ones give its direction best and come first.
+    tried = np.zeros(len(away), dtype=np.bool_)
+    for other in np.argsort(-np.linalg.norm(away, axis=1), kind="stable")[:-1]:
+        if tried[other]:
+            continue
+        direction = away[other] / np.linalg.norm(away[other])
+        direction *= np.sign(direction[np.argmax(np.round(np.abs(direction), 6))])
+        tried |= np.linalg.norm(np.cross(away, direction), axis=1) <= _ALIGNED * spacing
+        lines = _parallel_lines(position, direction, _ALIGNED * spacing)
+        if lines is not None:
+            length = np.ptp(position[lines[0]] @ direction) / spacing
+            found.append((round(float(length), 1), round(abs(float(direction[2])), 6), -len(found), direction, lines))
+    if not found:
+        raise ValueError("its contact pairs do not lie on a grid.")
+    *_, direction, lines = max(found, key=lambda each: each[:3])
+    decimals = 6 - math.floor(math.log10(spacing))  # two flanks of one shape get the same coordinates
+    centre = position[lines].mean(axis=1)
+    centre -= np.outer(centre @ direction, direction)
+    order = np.argsort((centre - centre.mean(axis=0)) @ np.linalg.svd(centre - centre.mean(axis=0))[2][0])
+    inwards = np.linalg.norm(centre[order[0]]) - np.linalg.norm(centre[order[-1]])
+    if abs(inwards) <= _ALIGNED * spacing:  # both ends are equally far: the larger component of the way decreases
+        way = centre[order[0]] - centre[order[-1]]
+        inwards = way[np.argmax(np.round(np.abs(way), decimals))]
+    order = order if inwards >= 0 else order[::-1]
+    steps = np.diff(centre[order], axis=0)
+    if np.any(np.sum(steps[1:] * steps[:-1], axis=1) <= 0):
+        raise ValueError("its contact pairs do not lie on a grid: their lines are not side by side.")
+    along = position[lines] @ direction
+    return Grid(
+        lines[order],
+        np.round(np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))]), decimals),
+        np.round((along - along[:, :1]).mean(axis=0), decimals),
+    )
+
+
+def _parallel_lines(
+    position: NDArray[np.float64], direction: NDArray[np.float64], tolerance: float
+) -> NDArray[np.intp] | None:
+    """Points (n_lines, n_points_a_line) on lines of a direction, in its order; None if the lines are not all equal."""
+    along = position @ direction
+    across = position - np.outer(along, direction)
+    # Most directions fail for a few points already: this saves the search for all.
+    some = across[:: max(1, len(across) // 6)]
+    alike = np.sum(np.linalg.norm(across[None] - some[:, None], axis=2) <= tolerance, axis=1)
+    if len(across) % alike[0] or np.any(alike != alike[0]):
+        return None
+    tree = cKDTree(across)
+    first = np.array([min(near) for near in tree.query_ball_point(tree.data, tolerance)])
+    counts = np.unique(first, return_counts=True)[1]
+    if np.any(counts != counts[0]):
+        return None
+    lines: NDArray[np.intp] = np.lexsort((along, first)).reshape(len(counts), counts[0])
+    from_first = along[lines] - along[lines[:, :1]]
+    return lines if np.all(np.ptp(from_first, axis=0) <= tolerance) else None
+
+
+# --- the whole contact of a cylinder or a sphere on a flat ---
+
+
+def find_scar(result: Result) -> Scar | None:
+    """The contact of the shown scene where it is one of a cylinder or a sphere on a flat; None for other scenes."""
+    planes = _MIRRORED.get(str(result.study.get("scene", {}).get("model", "")), 0)
+    x, y, _ = contact_pairs(result, result.shown_point()).position.T
+    if not planes or not np.isfinite([x, y]).all():
+        return None
+    pairs, width = np.arange(x.size), 0.0
+    pairs, x, y = np.r_[pairs, pairs], np.r_[-x, x], np.r_[y, y]
+    if planes == 2:
+        width = 2.0 * float(np.abs(x).min())
+        pairs, x, y = np.r_[pairs, pairs], np.r_[x, x], np.r_[y, -y]
+    middle = np.flatnonzero((np.abs(y) <= 0.75 * width) & (y >= 0.0))
+    return Scar(pairs, x, y, middle[np.argsort(x[middle], kind="stable")], width)
+
+
+def read_profile(path: Path) -> Profile:
+    """The profile in a CSV file: a header such as `x_mm,depth_um`, then a row for each position. Raises UserError."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(str(path), "the file", None, f"give a CSV file that can be read: {error}") from None
+    header, *rows = [line.replace('"', "").split(",") for line in lines if line.strip(" ,")] or [[""]]
+    matches = ((place, _HEADER.fullmatch(cell)) for place, cell in enumerate(header))
+    found = {match[1].lower(): (place, _UNITS[match[2].lower()]) for place, match in matches if match}
+    if set(found) != {"x", "depth"}:
+        remedy = "give a first line that names both columns with their units, m, mm or um, as x_mm,depth_um"
+        raise UserError(str(path), "line 1", Verbatim(f'"{",".join(header)[:60]}"'), remedy)
+    values = []
+    for number, row in enumerate(rows, start=2):
+        try:
+            values.append([float(row[place]) * factor for place, factor in (found["x"], found["depth"])])
+        except (ValueError, IndexError):
+            raise UserError(str(path), f"row {number}", ",".join(row)[:60], "give a number in both columns") from None
+    array = np.array(values, dtype=float).reshape(-1, 2)
+    if not len(array) or not np.isfinite(array).all():
+        raise UserError(str(path), "the file", None, "give at least one row, and finite numbers")
+    array = array[np.argsort(array[:, 0], kind="stable")]
+    return Profile(path.name, array[:, 0], array[:, 1])

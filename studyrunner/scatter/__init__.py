@@ -1,1 +1,0 @@
-"""Samples of a study: which inputs scatter, and which values are drawn of them."""
