@@ -24,7 +24,7 @@ from solver.packing import Packed, packable
 from solver.results.verdict import describe_cut_off, describe_uncertain
 from solver.wear.course import Course, Node
 from solver.wear.history import compare
-from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Ended, Guide, Integrator, Solutions, guarded
+from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Guide, Integrator, Solution, Solutions, guarded
 
 STEP_ERROR = 0.5
 """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
@@ -61,7 +61,7 @@ class MissionProblem:
     # each step computes at least one mission
     iterations_per_save = 0
 
-    def __init__(self, mission: Mission, fine: Ended | None = None) -> None:
+    def __init__(self, mission: Mission, fine: Solution | None = None) -> None:
         self.mission, self.fine, self.budget = mission, fine, Budget()
         self.last = mission.missions[-1] if fine is None else int(fine.course.ends[-1])
         # how each block began last, and why a step was not found

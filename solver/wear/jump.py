@@ -43,7 +43,7 @@ def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) 
 
 def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
     """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends."""
-    case, joint = setup.of(state)
+    case, joint = setup.case_and_joint(state)
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
@@ -66,7 +66,7 @@ def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) 
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    case, joint = setup.of(state)
+    case, joint = setup.case_and_joint(state)
     found = relax_to_periodic(case, joint, worn, state.point, joint, setup.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
