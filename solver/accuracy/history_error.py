@@ -147,7 +147,7 @@ def error_of_target(
     """Estimated error of the count at which a history reaches its target: its difference to the other solution, or the
     time that the error of the wear takes, if that is longer.
 
-    at, other: counts at which both solutions reach the target; inf or NaN where the other one does not.
+    at, other: counts at which both solutions reach the target; NaN where the other one does not.
     fine, error: values and errors of the history at two counts, of which the target is the second.
     last_rate (n_contact,): wear rates at the end of the history, m per count. area (n_contact,): m2.
     """

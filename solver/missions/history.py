@@ -257,11 +257,11 @@ def _target_error(mission: Mission, at: float, fine: Course, reference: Course) 
     """Estimated error of the number of missions to the target, NaN where it was never reached."""
     if mission.until is None or math.isnan(at):
         return math.nan
-    counts, ahead = np.array([0.0, at]), reference.reach_ahead(mission.until)
+    counts, of_other = np.array([0.0, at]), reference.reach(mission.until)[0]
     whole, *_ = _errors(mission, counts, fine, reference)
     values = _of_blocks(slice(None), mission.area, fine.read(counts))
     last_rate = fine.nodes[-1].rate.reshape(-1, mission.area.size).sum(axis=0)
-    return error_of_target(mission.until, at, ahead, values, last_rate, whole, mission.area)
+    return error_of_target(mission.until, at, of_other, values, last_rate, whole, mission.area)
 
 
 def _judged(mission: Mission, solutions: Solutions, history: MissionHistory) -> Failure:

@@ -196,5 +196,5 @@ def _target_error(solutions: Solutions, asked: SlowTime) -> float:
         return math.inf
     at, by_interpolation = course.reach(until)
     both, error = _compare(solutions, np.array([0.0, at]), follows=asked.follow is not None)
-    ahead = other.course.reach_ahead(until)
-    return error_of_target(until, at, ahead, both.fine, course.nodes[-1].rate, error, course.area) + by_interpolation
+    of_other = other.course.reach(until)[0]
+    return error_of_target(until, at, of_other, both.fine, course.nodes[-1].rate, error, course.area) + by_interpolation
