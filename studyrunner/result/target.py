@@ -15,7 +15,7 @@ from studies.scene_error import SceneError
 from studies.scene_file import has_mesh
 from studyrunner.checkpoint.store import read_study
 from studyrunner.result.provenance import POINTS_LEFT
-from studyrunner.study.toml_text import read_toml
+from studyrunner.study.text import read_toml
 from studyrunner.system.files import create, new_partial, sync
 from studyrunner.user_error import UserError
 

@@ -15,11 +15,16 @@ from studies.scenes import sector as sector_room
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
-from studyrunner.scene import computed as computed_room
 from studyrunner.scene import scene as scene_room
-from studyrunner.scene.computed import InMemory
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics, write_study_scene
+from studyrunner.scene.scene import (
+    InMemory,
+    _parts,
+    build_study_scene,
+    describe_scene,
+    largest_harmonics,
+    write_study_scene,
+)
 from studyrunner.scene_building import SceneModels
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
@@ -47,7 +52,7 @@ SCENES = {
 @pytest.fixture
 def keep_all(monkeypatch):
     """What takes no time is kept as well."""
-    monkeypatch.setattr(computed_room, "LEAST_SECONDS", -1.0)
+    monkeypatch.setattr(scene_room, "LEAST_SECONDS", -1.0)
 
 
 def memory(model):
@@ -73,14 +78,14 @@ def test_what_takes_long_is_computed_once(case, monkeypatch):
 
 def test_a_changed_file_or_source_makes_another_scene(monkeypatch):
     def key():
-        return {computed_room.model_key(read_study("blade_root"))}
+        return {scene_room.model_key(read_study("blade_root"))}
 
     before = key()
     with monkeypatch.context() as changed:
         changed.setattr(from_files, "file_digest", lambda _: "of another file")
         assert key() != before
     assert key() == before
-    monkeypatch.setattr(computed_room, "package_digest", lambda package: f"another {package}")
+    monkeypatch.setattr(scene_room, "package_digest", lambda package: f"another {package}")
     assert key() != before
 
 
@@ -90,7 +95,7 @@ def test_a_changed_scene_file_makes_another_scene():
     keys = []
     for mass in (1.0, 2.0):
         write_study_scene(read_study("two_masses", {"scene.mass_1": mass}), Path("scene.h5"))
-        keys += [computed_room.model_key(variant) for variant in read_study("s.toml").variants]
+        keys += [scene_room.model_key(variant) for variant in read_study("s.toml").variants]
     assert len(set(keys)) == 4
 
 
