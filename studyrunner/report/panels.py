@@ -185,7 +185,8 @@ def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
         return f"{text} %" if percent else text
 
     axis.set_minor_locator(NullLocator())
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,), numticks=_MOST_TICKS))
+    steps = (1.0, 2.0, 5.0) if high < 20.0 * low else (1.0, 3.0) if high < 100.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=steps, numticks=_MOST_TICKS))
     axis.set_major_formatter(FuncFormatter(show))
 
 
