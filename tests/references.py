@@ -174,7 +174,7 @@ def vibro_impact_orbit(
 
     start = system_at(sweep_start)
     at_rest = np.array([min(wall_stiffness * gap / (stiffness + wall_stiffness), 0.0), 0.0])
-    orbit = _land(start, at_rest)
+    orbit = _settle(start, at_rest)
     state, here, largest, previous = _state(orbit, at_rest), sweep_start, sweep_step * natural, None
     step = largest
     while here != omega:
@@ -190,7 +190,7 @@ def vibro_impact_orbit(
             continue
         else:  # the branch has ended: a whole step behind its end the motion falls on another one
             there, previous, step = _towards(here, omega, largest), None, largest
-            orbit = _land(system_at(there), state)
+            orbit = _settle(system_at(there), state)
         state, here = _state(orbit, state), there
     if orbit is None:
         raise NoPeriodicMotionError(f"no periodic motion at {omega} rad/s on a sweep {sweep} from {sweep_start} rad/s")
@@ -201,7 +201,7 @@ def _towards(here: float, end: float, step: float) -> float:
     return end if abs(end - here) <= step else here + float(np.copysign(step, end - here))
 
 
-def _land(system: PiecewiseLinear, state: FloatArray) -> Orbit | None:
+def _settle(system: PiecewiseLinear, state: FloatArray) -> Orbit | None:
     y = system.extended(state[:1], state[1:])
     try:
         return solve_orbit(system, system.phase_at("open", y), y, attempts=10)

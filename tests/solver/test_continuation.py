@@ -123,10 +123,10 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
     found = relax_to_periodic(case, joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
     assert isinstance(found, State)
-    landed = replace(found, parameter=0.03 * (1.0 + change))
-    assert not grows(landed)
+    settled = replace(found, parameter=0.03 * (1.0 + change))
+    assert not grows(settled)
     # the two sides of the unstable state end at different stable states
-    assert (size(landed) > size(middle)) == (change < 0.0)
+    assert (size(settled) > size(middle)) == (change < 0.0)
 
 
 @pytest.mark.slow
@@ -159,7 +159,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.15, abs=0.0)
 
 
-def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch):
+def test_a_motion_that_has_not_settled_within_its_effort_is_unsettled(monkeypatch):
     model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(5, 64)
     case = build_case(model, 0.3, 0.8 * NATURAL, settings)
     quiet, joint = case.joint(0.8 * NATURAL, 0.0), case.joint(0.8 * NATURAL, 10.0)

@@ -200,7 +200,7 @@ def test_a_state_far_better_than_needed_goes_down_to_fewer():
 @pytest.mark.parametrize(("amplitude", "rtol", "highest"), [(100.0, 1e-2, 25), (200.0, 1e-3, 115)])
 def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude, rtol, highest):
     """Against the same state with far more harmonics and samples."""
-    # constant normal loads: with impacts as well, states have too many neighbours to be told apart
+    # constant normal loads: with impacts as well, states have too many neighbours
     kinds = ("constant_load", "constant_load_one_tangent", "constant_load")
     level = started(random_model(4, kinds), 0.4, OMEGA, amplitude, SolverSettings(rtol=rtol))
     assert SLIP in level.point.evaluation.status_t

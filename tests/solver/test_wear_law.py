@@ -1,23 +1,18 @@
 """Wear laws: rate and gain, the work that wears, its derivatives, and histories against differential equations."""
 
 from dataclasses import replace
-from functools import lru_cache, partial
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline, RegularGridInterpolator
+from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import brentq
 
-from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, PairFactors, WearingWork, WearLaw, WearTable, wearing_work
+from solver.contact.wear_law import ARCHARDS_WORK, PairFactors, WearingWork, WearLaw, WearTable, wearing_work
 from solver.settings import SolverSettings
-from tests.solver.models import march_wear, random_balance, random_model
+from tests.solver.models import random_balance, random_model
 from tests.solver.test_balance import jacobian_by_differences
-from tests.solver.worn_slider import AREA as PAIR_AREA
-from tests.solver.worn_slider import COARSE, END, FRICTION, march, slider_start
-from tests.solver.worn_slider import WEAR as COEFFICIENT
+from tests.solver.worn_slider import AREA, END, FRICTION, WEAR, exact_depths, march
 
-CYCLES = np.linspace(0.0, END, 9)
 # of the slider, whose pressure falls from 1e5 Pa to nothing while 1e-4 m wear off
 TABLE = WearTable((2e4, 5e4, 9e4), (0.0, 1e-5, 6e-5), ((0.8, 0.2, 0.5), (1.0, 0.6, 0.4), (0.4, 0.8, 0.9)))
 THRESHOLD = 20.0  # J/m2: the slider begins with about 45 of them
@@ -91,55 +86,36 @@ def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name):
     assert np.abs(plain - differences).max() > 1e-4 * np.abs(differences).max()
 
 
-def march_by(law, scheme, wear=COEFFICIENT, step=1000.0):
-    model, start = slider_start(COARSE)
-    return march_wear(model, FRICTION, start, wear, step, scheme, CYCLES, replace(COARSE, rtol=1e-3), law=law)
-
-
 def test_by_energy_the_joint_wears_as_by_archard_with_friction_times_the_coefficient():
-    energy, archard = march_by(WearLaw("energy"), "adaptive"), march_by(ARCHARD, "adaptive", FRICTION * COEFFICIENT)
+    energy, archard = march(1.0, "adaptive", law=WearLaw("energy")), march(1.0, "adaptive", wear=FRICTION * WEAR)
     for name in ("wear_depth", "wear_rate", "worn_volume", "step_limit", "mean_pressure"):
         assert getattr(energy, name) == pytest.approx(getattr(archard, name), rel=1e-12, abs=0.0)
     assert energy.newton_iterations == archard.newton_iterations
     assert energy.error_estimate == pytest.approx(archard.error_estimate, rel=1e-9)
 
 
-@lru_cache
-def by_depth():
-    """Slip work, N m, and pressure, Pa, as functions of the depth: of it alone they depend, whatever wore it."""
-    fine = march(250.0, "implicit", np.linspace(0.0, 1.25 * END, 401))
-    of_depth = partial(CubicSpline, fine.wear_depth[:, 0])
-    return of_depth(fine.wear_rate / COEFFICIENT), of_depth(fine.mean_pressure[:, 0])
-
-
-def depth_by_equation(law):
-    """Depth of the slider at the end."""
-    (work, pressure), table = by_depth(), law.table
+def exact_depth(law):
+    """Depth of the slider at the end, by the differential equation."""
+    table = law.table
     look = table and RegularGridInterpolator((table.pressure, table.depth), np.array(table.factor))
 
-    def rate(_, depth):
-        (w,) = depth
-        worn, factor = float(work(w)), 1.0
-        if law.name == "threshold":
-            worn = max(worn - law.threshold * PAIR_AREA, 0.0)
-        if table is not None:
-            ends = np.array(table.pressure)[[0, -1]]
-            factor = float(look((np.clip(pressure(w), *ends), np.clip(w, 0.0, table.depth[-1])))[()])
-        return COEFFICIENT * factor * worn / PAIR_AREA
+    def wearing(work, pressure, depth):
+        if table is None:
+            return max(work - law.threshold * AREA, 0.0)
+        at = np.clip(pressure, table.pressure[0], table.pressure[-1]), np.clip(depth, 0.0, table.depth[-1])
+        return work * float(look(at)[()])
 
-    found = solve_ivp(rate, (0.0, END), [0.0], "DOP853", rtol=1e-9, atol=1e-16, max_step=1000.0)
-    return float(found.y[0, -1])
+    return exact_depths(np.array([END]), wearing)[0]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", [WearLaw("threshold", THRESHOLD), WearLaw("table", table=TABLE)], ids=lambda x: x.name)
 def test_histories_are_those_of_the_differential_equation(law):
-    exact = depth_by_equation(law)
-    assert abs(exact / depth_by_equation(ARCHARD) - 1.0) > 0.1
-    adaptive = march_by(law, "adaptive")
-    assert adaptive.wear_depth[-1, 0] == pytest.approx(exact, rel=1e-3)
+    exact = exact_depth(law)
+    assert abs(exact / exact_depths(np.array([END]))[0] - 1.0) > 0.1
+    assert march(1.0, "adaptive", rtol=1e-3, law=law).wear_depth[-1, 0] == pytest.approx(exact, rel=1e-3)
     errors = [
-        [march_by(law, scheme, step=step).wear_depth[-1, 0] - exact for step in (2000.0, 1000.0)]
+        [march(step, scheme, law=law).wear_depth[-1, 0] - exact for step in (2000.0, 1000.0)]
         for scheme in ("explicit", "implicit")
     ]
     for coarse, fine in errors:

@@ -7,14 +7,12 @@ import pytest
 
 from solver import Outcome, SolverSettings, balance_of, frequency_response, response_curve
 from solver.stability.floquet import Multipliers
-from tests.event_driven import close_orbit
-from tests.references import vibro_impact_orbit
+from tests.contact_pair import ContactPair
 from tests.solver.models import OMEGA, cyclic_model, random_model, scene
 from tests.solver.reconstruction import harmonic_structure
 from tests.solver.test_continuation import GRAZING, WALL_OMEGA
 
 SETTINGS = SolverSettings(harmonics=19, samples=256)
-WALL = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)  # mass, damping, stiffness, force, wall and gap of the vibro-impact scene
 
 
 @lru_cache
@@ -73,10 +71,10 @@ def test_motions_and_multipliers_are_the_exact_ones_also_of_an_unstable_branch(u
     curve = wall_curve()
     upper, lower = np.flatnonzero(curve.is_fold)
     index = (upper + lower) // 2 if unstable else 0
-    motion = curve.balance(index).motion()
-    system = vibro_impact_orbit(*WALL, 2.0 * np.pi * motion.frequency, sweep="down").system
-    y = np.array([motion.displacement_t[1, 0], motion.velocity_t[1, 0]])
-    orbit = close_orbit(system, "closed" if y[0] > WALL[-1] else "open", y)
+    motion, linear = curve.balance(index).motion(), scene("vibro_impact").linear[0]
+    given = linear.mass, linear.damping, linear.stiffness, np.zeros(2), 0.02 * linear.load_harmonic
+    pair = ContactPair(*given, 0, None, 0.0, 0.1, 0.0, 2.0 * np.pi * motion.frequency)
+    orbit = pair.orbit_near(motion.displacement_t[:, 0], motion.velocity_t[:, 0])
     assert abs(curve.response[index, 0]) == pytest.approx(abs(orbit.harmonic(0)), rel=5e-3)
     np.testing.assert_allclose(curve.multipliers[index], orbit.multipliers(), atol=0.03)
     assert curve.stability[index] == ("fold" if unstable else "stable")

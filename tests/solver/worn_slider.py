@@ -1,5 +1,7 @@
 """The textbook slider under a spring that presses: its wear histories, and the differential equation of its wear."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -26,9 +28,9 @@ CYCLES = np.linspace(0.0, END, 9)
 
 
 @lru_cache
-def slider_start(settings: SolverSettings) -> tuple[ReducedModel, StartState]:
-    model = scene("sdof_slider", settings.harmonics)
-    (start,) = branch_states(model, FRICTION, FORCE, [OMEGA], settings)
+def slider_start() -> tuple[ReducedModel, StartState]:
+    model = scene("sdof_slider", COARSE.harmonics)
+    (start,) = branch_states(model, FRICTION, FORCE, [OMEGA], COARSE)
     assert start.outcome is Outcome.CONVERGED
     return model, start
 
@@ -37,20 +39,21 @@ def march(
     step: float,
     scheme: Scheme,
     cycles: FloatArray = CYCLES,
-    settings: SolverSettings = COARSE,
+    *,
     wear: float = WEAR,
+    rtol: float = 1e-2,
     **asked: object,
 ) -> WearHistory:
     """The history of the slider; asked: as of `models.march_wear`."""
-    model, start = slider_start(settings)
-    return march_wear(model, FRICTION, start, wear, step, scheme, cycles, settings, **asked)
+    model, start = slider_start()
+    return march_wear(model, FRICTION, start, wear, step, scheme, cycles, replace(COARSE, rtol=rtol), **asked)
 
 
-def begun(wear: float = WEAR) -> tuple[WearingJoint, WearState]:
+def begun() -> tuple[WearingJoint, WearState]:
     """The wearing slider and its unworn state."""
-    model, start = slider_start(COARSE)
+    model, start = slider_start()
     case = build_case(model, FRICTION, start.penalty_omega, COARSE, start.resolution)
-    work = WearingJoint(case, start, wear)
+    work = WearingJoint(case, start, WEAR)
     return work, work.begin()
 
 
@@ -68,18 +71,25 @@ def exact_depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray
 
 
 @lru_cache
-def rate_of_depth(settings: SolverSettings = COARSE) -> CubicSpline:
-    """Wear rate, m per cycle, of a depth, m.
+def by_depth() -> tuple[CubicSpline, CubicSpline]:
+    """Slip work, N m, and pressure, Pa, as functions of the depth, m: of it alone they depend, whatever wore it."""
+    fine = march(250.0, "implicit", np.linspace(0.0, 1.25 * END, 401))
+    depth = fine.wear_depth[:, 0]
+    return CubicSpline(depth, fine.wear_rate / WEAR), CubicSpline(depth, fine.mean_pressure[:, 0])
 
-    The wear rate is a function of the depth alone: it is tabulated from the states of a history, each of which is a
-    state at its own depth whatever the step.
+
+def exact_depths(
+    cycles: FloatArray, wearing: Callable[[float, float, float], float] = lambda work, _, __: work
+) -> FloatArray:
+    """Depths (n,), m, for the motion of these harmonics and samples: what is off is off by the integration.
+
+    wearing: the work that wears, N m, from slip work, pressure and depth.
     """
-    fine = march(250.0, "implicit", np.linspace(0.0, 1.25 * END, 401), settings)
-    return CubicSpline(fine.wear_depth[:, 0], fine.wear_rate / AREA)
+    work, pressure = by_depth()
 
+    def rate(_: float, depth: FloatArray) -> list[float]:
+        w = float(depth[0])
+        return [WEAR / AREA * wearing(float(work(w)), float(pressure(w)), w)]
 
-def exact_depths(cycles: FloatArray, settings: SolverSettings = COARSE) -> FloatArray:
-    """Depths (n,), m, for the motion of so many harmonics and samples: what is off is off by the integration."""
-    rate = rate_of_depth(settings)
-    found = solve_ivp(lambda _, w: rate(w), (0.0, END), [0.0], "DOP853", cycles, rtol=1e-11, atol=1e-20)
+    found = solve_ivp(rate, (0.0, END), [0.0], "DOP853", cycles, rtol=1e-10, atol=1e-18, max_step=1000.0)
     return np.asarray(found.y[0])
