@@ -273,10 +273,7 @@ def rgb(names: tuple[str, ...], which: Places) -> Floats:
 
 
 def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View, *, lines: float = 0.2) -> None:
-    """Faces (n, 4) with their colours (n, 3) as seen in a view, darker where they turn away from the eye, in mm.
-
-    The inner side of a face, which is seen where a mesh is cut, is grey. lines: width of the edges, points; 0 for none.
-    """
+    """Faces (n, 4) with colours (n, 3) as seen in a view, in mm; inner sides, where a mesh is cut, are grey."""
     order = np.argsort(nodes[faces].mean(axis=1) @ view.to_eye, kind="stable")
     normals = face_normals(nodes, faces)
     turned = normals @ view.to_eye / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)

@@ -23,10 +23,7 @@ _MANY = 60  # points from which markers are small
 
 @dataclass(frozen=True)
 class Choice:
-    """Points that a figure shows, as indices along all axes that are not free, with labels.
-
-    sentence: on combinations that are left out; empty where there are none.
-    """
+    """Points that a figure shows, with labels, and a sentence on combinations that are left out, or nothing."""
 
     points: tuple[dict[str, int], ...]
     labels: tuple[str, ...]

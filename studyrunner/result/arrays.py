@@ -64,10 +64,7 @@ def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, 
 def small_arrays(
     study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SceneVariable] = ()
 ) -> list[SmallArray]:
-    """Coordinates of the file, and its variables that no task computes. facts: of each scene.
-
-    of_scene: what the study asks of the scene.
-    """
+    """Coordinates of the file, and its variables that no task computes. of_scene: what the study asks of the scene."""
     hertz = frequencies_of_ratios(study, facts, scenes)
     return [
         *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
@@ -116,10 +113,7 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
 
 
 def _labels(values: Sequence[object] | NDArray[np.generic]) -> NDArray[np.generic]:
-    """Values of an axis: whole numbers in 32 bits, which every NetCDF reader knows; text where one value is text.
-
-    True and false, which NetCDF does not have, are 1 and 0.
-    """
+    """Values of an axis: whole numbers and flags as NetCDF has them; texts where one value is text."""
     texts = any(isinstance(value, str) for value in values)
     array = np.array([str(value) for value in values] if texts else values)
     if array.dtype.kind == "b":

@@ -95,10 +95,7 @@ def worn_volume_statistics(
 
 
 def statistics_of_file(dataset: xr.Dataset) -> xr.Dataset | None:
-    """`worn_volume_statistics` at all counts, or at some of these, evenly spaced, where a file has many.
-
-    None without samples, without worn volumes, or with too many of them.
-    """
+    """`worn_volume_statistics` of a file, at some counts where it has many; None without samples, or with too many."""
     if dataset.sizes.get(SAMPLE, 0) < 2 or "worn_volume" not in dataset:
         return None
     counts = dataset.sizes[CYCLE]

@@ -80,10 +80,7 @@ class ComparedPoint:
         return np.asarray((self.errors[quantity] >= least) & np.isfinite(self.errors[quantity]))
 
     def front(self, quantity: str, scheme: str | None = None) -> list[int]:
-        """Rows of settings, of all schemes or of one, than which no quicker one is as exact; the quickest first.
-
-        An error that is not resolved counts as the smallest that would be.
-        """
+        """Rows of settings than which no quicker one is as exact, the quickest first."""
         errors = np.maximum(self.errors[quantity], RESOLVED * self.uncertainty[quantity])
         own = [row for row, each in enumerate(self.settings) if scheme in (None, each.scheme)]
         own = sorted((row for row in own if np.isfinite(errors[row])), key=lambda row: (self.time[row], errors[row]))
@@ -155,10 +152,7 @@ def _compare(label: str, settings: tuple[Setting, ...], own: Mapping[str, FloatA
 
 
 def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:
-    """All settings, each with the number of its first place among the values of `keys`, the last axis fastest.
-
-    A setting holds no value that it does not use: the file may have it at several places.
-    """
+    """All settings, without values that they do not use, each with its first place among the values of `keys`."""
 
     def read(key: str, value: object) -> float | str:
         # numbers beside "auto" are texts in the file

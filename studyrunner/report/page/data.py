@@ -119,10 +119,7 @@ def _fit(
 
 
 def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
-    """A variable: `dims`, `data` in SI, times `factor` in `unit`.
-
-    `error`: the variable that holds its error, `relative` or in the same unit. `words`: what its values mean.
-    """
+    """A variable: `data` in SI times `factor` in `unit`, `error` the variable of its error, `words` of its values."""
     name, attributes = str(array.name), array.attrs
     values = array.values.astype(float)
     scale = scale_for(str(attributes.get("units", "")), values)
