@@ -227,10 +227,8 @@ def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: S
     """What the samples draw of each input that scatters, in the order of `section.inputs`.
 
     own_values: of the study: a number, (n_pairs,), or (n_values, 1) for an axis; not needed for an absolute
-    distribution.
-
-    Raises WrongValueError, with its key, where a draw is none that physics allows, positions that a correlation length
-    needs are missing, or a width is a share of 0.
+    distribution. Raises WrongValueError, with its key, where physics forbids a draw, positions are missing, or a width
+    is a share of 0.
     """
     from scipy.special import ndtri
 

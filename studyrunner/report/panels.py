@@ -98,10 +98,9 @@ def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
 def add_line(
     panel: Axes, x: FloatArray, y: FloatArray, error: FloatArray | None = None, *, band: bool = False, **look: Any
 ) -> float:
-    """A line with the errors of its values as bars, or as a band; how high it and its errors reach.
+    """A line with its errors as bars, or as a band; how high both reach, errors up to twice the largest value.
 
-    x, y, error (n,): as shown, error NaN, infinite or 0 where there is none to draw. Errors count to the height up to
-    twice the largest value: beyond they are cut.
+    x, y, error (n,): as shown, error NaN, infinite or 0 where there is none to draw.
     """
     (line,) = panel.plot(x, y, **look)
     highest = float(np.nanmax(y, initial=0.0))

@@ -77,10 +77,7 @@ class RootSurface:
     flanks: tuple[str, ...]
 
     def worn(self, depth: Floats, factor: float) -> Floats:
-        """Nodes (n_nodes, 3), m, with the wear depth (n_contact,), m, of the pairs times a factor taken off.
-
-        The depth of a pair is that of both its surfaces together: it is drawn into each of them. NaN counts as no wear.
-        """
+        """Nodes (n_nodes, 3), m, with the wear depth (n_contact,), m, times a factor taken off both surfaces."""
         worn = self.nodes.copy()
         worn[self.contact.nodes] -= factor * np.nan_to_num(depth[self.contact.pairs])[:, None] * self.contact.normals
         return worn
@@ -157,9 +154,8 @@ def face_normals(nodes: Floats, faces: Places) -> Floats:
 
 
 def find_contact_faces(nodes: Floats, faces: Places, positions: Floats, flank: Places) -> ContactFaces:
-    """Faces in contact of a mesh.
+    """Faces in contact of a mesh: nodes (n_nodes, 3), m, faces (n_faces, 4).
 
-    nodes (n_nodes, 3), m. faces (n_faces, 4): nodes anticlockwise from outside; triangles repeat their last one.
     positions (n_contact, 3) of the pairs, m. flank (n_contact,): number of the contact surface of each pair.
     """
     distance, nearest = cKDTree(positions).query(nodes)

@@ -142,10 +142,9 @@ def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Smal
 
 
 def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
-    """The drawn values of each input, in the unit of the input.
+    """The drawn values of each input, in its unit, along the samples.
 
-    Along the samples; along an axis as well where the input is drawn around the values of the axis; along the pairs
-    where pairs differ.
+    Along an axis as well where they are drawn around its values; along the pairs where pairs differ.
     """
     if study.scatter is None:
         return

@@ -299,8 +299,7 @@ def measure_of(statistics: xr.Dataset) -> str | None:
 def deciding_input(intervals: Array) -> int | None:
     """Place of the input that decides most, from intervals (n_inputs, 2); None where the samples do not tell.
 
-    They tell where the interval of the strength of one input, a share or a correlation without its sign, is above those
-    of all others.
+    They tell where the interval of its strength, a correlation without sign, is above those of all others.
     """
     ends = np.nan_to_num(intervals)
     least = np.where((ends[:, 0] < 0.0) & (ends[:, 1] > 0.0), 0.0, np.abs(ends).min(axis=1))

@@ -89,10 +89,9 @@ class ComparedPoint:
 
 
 def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
-    """What the settings of a file cost and how wrong they are, at all points of the axes that are no settings.
+    """What the settings of a file cost and how wrong they are, at all points of the other axes.
 
-    Empty where the file does not compare at least two with a third one, or with the exact answer. Schemes alone are
-    compared with the exact answer only.
+    Empty without two to compare with a third one, or with the exact answer, as schemes alone are.
     """
     varying = [key for key in KEYS if key in result.varying]
     alone = set(varying) <= {"scheme"} and not result.has("exact_worn_volume")
