@@ -50,10 +50,7 @@ def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, 
 def small_arrays(
     study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SmallArray] = ()
 ) -> list[SmallArray]:
-    """Coordinates of the file, and its variables that no task computes. facts: of each scene.
-
-    of_scene: what the study asks of the scene.
-    """
+    """Coordinates of the file, and its variables that no task computes. of_scene: what the study asks of the scene."""
     hertz = frequencies_of_ratios(study, facts, scenes)
     return [
         *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
@@ -102,10 +99,7 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
 
 
 def _labels(values: Sequence[object] | NDArray[np.generic]) -> NDArray[np.generic]:
-    """Values of an axis: whole numbers in 32 bits, which every NetCDF reader knows; text where one value is text.
-
-    True and false, which NetCDF does not have, are 1 and 0.
-    """
+    """Values of an axis: whole numbers and flags as NetCDF has them; texts where one value is text."""
     texts = any(isinstance(value, str) for value in values)
     array = np.array([str(value) for value in values] if texts else values)
     if array.dtype.kind == "b":
@@ -126,10 +120,9 @@ def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Smal
 
 
 def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
-    """The drawn values of each input, in the unit of the input.
+    """The drawn values of each input, in its unit, along the samples.
 
-    Along the samples; along an axis as well where the input is drawn around the values of the axis; along the pairs
-    where pairs differ.
+    Along an axis as well where they are drawn around its values; along the pairs where pairs differ.
     """
     if study.scatter is None:
         return
