@@ -141,9 +141,9 @@ def test_nodal_diameters_in_a_scene_file_bound_automatic_harmonics(n_harmonics, 
     wave = replace(sector(), n_sectors=47, nodal_diameter=4)
     standing, travelling = wave.linear.values()
     needed = needed_nodal_diameters(4, 47, n_harmonics)
-    held = replace(wave, linear={k: standing if k == 0 else travelling for k in needed})
-    assert largest_harmonics(held) == n_harmonics
-    write_scene(held, Path("wave.h5"))
+    scene = replace(wave, linear={k: standing if k == 0 else travelling for k in needed})
+    assert largest_harmonics(scene) == n_harmonics
+    write_scene(scene, Path("wave.h5"))
     text = SLIDER.replace('"sdof_slider"', '"wave.h5"\nfriction_coefficient = 0.3').replace("= 5", '= "auto"')
     Path("s.toml").write_text(text, encoding="utf-8")
     assert main(["s.toml", "--plan"]) == 0
