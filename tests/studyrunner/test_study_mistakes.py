@@ -86,7 +86,7 @@ WRONG = {
         scene.worn={{result='worn.nc', cycle=[0], frequency=151}} -> scene.worn.frequency = 151
         scene.worn={{result='worn.nc', cycle=[0], scheme='explicit'}} -> scene.worn.scheme
         scene.worn={{result='none.nc', cycle=[0]}} -> scene.worn.result
-        scene.area=-1 ; axes.scheme=final ; solver.samples=8 -> scene.area, slow_time.cycles, solver.samples
+        axes.scheme=final ; solver.samples=8 -> slow_time.cycles, solver.samples
     """,
     SLIDER.replace("[study]\nname", "[other]\nname"): "-> study, other",
     SLIDER.replace('model = "sdof_slider"\n', ""): "-> scene.model",
@@ -133,14 +133,14 @@ axes.shceme, axes.damping, wear.law, scatter.samples, scatter.mu.normal.sigma
         axes.normal_load=[1, 2] ; mission.0.normal_load=1.0 ; mission.1.normal_load=1.0 -> axes.normal_load
         mission.cruise.frequency={start=1.0, stop=2.0}
         mission.heavy.engine_order=4
-        mission.cruise.engine_order=4 -> axes.frequency, mission.cruise.engine_order
+        mission.cruise.engine_order=4 -> axes.frequency
         mission.heavy.begin=continue
         mission.run-up.begin=ramp
         mission.heavy.wear_coefficient=1.0
         mission.heavy.name=cruise -> mission.name
         mission=[]
         scatter={samples=4, frequency={normal={std=1.0}}} -> scatter.frequency
-        scene.mas=1 ; mission.heavy.mass=-1 -> scene.mas, mission.heavy.mass
+        mission.heavy.mass=-1
     """,
     SAMPLES: f"""
         scatter.samples=1000000 ; axes.frequency=[1, 2] -> scatter.samples
