@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import backbone, build_model, frequency_response
+from solver import SolverSettings, backbone, build_model, frequency_response
 from tests.benchmarks.free_decay import decay_of, free_decay
 from tests.benchmarks.ring_of_sectors import ring_of_sectors
 from tests.benchmarks.time_integration import (
@@ -102,18 +102,11 @@ def test_a_mass_on_rigid_ground_loses_four_limits_in_each_cycle():
 def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_two_amplitudes():
     """As far as a mode of periodic motion describes a decay: the amplitude changes within a cycle."""
     # of the stiffness of the tip a twelfth goes over the foot, which sticks up to 25 N
-    model = build_model(
-        np.diag([1e-3, 1e-3, 0.2]),
-        1e-6 * np.array([[1e7, 0.0, 0.0], [0.0, 4e5, -2e5], [0.0, -2e5, 2.2e6]]),
-        np.array([[1e7, 0.0, 0.0], [0.0, 4e5, -2e5], [0.0, -2e5, 2.2e6]]),
-        [[0, 1, -1]],
-        1e-4,
-        load_static=[50.0, 0.0, 0.0],
-        load_harmonic=[0.0, 0.0, 1.0],
-        response=[2],
-    )
+    stiffness = np.array([[1e7, 0.0, 0.0], [0.0, 4e5, -2e5], [0.0, -2e5, 2.2e6]])
+    load = {"load_static": [50.0, 0.0, 0.0], "load_harmonic": [0.0, 0.0, 1.0], "response": [2]}
+    model = build_model(np.diag([1e-3, 1e-3, 0.2]), 1e-6 * stiffness, stiffness, [[0, 1, -1]], 1e-4, **load)
     modal = np.array([2e-4, 8e-4])
-    mode = backbone(model, modal, 0.5)
+    mode = backbone(model, modal, 0.5, settings=SolverSettings(harmonics=7, samples=128))
     tips = abs(mode.response[:, 0])
     _, (amplitude, frequency, damping) = decaying(model, 2, 1.5 * float(tips[-1]), float(mode.frequency[0]), 90)
     for place, tip in enumerate(tips.tolist()):

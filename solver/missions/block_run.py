@@ -156,8 +156,8 @@ class BlockCase:
         """The joint at the depth before the block, with harmonics, samples and penalty of a state, and this state."""
         friction, mission = self.block.friction_coefficient, self.mission
         case = build_case(self.model, friction, start.penalty_omega, self.settings, start.resolution)
-        work = WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
-        return work, work.begin()
+        setup = WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
+        return setup, setup.begin()
 
 
 def run_block(case: BlockCase) -> BlockRun | Failure:
@@ -165,10 +165,10 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     start, begun = find_start(case)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    (work, _), cycles = case.begin(start), case.block.steady[1]
+    (setup, _), cycles = case.begin(start), case.block.steady[1]
     counts = np.array([0.0, cycles])
-    asked = SlowTime(work.wear_coefficient, Adaptive(work.case.settings.rtol), counts, law=work.law, ends_at_last=True)
-    solve = Integrations(work.case, start)
+    steps, solve = Adaptive(case.mission.settings.rtol), Integrations(setup.case, start)
+    asked = SlowTime(setup.wear_coefficient, steps, counts, law=setup.law, ends_at_last=True)
     if case.guide is None:
         ended = solve.history(asked, stable_end=case.every)
     else:
@@ -178,10 +178,10 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         return ended.failure
     values, slope = ended.course.read(counts), None
     depth = values["wear_depth"]
-    volume = float(depth[-1] @ work.area)
+    volume = float(depth[-1] @ setup.area)
     if case.with_slope:
         # the flow of the linearised wear rate
-        rates = rate_slope(work, state, case.depth + depth[-1] > 0.0)
+        rates = rate_slope(setup, state, case.depth + depth[-1] > 0.0)
         slope = np.asarray(scipy.linalg.expm(cycles * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
@@ -247,8 +247,8 @@ def _again(case: BlockCase, begun: Begun) -> StartState | None:
     start, run = begun.start, case.run()
     if start is None or start.state is None or start.branch > 0:
         return None
-    ramp, omega, (work, begins) = case.block.way == "ramp", start.state.omega, case.begin(start)
-    path = LoadingPath(work.case, case.block.excitation_amplitude, omega if ramp else None)
+    ramp, omega, (setup, begins) = case.block.way == "ramp", start.state.omega, case.begin(start)
+    path = LoadingPath(setup.case, case.block.excitation_amplitude, omega if ramp else None)
     target = 1.0 if ramp else omega
     before = State(begins.at, start.state.start_history, target)
     try:
@@ -259,7 +259,7 @@ def _again(case: BlockCase, begun: Begun) -> StartState | None:
         if found is None or vibration_change(begins.at, found.evaluation) > most:
             return None
         joint = path.joint_at(target)
-        if find_instability(work.case, joint, found.evaluation, run, case.every):
+        if find_instability(setup.case, joint, found.evaluation, run, case.every):
             return None
     except np.linalg.LinAlgError:
         return None
@@ -299,8 +299,8 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
     """
     before, run, frequency = carried.state, case.run(), case.block.steady[0]
     assert before is not None
-    work, begins = case.begin(carried)
-    balance = work.balance_of(begins)
+    setup, begins = case.begin(carried)
+    balance = setup.balance_of(begins)
     found = run.state(balance, begins.at.predicted_h)
     if found is None:
         return replace(carried, state=None, outcome=Outcome.BRANCH_LOST)
@@ -319,9 +319,9 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
             break
         if here.excitation_amplitude == load if way == "ramp" else here.omega == 2.0 * np.pi * target:
             continue
-        line, (work, begins) = case.line(way, load), case.begin(start)
+        line, (setup, begins) = case.line(way, load), case.begin(start)
         parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
-        if not line.go_on_from(work.case, replace(begins.point, parameter=parameter), target):
+        if not line.go_on_from(setup.case, replace(begins.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)
         _, after = next(follow_line(line, np.array([target])))
         start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)

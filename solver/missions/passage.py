@@ -242,9 +242,9 @@ def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Fa
             return Failure(start.outcome, start.message)
         if computing_time() > case.deadline:
             return Failure(Outcome.TIME_LIMIT)
-        work, begun = case.begin(start)
-        joint, frequency = work.joint_of(begun), float(frequencies[index])
-        density = work.rate(begun.at) * frequency / passage.rate
+        setup, begun = case.begin(start)
+        joint, frequency = setup.joint_of(begun), float(frequencies[index])
+        density = setup.rate(begun.at) * frequency / passage.rate
         response = to_complex(joint.structure.response_h(joint.to_relative(begun.at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, begun.at)))
     return found

@@ -44,14 +44,14 @@ Checked = tuple[WearState, dict[str, Any]]
 
 
 def full_check(
-    work: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
+    setup: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
 ) -> Checked | Failure:
     """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
-    anew, certified = chosen_for_another(work, state), partial(_certified, work, loops, with_resonance=with_resonance)
-    checked = certified(choose_anew(work, state) if anew else state)
-    if isinstance(checked, Failure) and not anew and state.accurate and work.case.settings.automatic:
+    anew, certified = chosen_for_another(setup, state), partial(_certified, setup, loops, with_resonance=with_resonance)
+    checked = certified(choose_anew(setup, state) if anew else state)
+    if isinstance(checked, Failure) and not anew and state.accurate and setup.case.settings.automatic:
         # more harmonics or samples may suffice
-        checked = certified(choose_anew(work, state))
+        checked = certified(choose_anew(setup, state))
     if isinstance(checked, Failure):
         return checked
     state, reported = checked
@@ -62,34 +62,34 @@ def full_check(
         if not estimate.largest < worst.largest:
             worst = UNKNOWN if unknown else estimate
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
-    case, joint = work.of(state)
+    case, joint = setup.of(state)
     if state.hold is not None and creeps(joint, state.hold, state.at):
         return Failure(Outcome.ADRIFT)
     if _vibrates_otherwise(state):
-        if (unstable := find_instability(case, joint, state.at, work.run, False)) is not None:
+        if (unstable := find_instability(case, joint, state.at, setup.run, False)) is not None:
             return unstable
         state = replace(state, judged_h=state.at.predicted_h)
     return state, reported
 
 
 def _certified(
-    work: WearingJoint, loops: tuple[int, ...], state: WearState | Failure, *, with_resonance: bool
+    setup: WearingJoint, loops: tuple[int, ...], state: WearState | Failure, *, with_resonance: bool
 ) -> Checked | Failure:
     """A state with its report, whose estimated errors come from the last choice of the harmonics."""
     if isinstance(state, Failure):
         return state
-    joint, estimate = work.joint_of(state), state.estimate
-    wear_rate_error = work.wearing.amplification(*worn_by(state.at)) * estimate.wear_rate
+    joint, estimate = setup.joint_of(state), state.estimate
+    wear_rate_error = setup.wearing.amplification(*worn_by(state.at)) * estimate.wear_rate
     certificate = certify(joint, state.at)
     certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
-    if not certificate.holds(work.case.settings.tolerance):
+    if not certificate.holds(setup.case.settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED)
     report = report_state(joint, state.at, certificate, loops, with_resonance=with_resonance)
-    return state, report | {"excitation_frequency_error": work.frequency_error(state)}
+    return state, report | {"excitation_frequency_error": setup.frequency_error(state)}
 
 
 def report_only(
-    work: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
+    setup: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
 ) -> Checked:
     """A state of a reference solution with its report, with the harmonics wanted at its count where it is found there.
 
@@ -97,18 +97,18 @@ def report_only(
     """
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
-        case, _ = work.of(state)
-        point = work.run.move(case, case.at(wanted).joint(state.omega, work.excitation_amplitude), state.point)
-        moved = point and work.at_followed(replace(state, point=point, resolution=wanted))
+        case, _ = setup.of(state)
+        point = setup.run.move(case, case.at(wanted).joint(state.omega, setup.excitation_amplitude), state.point)
+        moved = point and setup.at_followed(replace(state, point=point, resolution=wanted))
         state = moved if isinstance(moved, WearState) else state
-    return state, report_state(work.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=with_resonance)
+    return state, report_state(setup.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=with_resonance)
 
 
-def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
+def chosen_for_another(setup: WearingJoint, state: WearState) -> bool:
     """Whether harmonics and samples have to be chosen again: where the part of the contact force in harmonics that are
     left out, which grows with the error, is so large that the error may be above rtol, or so small that fewer may do.
     """
-    settings, orders = work.case.settings, state.resolution.orders
+    settings, orders = setup.case.settings, state.resolution.orders
     if not settings.automatic:
         return False
     if settings.harmonics == "auto" and lacks_even(orders, state.at):
@@ -124,12 +124,12 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
     return now < KEPT_FRACTION**2 * state.left_out
 
 
-def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
+def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    refined = refine(work.of(state)[0], state.omega, work.excitation_amplitude, state.point, work.run)
+    refined = refine(setup.of(state)[0], state.omega, setup.excitation_amplitude, state.point, setup.run)
     resolution, point = refined.case.resolution, refined.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
-    return work.at_followed(replace(state, estimate=refined.estimate, accurate=refined.accurate))
+    return setup.at_followed(replace(state, estimate=refined.estimate, accurate=refined.accurate))
 
 
 def _vibrates_otherwise(state: WearState) -> bool:
@@ -140,18 +140,18 @@ def _vibrates_otherwise(state: WearState) -> bool:
     return float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
 
 
-def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
+def unstable_at_end(setup: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
-    if state.cycle == 0.0 and work.follow is None and not _vibrates_otherwise(state):
+    if state.cycle == 0.0 and setup.follow is None and not _vibrates_otherwise(state):
         return None
-    case, joint = work.of(state)
+    case, joint = setup.of(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, state.at) is None and not work.is_stable(state):
+    if free_slide(joint, state.at) is None and not setup.is_stable(state):
         return Failure(Outcome.UNSTABLE)
-    return find_instability(case, joint, state.at, work.run, True)
+    return find_instability(case, joint, state.at, setup.run, True)
 
 
-def why_endless(work: WearingJoint, state: WearState, course: Course, final_share: float) -> Failure | None:
+def why_endless(setup: WearingJoint, state: WearState, course: Course, final_share: float) -> Failure | None:
     """Why a history to the end of wear ends: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on.
 
     final_share: as in `ToTheEnd`.
@@ -160,7 +160,7 @@ def why_endless(work: WearingJoint, state: WearState, course: Course, final_shar
     if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():
         return AS_ASKED
     rate, n_steps = float(state.rates[-1]), len(course.ends) - 1
-    if is_steady(work, state, course):
+    if is_steady(setup, state, course):
         steady = f"from cycle {in_digits(state.cycle, 4)} on they wear at a steady rate of {rate:.6g} m3 a cycle"
         return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
     if n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
@@ -169,7 +169,7 @@ def why_endless(work: WearingJoint, state: WearState, course: Course, final_shar
     return None
 
 
-def is_steady(work: WearingJoint, state: WearState, course: Course) -> bool:
+def is_steady(setup: WearingJoint, state: WearState, course: Course) -> bool:
     """Whether wear goes on without end: every pair that carries load slips, and the wear rate is constant although the
     wear is deep enough to act back.
     """
@@ -177,13 +177,13 @@ def is_steady(work: WearingJoint, state: WearState, course: Course) -> bool:
     pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))
     if not pressed.any() or not (state.at.slip_work[pressed] > 0.0).all():
         return False
-    volumes, rates = course.volumes, course.rates @ work.area
+    volumes, rates = course.volumes, course.rates @ setup.area
     # over the last nine tenths of the worn volume, to the accuracy of a rate
     first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
-    varies = np.abs(rates[first:] - rates[-1]) > work.case.settings.rtol * rates[-1]
+    varies = np.abs(rates[first:] - rates[-1]) > setup.case.settings.rtol * rates[-1]
     if volumes[first] > 0.1 * volumes[-1] or varies.any():
         return False
-    joint = work.joint_of(state)
+    joint = setup.joint_of(state)
     pair, component = joint.component_index // 3, joint.component_index % 3
     acted = np.diag(joint.structure.static_stiffness) * state.depth[pair] >= ACTED_BACK * normal[pair]
     return bool(acted[(component == 0) & pressed[pair]].all())

@@ -23,6 +23,7 @@ from solver.structure.joint import build_case
 from solver.wear.course import Course, Node
 from solver.wear.integrate import Integrations, SlowTime
 from solver.wear.slow_time import ENDS_ALL, Ended, Guide, Integrator, Solutions
+from solver.wear.step import Adaptive
 from solver.wear.wearing_joint import WearState
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
@@ -91,7 +92,11 @@ def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rto
         return Solutions(own, own)
     adaptive, spent = own, own.seconds
     if not asked.adaptive:
-        asked = asked.adaptive_to(min(own.course.ends[-1], asked.end), rtol)
+        # one for all given steps to one last count; to another end no longer than needed
+        known = asked.end < math.inf and asked.until is None
+        cycles = asked.cycles if known else np.array([0.0, min(own.course.ends[-1], asked.end)])
+        never = asked.until and replace(asked.until, value=math.inf)
+        asked = replace(asked, steps=Adaptive(rtol), cycles=cycles, until=never)
         adaptive = integrations.history(asked, spent)
         spent += adaptive.seconds
     if not is_compared(adaptive):

@@ -82,16 +82,6 @@ class SlowTime:
         target = None if self.until is None else astuple(self.until)
         return f"{self.steps!r} {self.end!r} {target!r}"
 
-    def adaptive_to(self, reached: float, rtol: float) -> SlowTime:
-        """The adaptive history with which one with given steps is compared, that has come to the count `reached`.
-
-        Equal for all given steps to one last count; to another end it is no longer than needed.
-        """
-        known = self.end < math.inf and self.until is None
-        never = None if self.until is None else replace(self.until, value=math.inf)
-        cycles = self.cycles if known else np.array([0.0, reached])
-        return replace(self, steps=Adaptive(rtol), cycles=cycles, until=never)
-
 
 @dataclass(frozen=True)
 class WearProblem:
@@ -101,7 +91,7 @@ class WearProblem:
     stable_end: whether the stability of the last state is tested.
     """
 
-    work: WearingJoint
+    setup: WearingJoint
     asked: SlowTime
     end: float
     guide: Guide | None = None
@@ -110,18 +100,18 @@ class WearProblem:
     @cached_property
     def line(self) -> WearLine:
         """The steps; adaptive ones go beyond the last count, where nothing else begins there."""
-        asked, work = self.asked, self.work
+        asked, setup = self.asked, self.setup
         end = math.inf if asked.adaptive and not asked.ends_at_last else self.end
         if self.guide is None:
-            return WearLine(work, asked.steps, end)
+            return WearLine(setup, asked.steps, end)
         # a short history may consist of its first steps, which do not depend on rtol
         first = self.guide.first_length * (2.0 if asked.ends_at_last else 1.0)
-        return WearLine(work, Adaptive(RTOL_RATIO * work.case.settings.rtol, first), end, bounded=False)
+        return WearLine(setup, Adaptive(RTOL_RATIO * setup.case.settings.rtol, first), end, bounded=False)
 
     @property
     def budget(self) -> Budget:
         """As in SlowProblem."""
-        return self.work.run.budget
+        return self.setup.run.budget
 
     @property
     def iterations_per_save(self) -> int:
@@ -130,7 +120,7 @@ class WearProblem:
 
     def saved(self, state: WearState) -> WearState:
         """As in SlowProblem: without the factorisation."""
-        self.work.drop_factor()
+        self.setup.drop_factor()
         return in_rows(state)
 
     def _ended(self, state: WearState, course: Course) -> Failure | None:
@@ -140,18 +130,18 @@ class WearProblem:
         if still or not math.isnan(course.reached) or course.ends[-1] >= self.end * (1.0 - 1e-12):
             found = AS_ASKED
         elif isinstance(cycles, ToTheEnd) and self.end == math.inf:
-            found = why_endless(self.work, state, course, cycles.final_share)
+            found = why_endless(self.setup, state, course, cycles.final_share)
         if found is None and state.wears and self.budget.iterations > most:
             found = Failure(Outcome.MARCH_FAILED)
         if found is AS_ASKED and self.stable_end:
-            found = unstable_at_end(self.work, state) or found
+            found = unstable_at_end(self.setup, state) or found
         return found
 
     def advance(self, state: WearState | None, course: Course) -> tuple[WearState, Course] | Failure:
         """As in SlowProblem: the next state is checked and stored."""
-        work, asked, error = self.work, self.asked, 0.0
+        setup, asked, error = self.setup, self.asked, 0.0
         if state is None:
-            found = work.at_followed(work.begin() if self.guide is None else begin_reference(work))
+            found = setup.at_followed(setup.begin() if self.guide is None else begin_reference(setup))
         elif (ended := self._ended(state, course)) is not None:
             return ended
         elif not state.wears:
@@ -161,14 +151,14 @@ class WearProblem:
             step = self.line.step(state)
             if isinstance(step, Failure):
                 return step
-            found, error = work.out_of_range(step.state) or step.state, step.error
+            found, error = setup.out_of_range(step.state) or step.state, step.error
         if isinstance(found, Failure):
             return found
         shifts = asked.until is not None and asked.until.quantity == "frequency_shift"
         if self.guide is None:
-            checked = full_check(work, found, loops=asked.loops, with_resonance=shifts)
+            checked = full_check(setup, found, loops=asked.loops, with_resonance=shifts)
         else:
-            checked = report_only(work, found, self.guide.resolutions, with_resonance=shifts)
+            checked = report_only(setup, found, self.guide.resolutions, with_resonance=shifts)
         if isinstance(checked, Failure):
             return checked
         after, report = checked
@@ -179,7 +169,7 @@ class WearProblem:
         if not after.resolutions or after.resolutions[-1][1] != after.resolution:
             after = replace(after, resolutions=(*after.resolutions, (after.cycle, after.resolution)))
         # local: sum of the local errors of the steps so far, m3
-        return after, course.after(Node(after.cycle, after.depth, work.rate(after.at), report | {"local": error}))
+        return after, course.after(Node(after.cycle, after.depth, setup.rate(after.at), report | {"local": error}))
 
 
 class Integrations:
@@ -193,7 +183,7 @@ class Integrations:
         """Integrate a history. spent: CPU seconds of its time limit so far. stable_end: as in WearProblem."""
         outputs = np.zeros(0) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
         problem = WearProblem(self._joint(asked), asked, asked.end, stable_end=stable_end)
-        course = Course(problem.work.area, outputs, asked.until)
+        course = Course(problem.setup.area, outputs, asked.until)
         return self._integrator.integrate(asked.name, problem, course, spent)
 
     def reference(self, asked: SlowTime, guide: Guide, compared: FloatArray, spent: float = 0.0) -> Ended:
@@ -201,11 +191,11 @@ class Integrations:
 
         compared (n,): ascending counts at which it is read, the first 0. spent: as for `history`.
         """
-        work = self._joint(asked)
-        work.run = work.run.to(self._case.settings.rough_tolerance)
+        setup = self._joint(asked)
+        setup.run = setup.run.to(self._case.settings.rough_tolerance)
         resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in guide.resolutions)
-        problem = WearProblem(work, asked, float(compared[-1]), replace(guide, resolutions=resolutions))
-        course = Course(work.area, compared)
+        problem = WearProblem(setup, asked, float(compared[-1]), replace(guide, resolutions=resolutions))
+        course = Course(setup.area, compared)
         return self._integrator.integrate(f"{asked.name} reference", problem, course, spent)
 
     def _joint(self, asked: SlowTime) -> WearingJoint:
@@ -225,17 +215,17 @@ def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
     return fewer(resolution, SolverSettings())
 
 
-def begin_reference(work: WearingJoint) -> WearState:
+def begin_reference(setup: WearingJoint) -> WearState:
     """The unworn state of the reference solution.
 
     The state of the reference sweep has another tangential history, which may decide whether a pair goes on slipping
     while the joint wears. So the state is solved with twice the difference (dovetail, 212.5 Hz: 0.082 or 0.106 mm3;
     both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep is taken.
     """
-    begun, fine, reference = work.begin(of_reference=True), work.start.state, work.start.reference
+    begun, fine, reference = setup.begin(of_reference=True), setup.start.state, setup.start.reference
     if fine is None or reference is None:
         return begun
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
-    balance = Balance(work.joint_of(begun), history, begun.depth)
-    point = work.run.state(balance, begun.at.predicted_h, most=NEAR_ITERATIONS)
-    return begun if point is None else work.with_rates(replace(begun, point=point))
+    balance = Balance(setup.joint_of(begun), history, begun.depth)
+    point = setup.run.state(balance, begun.at.predicted_h, most=NEAR_ITERATIONS)
+    return begun if point is None else setup.with_rates(replace(begun, point=point))

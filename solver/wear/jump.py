@@ -30,47 +30,47 @@ from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 
-def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
+def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
     """A stable state of depths (n_contact,), m, behind the end of a branch: with a hold, or of another branch."""
-    work.run.budget.limit = work.run.budget.iterations + SEARCH_ITERATIONS
-    reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
+    setup.run.budget.limit = setup.run.budget.iterations + SEARCH_ITERATIONS
+    reached = _held(setup, state, worn) or _on_another_branch(setup, state, worn)
     if isinstance(reached, Failure) and reached.outcome is Outcome.ADRIFT:
         # the last pairs that stick come loose together
-        reached = _held(work, state, worn, drifts=True) or reached
-    work.run.budget.limit = float("inf")
-    return reached if isinstance(reached, Failure) else work.with_rates(replace(reached, cycle=cycle, previous=None))
+        reached = _held(setup, state, worn, drifts=True) or reached
+    setup.run.budget.limit = float("inf")
+    return reached if isinstance(reached, Failure) else setup.with_rates(replace(reached, cycle=cycle, previous=None))
 
 
-def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
+def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
     """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends.
 
     drifts: whether the joint is known to slide as a whole, although some pairs still stick.
     """
-    case, joint = work.of(state)
+    case, joint = setup.of(state)
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    joint = case.held(hold).joint(state.omega, work.excitation_amplitude)
+    joint = case.held(hold).joint(state.omega, setup.excitation_amplitude)
 
     def balance_at(fraction: float, _: FloatArray) -> Balance:
         return Balance(joint, state.point.history, state.depth + fraction * (worn - state.depth))
 
-    found, arrived = follow_naturally(balance_at, replace(state.point, parameter=0.0), 1.0, work.run)
+    found, arrived = follow_naturally(balance_at, replace(state.point, parameter=0.0), 1.0, setup.run)
     there = found.evaluation
-    stable = arrived and work.run.is_stable(Balance(joint, there.history, there.wear_depth), there)
+    stable = arrived and setup.run.is_stable(Balance(joint, there.history, there.wear_depth), there)
     if not stable or creeps(joint, hold, there) or vibration_change(state.at, there) > OTHER_BRANCH:
         return None
     return replace(state, point=State(there, found.history), hold=hold, held_from=state.cycle)
 
 
-def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
+def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
     """The state of another branch to which the structure relaxes in time at depths `worn` (n_contact,), m.
 
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    case, joint = work.of(state)
-    found = relax_to_periodic(case, joint, worn, state.point, joint, work.run)
+    case, joint = setup.of(state)
+    found = relax_to_periodic(case, joint, worn, state.point, joint, setup.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners

@@ -24,44 +24,44 @@ LARGEST_MOVED_LOAD = 10.0
 worn volume is a sufficient warning (27 % with 0.6)."""
 
 
-def rate_slope(work: WearingJoint, state: WearState, pairs: BoolArray) -> FloatArray:
+def rate_slope(setup: WearingJoint, state: WearState, pairs: BoolArray) -> FloatArray:
     """Derivative dg/dW (n_contact, n_contact), 1 per cycle, with one column a pair; those not in `pairs` are 0."""
     slope = np.zeros((pairs.size, pairs.size))
-    slope[:, pairs] = _rate_changes(work, state, np.eye(pairs.size)[pairs], fixed_factors=False).T
+    slope[:, pairs] = _rate_changes(setup, state, np.eye(pairs.size)[pairs], fixed_factors=False).T
     return slope
 
 
-def _rate_changes(work: WearingJoint, state: WearState, depths: FloatArray, *, fixed_factors: bool) -> FloatArray:
+def _rate_changes(setup: WearingJoint, state: WearState, depths: FloatArray, *, fixed_factors: bool) -> FloatArray:
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m.
 
     To the relative residual of a Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
-    at, joint, balance, gain = state.at, work.joint_of(state), work.balance_of(state), work.gain(1.0)
-    fixed = replace(work.wearing, depth_held=True)
+    at, joint, balance, gain = state.at, setup.joint_of(state), setup.balance_of(state), setup.gain(1.0)
+    fixed = replace(setup.wearing, depth_held=True)
     growth = replace(balance, wear_gain=gain, wearing=fixed).linearise(at).growth_tangent
-    found = depths * (gain * (fixed if fixed_factors else work.wearing).slopes(*worn_by(at))[2])
+    found = depths * (gain * (fixed if fixed_factors else setup.wearing).slopes(*worn_by(at))[2])
     closing = np.where(joint.component_index % 3 == 0, depths[:, joint.component_index // 3], 0.0)
     # nothing acts back on a constant normal force
     acting = closing.any(axis=1)
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = work.run.steps(balance, at, rights)
+        steps = setup.run.steps(balance, at, rights)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
         found[acting] += (growth * moved).sum(axis=2)
     return found
 
 
-def explicit_step_limit(work: WearingJoint, state: WearState) -> float:
+def explicit_step_limit(setup: WearingJoint, state: WearState) -> float:
     """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
 
     A step multiplies a disturbance of W by 1 + h dg/dW: 2 over the largest positive eigenvalue of -dg/dW, by Arnoldi's
     method. A complex one counts where its real part is larger than its imaginary part.
     """
-    wears = work.rate(state.at) > 0.0
+    wears = setup.rate(state.at) > 0.0
 
     def product(depths: FloatArray) -> FloatArray:
-        return np.asarray(-_rate_changes(work, state, depths[None], fixed_factors=True)[0])
+        return np.asarray(-_rate_changes(setup, state, depths[None], fixed_factors=True)[0])
 
     # depths of pairs whose rates follow no depth do not matter
     start = product(np.where(wears, np.random.default_rng(0).normal(size=wears.size), 0.0))
@@ -95,10 +95,10 @@ def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, 
     return moved / preload if preload > 0.0 else 0.0
 
 
-def too_long(work: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> str | None:
+def too_long(setup: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> str | None:
     """Why a step or a jump of some cycles to depths (n_contact,), m, is rejected, and how long it may be; else None."""
     for free_tangents in (False, True):
-        fraction = moved_fraction(work.joint_of(state), state.at, wear_depth, free_tangents=free_tangents)
+        fraction = moved_fraction(setup.joint_of(state), state.at, wear_depth, free_tangents=free_tangents)
         if fraction <= LARGEST_MOVED_LOAD:
             return None
     # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces

@@ -73,18 +73,13 @@ across, by 3, 2, 2 and 4 doublings, errors 0.1 to 2.7 times the allowed ones; el
 class Given:
     """Euler steps of `length` cycles, which end at its multiples also behind a shorter step: equal steps in `k_w h` of
     histories that differ in k_w only. To the end of wear, each step wears about as much as the first one.
+
+    depth: in place of the length, wear of the fastest pair at the rate of the start of a step, m, Eq. (22).
     """
 
     length: float
     scheme: Scheme = "implicit"
-
-
-@dataclass(frozen=True)
-class LargestDepth:
-    """Explicit steps in which the fastest pair wears `depth`, m, at the rate of the start, Eq. (22)."""
-
-    depth: float
-    scheme: ClassVar[Scheme] = "explicit"
+    depth: float | None = None
 
 
 @dataclass(frozen=True)
@@ -99,16 +94,14 @@ class Adaptive:
     scheme: ClassVar[Scheme] = "adaptive"
 
 
-Steps = Given | LargestDepth | Adaptive
+Steps = Given | Adaptive
 
 
 def steps_of(scheme: str, length: float, rtol: float, largest_depth: float | None = None) -> Steps:
     """The steps of a scheme by its name, "final" included; largest_depth: in place of the length of explicit steps."""
     if scheme in ("adaptive", "final"):
         return Adaptive(rtol)
-    if scheme == "explicit" and largest_depth is not None:
-        return LargestDepth(largest_depth)
-    return Given(length, "explicit" if scheme == "explicit" else "implicit")
+    return Given(length, "explicit", largest_depth) if scheme == "explicit" else Given(length)
 
 
 @dataclass(frozen=True)
@@ -127,7 +120,7 @@ class WearLine:
     bounded: whether a step or a jump that moves many times the normal forces is a failure.
     """
 
-    work: WearingJoint
+    setup: WearingJoint
     steps: Steps
     end: float
     bounded: bool = True
@@ -138,8 +131,8 @@ class WearLine:
         if isinstance(steps, Adaptive) and steps.first > 0.0:
             length = steps.first
         elif state.wears:
-            state = replace(state, step_limit=explicit_step_limit(self.work, state))
-            moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), self.work.rate(state.at).max()
+            state = replace(state, step_limit=explicit_step_limit(self.setup, state))
+            moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), self.setup.rate(state.at).max()
             # the limit is no bound where almost nothing slips
             length = min(FIRST_STEP * state.step_limit, float(FIRST_DEPTH * moved / fastest), 0.5 * self.end)
         return replace(state, length=length, first_length=length)
@@ -165,8 +158,8 @@ class WearLine:
         steps = self.steps
         if isinstance(steps, Adaptive):
             return state.length
-        if isinstance(steps, LargestDepth):
-            return steps.depth / float(self.work.rate(state.at).max())
+        if steps.depth is not None:
+            return steps.depth / float(self.setup.rate(state.at).max())
         if self.end == math.inf:
             return steps.length * float(state.largest_rates[-1] / state.rates[-1])
         left = steps.length * (math.floor(state.cycle / steps.length + ROUND_OFF) + 1.0) - state.cycle
@@ -181,7 +174,7 @@ class WearLine:
     def attempt(self, state: WearState, length: float) -> Step | None:
         """As in Line."""
         if isinstance(self.steps, Adaptive):
-            return attempt_step(self.work, state, length, "adaptive")
+            return attempt_step(self.setup, state, length, "adaptive")
         return self._euler_step(state, length, self.steps.scheme)
 
     def judge(self, state: WearState, step: Step, length: float) -> float:
@@ -190,31 +183,31 @@ class WearLine:
         """
         if not isinstance(self.steps, Adaptive):
             return 0.0
-        before, after = (float(each.depth @ self.work.area) for each in (state, step.state))
+        before, after = (float(each.depth @ self.setup.area) for each in (state, step.state))
         allowed = allowed_error(STEP_ERROR_FRACTION * self.steps.rtol, before, after, state.cycle, length)
         ratio = step.error / allowed
         return min(ratio, 1.0) if length <= self._shortest(state, length) and is_smooth(state, step) else ratio
 
     def rescue(self, state: WearState, length: float) -> Step | Failure:
         """As in Line. In this order: an Euler step, a longer step across corners (both adaptive only), and a jump."""
-        work = self.work
+        setup = self.setup
         if isinstance(self.steps, Adaptive):
             found = self._euler_step(state, length, "implicit") or self._step_across(state, length)
             if found is not None:
                 return found
-        worn = state.depth + length * work.rate(state.at)
+        worn = state.depth + length * setup.rate(state.at)
         if (failure := self._refused(state, worn, length)) is not None:
             return failure
-        behind = jump(work, state, worn, state.cycle + length)
+        behind = jump(setup, state, worn, state.cycle + length)
         if isinstance(behind, Failure):
-            return work.lost(state, behind)
-        behind = work.at_followed(behind)
+            return setup.lost(state, behind)
+        behind = setup.at_followed(behind)
         return behind if isinstance(behind, Failure) else Step(behind)
 
     def _euler_step(self, state: WearState, length: float, scheme: Scheme) -> Step | None:
         """An Euler step to a stable state, or None. A followed resonance may be unstable at constant frequency."""
-        step = attempt_step(self.work, state, length, scheme)
-        return step if step is None or self.work.follow is not None or self.work.is_stable(step.state) else None
+        step = attempt_step(self.setup, state, length, scheme)
+        return step if step is None or self.setup.follow is not None or self.setup.is_stable(step.state) else None
 
     def _step_across(self, state: WearState, shortest: float) -> Step | None:
         """A step longer than the shortest one, cycles, across corners of the branch; None where it is not found.
@@ -222,49 +215,50 @@ class WearLine:
         Where the last pairs that stick come loose one by one, no step ends between the small folds, however short.
         """
         # a search without success leaves no trace: where a joint begins to slide, round-off decides what is found next
-        kept = self.work.run
-        self.work.drop_factor()
+        kept = self.setup.run
+        self.setup.drop_factor()
         for doubling in range(1, DOUBLINGS_ACROSS + 1):
             length = 2.0**doubling * shortest
             if state.cycle + length > self.end:
                 break
-            tried = attempt_step(self.work, state, length, "adaptive")
+            tried = attempt_step(self.setup, state, length, "adaptive")
             if tried is not None and is_smooth(state, tried):
                 return tried
-        self.work.run = kept
+        self.setup.run = kept
         return None
 
     def _refused(self, state: WearState, wear_depth: FloatArray, length: float) -> Failure | None:
         """Why a step or a jump to depths (n_contact,), m, after so many cycles is no result; None if it is."""
-        said = too_long(self.work, state, wear_depth, length) if self.bounded else None
+        said = too_long(self.setup, state, wear_depth, length) if self.bounded else None
         return None if said is None else Failure(Outcome.STEP_TOO_LONG, said)
 
 
-def attempt_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | None:
+def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | None:
     """A step of `length` cycles by one balance; None where its end is not found."""
-    depth, rate = state.depth, work.rate(state.at)
+    depth, rate = state.depth, setup.rate(state.at)
     worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
     w, grown = 0.0, np.zeros_like(depth)
     if scheme == "adaptive" and state.previous is not None:
         w, grown = length / state.previous.length, depth - state.previous.depth
         worn_before = depth + w**2 / (1.0 + 2.0 * w) * grown
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
-    balance = Balance(work.joint_of(state), state.point.history, worn_before, work.gain(implicit_cycles), work.wearing)
-    start, balance = first_guess(work, state, balance, length)
-    end = work.solve(balance, start, state)
+    gain = setup.gain(implicit_cycles)
+    balance = Balance(setup.joint_of(state), state.point.history, worn_before, gain, setup.wearing)
+    start, balance = first_guess(setup, state, balance, length)
+    end = setup.solve(balance, start, state)
     if end is None:
         return None
-    error = 0.5 * length * (work.rate(end.at) - rate)
+    error = 0.5 * length * (setup.rate(end.at) - rate)
     if w > 0.0:
         explicit_depth = depth + (1.0 + w) * length * rate - w**2 * grown
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
         error = own / (own + other) * (end.depth - explicit_depth)
     last = LastStep(length, depth, state.at.predicted_h, state.omega, state.resolution)
-    end = work.with_rates(replace(end, cycle=state.cycle + length, previous=last))
-    return Step(end, float(np.abs(error) @ work.area))
+    end = setup.with_rates(replace(end, cycle=state.cycle + length, previous=last))
+    return Step(end, float(np.abs(error) @ setup.area))
 
 
-def first_guess(work: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[FloatArray, Balance]:
+def first_guess(setup: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[FloatArray, Balance]:
     """First predicted force of a step (n_rel, 2H+1), N, and the balance with its first frequency and its history:
     extrapolated from the last step, or those of the state where this residual is lower.
     """
@@ -273,9 +267,9 @@ def first_guess(work: WearingJoint, state: WearState, balance: Balance, length: 
         return now, balance
     further, there = length / last.length, balance
     ahead = now + further * (now - last.predicted_h)
-    if work.follow is not None:
+    if setup.follow is not None:
         omega = state.omega + further * (state.omega - last.omega)
-        there = replace(balance, joint=work.of(state)[0].joint(omega, work.excitation_amplitude))
+        there = replace(balance, joint=setup.of(state)[0].joint(omega, setup.excitation_amplitude))
     found = there.evaluate(ahead)
     if found.scaled_residual() > balance.evaluate(now).scaled_residual():
         return now, balance

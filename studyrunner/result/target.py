@@ -40,11 +40,6 @@ class Target:
         """File of what is computed so far."""
         return self.path.with_name(f"{self.path.name}.progress")
 
-    @property
-    def older_folder(self) -> Path:
-        """Folder of what version 0.4.0 or before has computed."""
-        return self.path.with_name(f"{self.path.name}.parts")
-
 
 def identity_of(study: Study) -> str:
     """Identity of a study in words: the same study with other values, such as a finer axis, has the same."""

@@ -20,7 +20,7 @@ from solver.structure.joint import build_case
 from solver.wear import step as control
 from solver.wear.check import chosen_for_another
 from solver.wear.rate_slope import moved_fraction, rate_slope
-from solver.wear.step import Adaptive, Given, LargestDepth, Step, WearLine
+from solver.wear.step import Adaptive, Given, Step, WearLine
 from solver.wear.wearing_joint import WearingJoint
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import AREA, END, begun
@@ -59,7 +59,7 @@ def test_a_given_step_follows_its_own_equation(scheme):
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
     # Eq. (22): one pair, so each step wears just that depth
-    states, _ = steps_of(LargestDepth(2e-6), 4, END)
+    states, _ = steps_of(Given(np.inf, "explicit", 2e-6), 4, END)
     assert np.diff(read(states)[1]) == pytest.approx(np.full(4, 2e-6), rel=1e-9)
 
 

@@ -15,17 +15,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.checkpoint.completion_index import variable_sizes
 from studyrunner.coordinates import COORDINATES
 from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
 from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn
-from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, COUNTS, KEPT, LOOP_COMPONENTS, LOOPS, OF_SAMPLES, USUAL, Variable
+from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOPS, OF_SAMPLES, USUAL, Variable
 from tests.studyrunner.fakes import FACTS
 
 AXES: Mapping[str, Sequence[object]] = {
@@ -302,8 +301,7 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[PointResult
     """The result of a study: axes in the order of the study, then cycle, then contact or response."""
     axes, sizes = study.dimensions, variable_sizes(study, facts)
     sizes = {name: len(values) for name, values in axes.items()} | sizes
-    variables = {name: entry for name, entry in study.variables.items() if name in study.outputs.variables}
-    variables |= (LOOPS if study.outputs.loops else {}) | study.kept | (COUNTS if study.to_the_end else {})
+    variables = {**study.recorded, **study.kind.kept}
     dataset = _empty(axes, sizes, variables)
     dataset["outcome"].values[...] = Outcome.CONVERGED
     for result, point in [(each, point) for each in results for point in each.points]:

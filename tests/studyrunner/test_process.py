@@ -124,14 +124,11 @@ def test_a_plan_that_does_not_arrive(tmp_path):
     assert (status, said, len(printed.splitlines())) == (0, "", 1)
 
 
-@pytest.mark.parametrize(
-    ("before", "option", "said"), [("", "-o /dev/stdout", "-o"), ("ulimit -v 450000;", "", "461 MB")]
-)
-def test_what_cannot_end_well_is_refused_at_the_beginning(before, option, said, tmp_path):
-    status, _, line = shell(f"{before} {sys.executable} -m studyrunner.cli two_masses {option}", tmp_path)
+def test_what_cannot_end_well_is_refused_at_the_beginning(tmp_path):
+    status, _, line = shell(f"{sys.executable} -m studyrunner.cli two_masses -o /dev/stdout", tmp_path)
     assert (status, line.count("\n")) == (2, 1)
     assert line.startswith("run-study: ")
-    assert said in line
+    assert "-o" in line
 
 
 def test_nothing_else_gets_the_number_of_a_stream(tmp_path):

@@ -16,8 +16,7 @@ from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi import dispatch, mapped_file
-from studyrunner.mpi.cost_model import CostModel
-from studyrunner.mpi.dispatch import Dispatcher
+from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.mapped_file import open_mapped, ranks_that_see, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
@@ -35,10 +34,6 @@ class Job:
     cost: float
     n_results: int = 1
     gives_starts: bool = False
-
-    def cost_of(self, *, first):
-        del first
-        return self.cost / self.n_results
 
     @property
     def cost_keys(self):
@@ -126,25 +121,6 @@ def test_what_waits_is_bounded(monkeypatch):
         most = max(most, waiting)
     assert (n_done, waiting) == (200, 0)
     assert most < 10 + 4
-
-
-def test_a_sick_rank_gets_no_more_tasks_unless_all_are():
-    dispatcher = Dispatcher(3, CostModel(), time.monotonic)
-    dispatcher.add([Job("chore", 1.0) for _ in range(20)])
-    given, ranks = list(dispatcher.assign()), []
-    while given:
-        rank, assignment = given.pop(0)
-        if rank in (0, 2):
-            dispatcher.shun(rank)
-        dispatcher.deliver(rank, assignment.number, 0.01)
-        new = list(dispatcher.assign())
-        ranks += [rank for rank, _ in new]
-        given += new
-    assert dispatcher.done
-    assert set(ranks) == {1}
-    dispatcher.shun(1)
-    dispatcher.add([Job("chore", 1.0)])
-    assert [rank for rank, _ in dispatcher.assign()] == [1]
 
 
 # --- arrays in a file that several processes map, and which ranks see it ---
@@ -262,7 +238,7 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     histories = []
     for sweep in plan.sweeps:
         for start in fake_sweep(sweep):
-            progress.costs.learn(sweep.cost_keys, sweep.cost_of(first=False), 1.0)
+            progress.costs.learn(sweep.cost_keys, sweep.cost / sweep.n_results, 1.0)
             histories.extend(progress.take(sweep, start))
     for number, task in enumerate(histories, start=1):
         progress.costs.learn(task.cost_keys, task.cost, 2.0 * task.cost)
