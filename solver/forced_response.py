@@ -13,7 +13,7 @@ from solver.harmonic_balance.state import largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to
-from solver.presentation import PresentedResponse
+from solver.presentation import Presented
 from solver.results.history import StartState
 from solver.results.state_report import evaluated
 from solver.results.verdict import describe_cut_off, first_cut_off
@@ -23,7 +23,7 @@ from solver.structure.joint import build_case, friction_of_pairs
 
 
 @dataclass(frozen=True, repr=False)
-class FrequencyResponse(PresentedResponse):
+class FrequencyResponse(Presented):
     """Periodic states over frequency, at `n_frequency` points, of an unworn joint or at a fixed wear depth.
 
     - frequency (n_frequency,): Hz, as given.
@@ -34,6 +34,10 @@ class FrequencyResponse(PresentedResponse):
     - branch, fold_frequency (n_frequency,): number of folds at which the sweep has jumped before it reached the point,
       and frequency of the last of them, Hz; NaN if there is none.
     """
+
+    OVER = ("frequency", "frequency")
+    SHOWN = ("response", "response_error", "fold_frequency")
+    DRAWN = ("response",)
 
     frequency: FloatArray
     response: ComplexArray

@@ -57,48 +57,32 @@ def march_wear(
 
     A failure is no exception: `outcome` and `message` of the history give the reason and the last cycle count.
 
-    Parameters
-    ----------
-    model
-        From `build_model`, `studies.build_scene` or `studies.read_scene`.
-    frequency
-        Of the excitation, Hz; or "resonance" or "peak", which it follows while the joint wears, see `between`.
-    excitation_amplitude
-        N. It multiplies the unit harmonic load of the model.
-    friction_coefficient
-        One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
-    wear_coefficient
-        k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
-    cycles
-        Ascending cycle counts at which the history is reported, or the last count alone. A missing 0 is added. With inf
-        the history ends where wear has come to an end, see `outputs`.
-    scheme, step
-        "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step` cycles, Eqs.
-        (23), (24). "final" is "adaptive" to the final state, in which nothing wears any more; it needs `cycles` = inf.
-    sweep
-        Way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
-    settings, law
-        The defaults of `SolverSettings`, and Archard's law (`solver.contact.wear_law`), if not given.
-    until
-        Wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
-    outputs, final_share
-        For `cycles` = inf. outputs: number of reported states, spaced evenly in worn volume and cycles. final_share:
-        the history ends where the wear rate of each pair is below this share of its own largest wear rate.
-    wear_depth
-        (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of the
-        history count from there.
-    between
-        Range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance that the
-        sweep meets in the range. "resonance" is phase resonance: in the first harmonic, the vibration is in quadrature
-        with the excitation, `F^H x` has no real part. "peak" is the largest amplitude of the first response in its
-        first harmonic, over the frequency at constant wear depth. Under strong damping both differ: for one degree of
-        freedom with the damping ratio zeta the peak lies lower by a factor sqrt(1 - 2 zeta^2).
+    model: from `build_model`, `studies.build_scene` or `studies.read_scene`.
+    frequency: of the excitation, Hz; or "resonance" or "peak", which it follows while the joint wears, see `between`.
+    excitation_amplitude: N, multiplies the unit harmonic load of the model.
+    friction_coefficient: one number for all pairs, or (n_contact,). None for a model with its own.
+    wear_coefficient: k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
+    cycles: ascending cycle counts at which the history is reported, or the last count alone. A missing 0 is added. With
+        inf the history ends where wear has come to an end, see `outputs`.
+    scheme, step: "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step`
+        cycles, Eqs. (23), (24). "final" is "adaptive" to the final state, in which nothing wears any more; with
+        `cycles` = inf.
+    sweep: way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
+    law: of wear (`solver.contact.wear_law`).
+    until: wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
+    outputs, final_share: for `cycles` = inf: number of reported states, spaced evenly in worn volume and cycles; the
+        history ends where the wear rate of each pair is below this share of its own largest wear rate.
+    wear_depth: (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of
+        the history count from there.
+    between: range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance
+        that the sweep meets in the range. "resonance" is phase resonance: `F^H x` of the first harmonics of excitation
+        and motion has no real part. "peak" is the largest amplitude of the first response in its first harmonic, over
+        the frequency at constant wear depth; for one degree of freedom with the damping ratio zeta it lies lower by a
+        factor sqrt(1 - 2 zeta^2).
 
-    Raises
-    ------
-    ValueError
-        A number is out of its range; counts do not ascend; the scheme needs a step that is not given; model, friction
-        or law do not fit together; the law "table", whose factors depend on the depth, is given with `wear_depth`.
+    Raises ValueError where a number is out of its range; where counts do not ascend; where the scheme needs a step that
+    is not given; where model, friction or law do not fit together; where the law "table", whose factors depend on the
+    depth, is given with `wear_depth`.
     """
     settings = SolverSettings() if settings is None else settings
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
@@ -108,21 +92,19 @@ def march_wear(
     counts = check_numbers("cycles", 0.0 if to_the_end else cycles, least=0.0)
     if (np.diff(counts) <= 0.0).any():
         raise ValueError("cycles: give ascending counts")
+    counts = counts if counts[0] == 0.0 else np.append(0.0, counts)
     check_word("scheme", scheme, (*get_args(Scheme), "final"))
     if scheme == "final" and (not to_the_end or until is not None):
         raise ValueError('scheme: "final" goes with cycles = inf and without until')
+    if to_the_end and scheme == "explicit":
+        raise ValueError('scheme: explicit steps cannot grow: give "adaptive" or "implicit" with cycles inf')
     if step is None and scheme not in ("adaptive", "final"):
         raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
     length = math.inf if step is None else check_number("step", step, above=0.0)
-    counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
-    if to_the_end and scheme == "explicit":
-        raise ValueError('scheme: explicit steps cannot grow: give "adaptive" or "implicit" with cycles inf')
     if to_the_end and outputs < 2:
         raise ValueError(f"outputs = {outputs}: give at least 2, the unworn and the final state")
     check_number("final_share", final_share, above=0.0)
-    if until is not None:
-        check_word("until.quantity", until.quantity, TARGETS)
-        check_number("until.value", until.value, above=0.0)
+    _check_target(until, TARGETS)
     if wear_depth is not None and law.name == "table":
         raise ValueError('wear_depth: give another law: the factors of a "table" depend on depths that count from 0')
     model = worn_model(model, wear_depth)
@@ -154,6 +136,13 @@ def _check_frequency(
     return math.nan, FollowedFrequency(frequency, float(ends[0]), float(ends[1]))
 
 
+def _check_target(until: WearTarget | None, known: tuple[str, ...]) -> None:
+    """Raises ValueError where a target is not one of the known quantities, or not above 0."""
+    if until is not None:
+        check_word("until.quantity", until.quantity, known)
+        check_number("until.value", until.value, above=0.0)
+
+
 def integrate_mission(
     blocks: Sequence[Block],
     wear_coefficient: float,
@@ -167,31 +156,21 @@ def integrate_mission(
 ) -> MissionHistory:
     """Mission history of a joint from its unworn state on: blocks of vibration in order, repeated many times.
 
-    Depths are carried from block to block. Thousands of missions are integrated in steps of many missions at once
-    (`solver.missions.step`). A failure is no exception: `outcome` and `message` of the history give the reason.
+    Depths are carried from block to block. Thousands of missions are integrated in steps of many missions at once. A
+    failure is no exception: `outcome` and `message` of the history give the reason.
 
-    Parameters
-    ----------
-    blocks
-        Blocks in the order; of `solver.Block`.
-    missions
-        Ascending whole numbers of missions at which the history is reported, or the last number alone. A missing
+    blocks: in the order; of `solver.Block`.
+    missions: ascending whole numbers of missions at which the history is reported, or the last number alone. A missing
         0 is added.
-    wear_coefficient, settings, law
-        As for `march_wear`.
-    until
-        Wear depth or worn volume at which the history ends before; `missions_to_target` of the history is its number.
-    sweep
-        Way to the state of the first mission, where its first block continues the last one of the mission before.
-    largest_step
-        Most missions that are computed at once; 1: every mission by itself. By default the error decides.
+    wear_coefficient, settings, law: as for `march_wear`.
+    until: wear depth or worn volume at which the history ends before; `missions_to_target` of the history is its
+    number.
+    sweep: way to the state of the first mission, where its first block continues the last one of the mission before.
+    largest_step: most missions that are computed at once; 1: every mission by itself. By default the error decides.
 
-    Raises
-    ------
-    ValueError
-        A number is out of its range; numbers of missions are not whole or do not ascend; there is no block; the blocks
-        do not have equal contact pairs; a block continues another one with another model or friction; a model, friction
-        or law does not fit.
+    Raises ValueError where a number is out of its range; where numbers of missions are not whole or do not ascend;
+    where there is no block; where the blocks do not have equal contact pairs; where a block continues another one with
+    another model or friction; where a model, friction or law does not fit.
     """
     settings = SolverSettings() if settings is None else settings
     check_word("sweep", sweep, get_args(Direction))
@@ -203,9 +182,7 @@ def integrate_mission(
     counts = check_numbers("missions", missions, least=0.0)
     if (np.diff(counts) <= 0.0).any() or (counts != np.round(counts)).any() or counts[-1] < 1.0:
         raise ValueError("missions: give ascending whole numbers, the last of at least 1")
-    if until is not None:
-        check_word("until.quantity", until.quantity, TARGETS[:2])
-        check_number("until.value", until.value, above=0.0)
+    _check_target(until, TARGETS[:2])
     if largest_step is not None and largest_step != round(check_number("largest_step", largest_step, least=1.0)):
         raise ValueError(f"largest_step: give a whole number instead of {largest_step:g}")
     wanted = tuple(sorted({0, *(int(count) for count in counts)}))

@@ -12,12 +12,12 @@ from solver.forced_response import check_friction, check_numbers, check_settings
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.modes.points import Direction, follow_mode
 from solver.outcome import Outcome
-from solver.presentation import PresentedMode
+from solver.presentation import Presented
 from solver.settings import SolverSettings
 
 
 @dataclass(frozen=True, repr=False)
-class Backbone(PresentedMode):
+class Backbone(Presented):
     """A nonlinear mode at `n_amplitude` amplitudes.
 
     - amplitude (n_amplitude,): modal amplitude `sqrt(x_1^H M x_1)`, m sqrt(kg), as given; x_1: first harmonic of all
@@ -32,6 +32,10 @@ class Backbone(PresentedMode):
 
     Values are NaN where no state was found.
     """
+
+    OVER = ("amplitude", "modal_amplitude")
+    SHOWN = ("frequency", "damping_ratio", "damping_error")
+    DRAWN = ("frequency", "damping_ratio")
 
     amplitude: FloatArray
     frequency: FloatArray

@@ -43,29 +43,29 @@ _OF_MISSIONS = {
 }
 """All dimensions of values that belong to blocks or steps of missions."""
 
+NOT_IN_DATASETS = {"dataset": False}
+"""Metadata of a field that is no array of numbers or words."""
+
 
 def _row_of(table: dict[str, str], name: str, otherwise: str) -> str:
     return next((key for key, names in table.items() if name in names.split()), otherwise)
 
 
-def _unit(name: str) -> str:
+def unit_of(name: str) -> str:
+    """Unit of an attribute of a result."""
     return _row_of(_UNITS, name, "1")
 
 
-NOT_IN_DATASETS = {"dataset": False}
-"""Metadata of a field that is no array of numbers or words."""
-
-
 class Presented:
-    """A result over one dimension.
+    """A result over one dimension; the defaults are those of histories.
 
     OVER: name of the attribute with the values of this dimension, and name of the dimension in a Dataset.
     SHOWN: three attributes that the text shows. DRAWN: attributes that the picture shows, each on an axis of its own.
     """
 
     OVER: ClassVar[tuple[str, str]]
-    SHOWN: ClassVar[tuple[str, str, str]]
-    DRAWN: ClassVar[tuple[str, ...]]
+    SHOWN: ClassVar[tuple[str, str, str]] = ("worn_volume", "worn_volume_error", "wear_depth")
+    DRAWN: ClassVar[tuple[str, ...]] = ("worn_volume",)
 
     def to_xarray(self) -> xr.Dataset:
         """All values, named as here, in SI units; `outcome` as words.
@@ -80,11 +80,11 @@ class Presented:
         for field in fields(self):  # type: ignore[arg-type]
             if field.name != name and field.metadata.get("dataset", True):
                 data |= _variables(field.name, getattr(self, field.name), over, len(points))
-        return xr.Dataset(data, {over: (over, points, {"units": _unit(name)})})
+        return xr.Dataset(data, {over: (over, points, {"units": unit_of(name)})})
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draws the main values over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
-        axes = axes or _new_axes()
+        axes = axes or new_axes()
         at = getattr(self, self.OVER[0])
         order = np.argsort(at)
         for number, name in enumerate(self.DRAWN):
@@ -93,7 +93,7 @@ class Presented:
             if name == "worn_volume":
                 error = getattr(self, f"{name}_error")[order] * values
                 panel.fill_between(at[order], values - error, values + error, alpha=0.2)
-            panel.set_ylabel(f"{name.replace('_', ' ')} in {_unit(name)}")
+            panel.set_ylabel(f"{name.replace('_', ' ')} in {unit_of(name)}")
         axes.set_xlabel(self.OVER[1].replace("_", " "))
         axes.grid(alpha=0.3)
         return axes
@@ -103,11 +103,8 @@ class Presented:
         own: Any = self
         points, outcomes = getattr(self, self.OVER[0]), own.outcome
         ends, messages = (each if isinstance(each, tuple) else (each,) for each in (outcomes, own.message))
-        counts = Counter(ends)
-        words = ", ".join(
-            f"{number} {outcome}" if len(ends) > 1 else str(outcome) for outcome, number in counts.items()
-        )
-        rows = [(name, _span(getattr(self, name), _unit(name))) for name in self.SHOWN]
+        words = ", ".join(f"{n} {outcome}" if len(ends) > 1 else str(outcome) for outcome, n in Counter(ends).items())
+        rows = [(name, _span(getattr(self, name), unit_of(name))) for name in self.SHOWN]
         rows.append(("message", next((text for text in messages if text), "none")))
         first = f"{type(self).__name__}: {self.OVER[1]} {_span(points, '')}: {words}"
         return "\n".join((first, *(f"  {name.replace('_', ' '):<18} {text}" for name, text in rows)))
@@ -115,7 +112,7 @@ class Presented:
 
 def _variables(name: str, value: Any, over: str, n_points: int) -> dict[str, tuple[Any, Any, dict[str, str]]]:
     """The variables of one value: dimensions, values, units; two of complex values, none of empty ones."""
-    units = {"units": _unit(name)}
+    units = {"units": unit_of(name)}
     if isinstance(value, tuple):
         return {name: (over, [str(each) for each in value], units)}
     if not isinstance(value, np.ndarray):
@@ -135,7 +132,8 @@ def _variables(name: str, value: Any, over: str, n_points: int) -> dict[str, tup
     return {name: (dims, value, units)}
 
 
-def _new_axes() -> Axes:
+def new_axes() -> Axes:
+    """Axes of a new figure of matplotlib."""
     from matplotlib import pyplot
 
     axes: Axes = pyplot.subplots()[1]
@@ -150,45 +148,3 @@ def _span(values: Any, unit: str) -> str:
     lowest, highest = float(known.min()), float(known.max())
     words = f"{lowest:.6g}" if lowest == highest else f"{lowest:.6g} to {highest:.6g}"
     return words if unit in ("", "1") else f"{words} {unit}"
-
-
-class PresentedHistory(Presented):
-    """A wear history or a mission history."""
-
-    SHOWN = ("worn_volume", "worn_volume_error", "wear_depth")
-    DRAWN = ("worn_volume",)
-
-
-class PresentedResponse(Presented):
-    """A frequency response; each point has an outcome of its own."""
-
-    OVER = ("frequency", "frequency")
-    SHOWN = ("response", "response_error", "fold_frequency")
-    DRAWN = ("response",)
-
-
-class PresentedCurve(Presented):
-    """A response curve through folds, over its points; solid where it is stable."""
-
-    OVER = ("point", "point")
-    SHOWN = ("frequency", "excitation_amplitude", "response")
-
-    def plot(self, axes: Axes | None = None) -> Axes:
-        """As for other results, over the parameter that changes along the curve."""
-        own: Any = self
-        axes = axes or _new_axes()
-        at, stable = getattr(self, own.parameter), np.array(own.stability) == "stable"
-        for size in np.abs(own.response).T:
-            (line,) = axes.plot(at, size, ":")
-            axes.plot(at, np.where(stable, size, np.nan), color=line.get_color())
-        label = f"{own.parameter.replace('_', ' ')} in {_unit(own.parameter)}"
-        axes.set(xlabel=label, ylabel="response in m", title="solid where stable")
-        return axes
-
-
-class PresentedMode(Presented):
-    """A nonlinear mode over its amplitude; each point has an outcome of its own."""
-
-    OVER = ("amplitude", "modal_amplitude")
-    SHOWN = ("frequency", "damping_ratio", "damping_error")
-    DRAWN = ("frequency", "damping_ratio")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,11 +18,14 @@ from solver.harmonic_balance.state import BalanceAt, Failure, State, largest_res
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.presentation import NOT_IN_DATASETS, PresentedCurve
+from solver.presentation import NOT_IN_DATASETS, Presented, new_axes, unit_of
 from solver.settings import Direction, SolverSettings
 from solver.stability.floquet import Multipliers, Stability, find_multipliers
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _LEAST_PART = 0.1  # of the first value: how far a curve may turn back
 _FEWEST_STEPS = 50  # of a curve without folds: enough for a drawing
@@ -32,7 +35,7 @@ _Branch = tuple[list[State], list[int], Failure]
 
 
 @dataclass(frozen=True, repr=False)
-class ResponseCurve(PresentedCurve):
+class ResponseCurve(Presented):
     """Periodic states along a curve, `n_points` of them in the order of the curve, unstable ones included.
 
     - parameter: "frequency" or "excitation_amplitude", which changes along the curve; the other one is constant.
@@ -49,6 +52,9 @@ class ResponseCurve(PresentedCurve):
     - exponents: Hill's (Floquet) exponents of each point, 1/s.
     - outcome, message: CONVERGED where the curve comes to the last value; BRANCH_LOST where not, and how far.
     """
+
+    OVER = ("point", "point")
+    SHOWN = ("frequency", "excitation_amplitude", "response")
 
     parameter: Literal["frequency", "excitation_amplitude"]
     frequency: FloatArray
@@ -75,6 +81,17 @@ class ResponseCurve(PresentedCurve):
         pairs = zip(self.multipliers, self.frequency.tolist(), strict=True)
         with np.errstate(divide="ignore"):
             return tuple(np.log(values) * frequency for values, frequency in pairs)
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """As for other results, over the parameter that changes along the curve; solid where it is stable."""
+        axes = axes or new_axes()
+        at, stable = getattr(self, self.parameter), np.array(self.stability) == "stable"
+        for size in np.abs(self.response).T:
+            (line,) = axes.plot(at, size, ":")
+            axes.plot(at, np.where(stable, size, np.nan), color=line.get_color())
+        label = f"{self.parameter.replace('_', ' ')} in {unit_of(self.parameter)}"
+        axes.set(xlabel=label, ylabel="response in m", title="solid where stable")
+        return axes
 
     def balance(self, index: int) -> HarmonicBalance:
         """Residual, Jacobian, Fourier coefficients and time signals of a point."""

@@ -47,14 +47,12 @@ def advise(outcome: str, used: Used) -> str:
     """
     if outcome == "time_limit":
         return "--retry-failed continues with a larger solver.time_limit."
-    finer, steps, sweeps = _given(used), _other_steps(used), _other_sweeps(used)
-    # a ramp holds the frequency
-    other = "down" if used.sweep == "up" else "up"
-    turned = () if other in used.sweeps else (f'sweep = "{other}"',)
+    finer, steps, adaptive = _given(used), _other_steps(used), used.scheme in _OF_ADAPTIVE_STEPS
+    sweeps = tuple(f'sweep = "{sweep}"' for sweep in _SWEEPS if sweep not in (used.sweep, *used.sweeps))
     end = "another scheme with an end in " if used.scheme == "final" else "an end in "
-    adaptive = used.scheme in _OF_ADAPTIVE_STEPS
     remedies = {
-        "resonance_lost": ("another range in loading.between", *turned),
+        # a ramp holds the frequency
+        "resonance_lost": ("another range in loading.between", *(each for each in sweeps if "ramp" not in each)),
         "start_failed": (*finer, *sweeps),
         "branch_lost": (*finer, *sweeps),
         # more harmonics make no state stable
@@ -86,7 +84,8 @@ def advise_error(error: float, wear_rate_error: Sequence[float], used: Used) -> 
     if error >= _FAR * used.rtol:
         return "set a smaller solver.rtol"
     # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
-    return f"set solver.rtol = {_rounded_down(used.rtol**2 / error)}"
+    digits, exponent = f"{used.rtol**2 / error:.12e}".split("e")
+    return f"set solver.rtol = {float(f'{digits[:3]}e{exponent}'):g}"
 
 
 def _given(used: Used) -> tuple[str, ...]:
@@ -94,23 +93,12 @@ def _given(used: Used) -> tuple[str, ...]:
     return tuple(f'{key} = "auto"' for key in ("harmonics", "samples") if getattr(used, key) != "auto")
 
 
-def _other_sweeps(used: Used) -> tuple[str, ...]:
-    return tuple(f'sweep = "{sweep}"' for sweep in _SWEEPS if sweep not in (used.sweep, *used.sweeps))
-
-
 def _other_steps(used: Used) -> tuple[str, ...]:
     """Steps that are shorter than those that were used, and schemes that the study does not have."""
     if used.scheme in _OF_ADAPTIVE_STEPS:
-        shorter, other = "a smaller rtol, which makes the steps shorter,", "implicit"
-        return (
-            (shorter, 'scheme = "implicit" with a small step') if other not in used.schemes else (shorter.rstrip(","),)
-        )
+        shorter = "a smaller rtol, which makes the steps shorter"
+        other = 'scheme = "implicit" with a small step'
+        return (shorter,) if "implicit" in used.schemes else (f"{shorter},", other)
     by_depth = used.by_depth and used.scheme == "explicit"
     shorter = "a smaller slow_time.largest_depth" if by_depth else "a smaller step"
     return (shorter,) if "adaptive" in used.schemes else ('scheme = "adaptive"', shorter)
-
-
-def _rounded_down(value: float) -> str:
-    """With two digits, no larger than it is."""
-    digits, exponent = f"{value:.12e}".split("e")
-    return f"{float(f'{digits[:3]}e{exponent}'):g}"

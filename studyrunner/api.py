@@ -35,9 +35,9 @@ def run_study(
 ) -> xr.Dataset:
     """Run a study in this process, as the command `run-study` does, and open its result.
 
-    What is computed is the same as with the command, to the last bit, and a run that was ended early goes on when it is
-    called again, from here or by the command: see `<output>.progress`. This process computes alone, with one thread of
-    the linear algebra; for several processes give `mpiexec -n 8 run-study study.toml -o output.nc`.
+    The result is that of the command, to the last bit, and a run that was ended early goes on when it is called again,
+    from here or by the command. This process computes alone, with one thread of the linear algebra; for several
+    processes give `mpiexec -n 8 run-study study.toml -o output.nc`.
 
     Parameters
     ----------
@@ -69,9 +69,9 @@ def run_study(
         Where study, scene or output are wrong, another run is at work there, or a launcher has started several
         processes, each of which would compute all of it. Nothing is computed then.
     StorageError
-        Where something cannot be written on the way. What was computed is kept, and the same call goes on from it.
+        Where something cannot be written on the way. What was computed is kept.
     KeyboardInterrupt
-        After Ctrl-C; the file holds the points that were computed until then, and the same call goes on.
+        After Ctrl-C; the file holds the points that were computed until then.
     """
     if (announced := launcher_size()) > 1:
         remedy = "call it in one process, or give `mpiexec run-study`: here each process would compute all of it"

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import os
-import resource
 import sys
 import time
 import traceback
@@ -21,6 +19,7 @@ from studyrunner.mpi.ranks import (
     launcher_rank,
     start_ranks,
 )
+from studyrunner.system.machine import MachineFaultError
 from studyrunner.system.process import (
     INTERRUPTED,
     begin_ending,
@@ -30,20 +29,17 @@ from studyrunner.system.process import (
     raise_ending,
     take_endings,
 )
-from studyrunner.user_error import StorageError, UserError, Verbatim, show_text
+from studyrunner.user_error import StorageError, UserError, show_text
 
 if TYPE_CHECKING:
-    from studyrunner.options import Options
+    import argparse
+
     from studyrunner.study.study import Study
 
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3
 """Exit statuses, beside INTERRUPTED."""
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-
-_LEAST_ADDRESS_SPACE = 1e9
-"""Bytes of address space that the libraries alone need: a small study takes 0.8 GB with two ranks, of which 0.3 GB are
-in memory. With less a library that is loaded late ends the run, or the allocation of memory ends the process."""
 
 _SECONDS_FOR_RANK_0 = 60.0
 """Time that rank 0 has for writing the result, s, before another interrupted rank ends the run."""
@@ -100,7 +96,7 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
         status = UNEXPECTED
         if is_ending(error):
             begin_ending()
-            if ranks.rank > 0 and _leave_to_rank_0(ranks):
+            if ranks.rank > 0 and _leave_to_rank_0(ranks, RankInterrupted()):
                 ranks.close()
                 return CONVERGED
             said = str(error) if isinstance(error, KeyboardInterrupt) else ""
@@ -108,6 +104,11 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
             status = INTERRUPTED
         elif isinstance(error, StorageError):
             print(f"run-study: {error}", file=sys.stderr)
+        elif isinstance(error, MachineFaultError):
+            kept = "what was computed is kept, and the same command goes on from it"
+            if ranks.rank > 0:
+                _leave_to_rank_0(ranks, error)
+            print(f"run-study: {error}: a fault of the machine; {kept}", file=sys.stderr)
         else:
             print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
             traceback.print_exc()
@@ -120,12 +121,12 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
     return status
 
 
-def _leave_to_rank_0(ranks: Ranks) -> bool:
-    """Waits for rank 0 to write the result and to end all ranks, after telling rank 0 of the end.
+def _leave_to_rank_0(ranks: Ranks, reason: object) -> bool:
+    """Waits for rank 0 to write what there is and to end all ranks, after telling it the reason.
 
     Returns whether rank 0 had already finished.
     """
-    ranks.send(RankInterrupted(), 0)
+    ranks.send(reason, 0)
     latest = time.monotonic() + _SECONDS_FOR_RANK_0
     while time.monotonic() < latest:
         # a message moves only while its sender is in the MPI library
@@ -137,7 +138,6 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
 
 def _follow(ranks: Ranks) -> int:
-    """Any other rank."""
     from studyrunner.mpi.schedule import follow_rank_0
     from studyrunner.task_runs import evaluator
 
@@ -146,12 +146,10 @@ def _follow(ranks: Ranks) -> int:
 
 
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
-    """Rank 0: its exit status."""
     try:
         from studyrunner.options import parse_options
 
         options = parse_options(arguments)
-        _check_memory()
         raise_ending()
         from studyrunner.study.study_file import read_study
 
@@ -171,14 +169,6 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     except SystemExit:
         return CONVERGED
     return BAD_INPUT
-
-
-def _check_memory() -> None:
-    """Raises UserError where a limit of the address space leaves no room for the libraries."""
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if (math.inf if limit == resource.RLIM_INFINITY else limit) < _LEAST_ADDRESS_SPACE:
-        remedy = f"give each process at least {1e-6 * _LEAST_ADDRESS_SPACE:.0f} MB of address space, or no limit"
-        raise UserError("limits of the process", "ulimit -v", Verbatim(f"{1e-6 * limit:.0f} MB"), remedy)
 
 
 def _slow_steps() -> Callable[[str], None]:
@@ -237,7 +227,7 @@ def _write_scene(study: Study, path: Path) -> int:
     return CONVERGED
 
 
-def _compute(ranks: Ranks, study: Study, options: Options) -> int:
+def _compute(ranks: Ranks, study: Study, options: argparse.Namespace) -> int:
     from solver.outcome import COMPLETE
     from studyrunner.result.target import check_result
     from studyrunner.run import RunOptions, compute_study

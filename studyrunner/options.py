@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import NoReturn
@@ -37,29 +36,7 @@ A run that was ended, in whatever way, goes on where it was when the same comman
 is in the file OUT.nc.progress; with it a study that is changed computes only what is new. It may be removed."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """Options of the command line.
-
-    output: path of the result; None for `<study name>.nc` in the current folder.
-    date: checked date; None for none.
-    """
-
-    study: str
-    output: Path | None
-    plan: bool
-    check: bool
-    overrides: list[str]
-    write_scene: Path | None
-    fresh: bool
-    overwrite: bool
-    retry_failed: bool
-    date: str | None
-
-
 class _Parser(argparse.ArgumentParser):
-    """A parser that reports mistakes as UserError."""
-
     def error(self, message: str) -> NoReturn:
         raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
 
@@ -108,8 +85,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def parse_options(arguments: Sequence[str]) -> Options:
-    """Options from the command line. Raises UserError; SystemExit after --help, --new and the like."""
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Options from the command line, by their names.
+
+    study: text. output, write_scene: paths or None. overrides: texts. date: checked, or None. The others are flags.
+
+    Raises UserError; SystemExit after --help, --new and the like.
+    """
     parser = _Parser(
         prog="run-study",
         description=_DESCRIPTION,
@@ -118,18 +100,18 @@ def parse_options(arguments: Sequence[str]) -> Options:
         allow_abbrev=False,
     )
     _add_options(parser)
-    found = vars(parser.parse_args(list(arguments)))
-    new, deck, scene = (found.pop(name) for name in ("new", "deck", "scene_help"))
-    if deck is not None and new is None:
-        raise UserError("command line", "--from", str(deck), "give --new NAME beside it: the name of the new study")
-    if scene is not None or new is not None:
-        print(_scene_help(scene) if new is None else _new_study(new, deck), flush=True)
+    found = parser.parse_args(list(arguments))
+    if found.deck is not None and found.new is None:
+        remedy = "give --new NAME beside it: the name of the new study"
+        raise UserError("command line", "--from", str(found.deck), remedy)
+    if found.scene_help is not None or found.new is not None:
+        print(_scene_help(found.scene_help) if found.new is None else _new_study(found.new, found.deck), flush=True)
         parser.exit()
-    if found["date"] is not None:
+    if found.date is not None:
         from studyrunner.result.provenance import check_date  # where it is used: it takes a second to load
 
-        found["date"] = check_date(found["date"], "command line", "--date")
-    return Options(**found)
+        found.date = check_date(found.date, "command line", "--date")
+    return found
 
 
 def _scene_help(scene: str) -> str:

@@ -6,12 +6,11 @@ import contextlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex, record_type
 from studyrunner.checkpoint.store import Store, StoreInUseError
-from studyrunner.kinds.kind import build_tasks, kind_of
+from studyrunner.kinds.kind import build_tasks, describe_tasks
 from studyrunner.kinds.task import Identity, digest
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import serve_tasks
@@ -75,7 +74,6 @@ def compute_study(
                 *notes,
                 *(f"{show_text(study.source)}: {text}" for text in compare_with_archived(study, facts.digest)),
                 *store.notes,
-                *_older(target.older_folder),
                 *scenes.notes,
                 *doubts_of_study(study, facts),
                 *(f"{label}: {text}" for label, text in remarks_of_study(study)),
@@ -92,12 +90,11 @@ def compute_study(
                 arrays = small_arrays(study, scenes.scenes, scenes.facts, scenes.variables)
                 return write_result(study, facts, completion, target, arrays, attributes, scenes.kept)
 
-            return _compute(ranks, study, StudyRun(completion, scenes.models, display), target, options.again, write)
+            return _compute(ranks, StudyRun(completion, scenes.models, display), target, options.again, write)
 
 
 def _compute(
     ranks: Ranks,
-    study: Study,
     run: StudyRun,
     target: Target,
     again: str,
@@ -106,7 +103,7 @@ def _compute(
     """Has the tasks done that are left and writes the result, also where the run is ended from outside."""
     try:
         if run.tasks:
-            run.display.say(f"computing {kind_of(study).describe_tasks(run.tasks)}")
+            run.display.say(f"computing {describe_tasks(run.tasks)}")
         serve_tasks(ranks, run, evaluator(), run.costs)
         run.display.say("writing the result")
         # a signal that comes now finds a result that is about to be whole
@@ -162,10 +159,3 @@ def _open_completion(
     completion.give_up_crashed()
     store.flush()
     return completion
-
-
-def _older(folder: Path) -> list[str]:
-    """A sentence where a folder of an earlier version stands beside a result."""
-    if not folder.is_dir():
-        return []
-    return [f"{folder.name} is of version 0.4.0 or before: it is neither used nor changed, and may be removed"]

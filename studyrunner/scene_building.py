@@ -10,19 +10,19 @@ from __future__ import annotations
 import contextlib
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from solver.packing import Packed
+from solver.packing import Packed, pack_model, unpack_model
 from studyrunner.checkpoint.store import Store
 from studyrunner.kinds.task import Task
-from studyrunner.mpi.cost_model import CostKeys
+from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.mapped_file import MappedFile, ranks_that_see, write_mapped
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
 from studyrunner.scene.answers import SceneVariable, build_scene_variables, exact_answers, join_scene_variables
-from studyrunner.scene.computed import InMemory, keep_model, model_key, read_model
+from studyrunner.scene.computed import InMemory, model_key
 from studyrunner.scene.scene import KeptScene, SceneFacts, build_study_scene, describe_scene, scene_to_keep
 from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
 from studyrunner.study.scene_axes import keys_as_given
@@ -60,11 +60,7 @@ class ModelCache(OrderedDict[tuple[int, ...], Models]):
 
 
 class SceneModels:
-    """Rank 0: which rank has which models, and the files of models in use.
-
-    A rank holds the models of two tasks at most (`ModelCache`) and two tasks at most (`Dispatcher`). So a rank that
-    loses models here, by two later tasks with other models, has done the task that brought these.
-    """
+    """Rank 0: which rank has which models (`ModelCache`), and the files of models in use."""
 
     def __init__(self, read: Callable[[int], ReducedModel], seeing: Collection[int], beside: Path) -> None:
         """read: the model of a scene. seeing: ranks that see the files. beside: the file that they stand beside."""
@@ -86,7 +82,6 @@ class SceneModels:
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
     def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
-        """The model of a scene as a rank gets it."""
         if rank not in self._seeing:
             return self._read(number)
         if number not in self._files:
@@ -98,7 +93,7 @@ class SceneModels:
 
 @dataclass(frozen=True)
 class SceneTask:
-    """One scene to build. study: of this scene alone. known: what an earlier run has computed for the scene."""
+    """One scene to build. study: of this scene alone. known: its model from an earlier run, by `model_key`."""
 
     number: int
     study: Study
@@ -106,29 +101,20 @@ class SceneTask:
     cost: float = 1.0
     n_results: int = 1
     gives_starts: bool = False
-
-    def cost_of(self, *, first: bool) -> float:
-        """Estimated time, s; all scenes are alike."""
-        del first
-        return self.cost
-
-    @property
-    def cost_keys(self) -> CostKeys:
-        """Groups of similar tasks."""
-        return (("scene",),)
+    cost_keys: CostKeys = (("scene",),)
 
 
 @dataclass(frozen=True)
 class SceneBuilt:
     """A scene that was built.
 
-    facts: None where the scene is wrong. variables: what the study asks of the scene. computed: what later runs need
-        not compute. error: what the user has to change.
+    facts: None where the scene is wrong. variables: what the study asks of the scene. model: None where an earlier run
+    has kept it. error: what the user has to change.
     """
 
     facts: SceneFacts | None
     variables: tuple[SceneVariable, ...] = ()
-    computed: Mapping[str, Packed] = field(default_factory=dict)
+    model: Packed | None = None
     error: UserError | None = None
 
 
@@ -168,16 +154,13 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
                     raise each.error
             facts = tuple(each.facts for each in built if each.facts is not None)
             variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
-
-            def read(number: int) -> ReducedModel:
-                return read_model(scenes.studies[number], store)
-
+            read = building.read
         else:
             one = scenes.studies[0] if study.mission else study
             model = build_study_scene(one, say, store)
             if "natural_frequency" in study.scene_variables:
                 say("finding the natural frequencies of the scene")
-            facts, variables = (describe_scene(model),), build_scene_variables(one, model, store)
+            facts, variables = (describe_scene(model),), build_scene_variables(one, model)
             kept = scene_to_keep(one, model)
 
             def read(number: int) -> ReducedModel:  # noqa: ARG001
@@ -191,37 +174,44 @@ class _Building(Office):
     """Rank 0 while the scenes are built. found: those that are, by number."""
 
     def __init__(self, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> None:
-        self._scenes = scenes
+        self._keys = [model_key(study) for study in scenes.studies]
+        self._studies = scenes.studies
         self._store = store
         self._say = say
         self.found: dict[int, SceneBuilt] = {}
 
     def begin(self) -> Iterator[SceneTask]:
-        for number, study in enumerate(self._scenes.studies):
-            key = model_key(study)
+        for number, (study, key) in enumerate(zip(self._studies, self._keys, strict=True)):
             model = self._store.read_computed(key)
             yield SceneTask(number, study, {} if model is None else {key: model})
 
     def take(self, task: SceneTask, result: SceneBuilt) -> Sequence[SceneTask]:
-        for key, value in result.computed.items():
-            self._store.keep_computed(key, value)
-        self.found[task.number] = result
-        self._say(f"{len(self.found)} of {len(self._scenes.studies)} scenes are built")
+        if result.model is not None:
+            self._store.keep_computed(self._keys[task.number], result.model)
+        self.found[task.number] = replace(result, model=None)
+        self._say(f"{len(self.found)} of {len(self._studies)} scenes are built")
         return ()
 
     def tick(self, running: object) -> None:  # noqa: ARG002
         self._store.tick()
 
+    def read(self, number: int) -> ReducedModel:
+        """The model of a scene. Raises RuntimeError where it is no longer there."""
+        packed = self._store.read_computed(self._keys[number])
+        if packed is None:
+            raise RuntimeError(f"the model of scene {number} has gone")
+        return unpack_model(packed)
+
 
 def build_scene_task(task: SceneTask, _: Callable[[object], None]) -> Iterator[SceneBuilt]:
-    """Builds one scene."""
-    computed = InMemory(task.known)
+    """Builds one scene, or takes its model from an earlier run."""
     try:
-        model = build_study_scene(task.study, computed=computed)
-        variables = build_scene_variables(task.study, model, computed)
+        model = build_study_scene(task.study, computed=InMemory(task.known))
+        variables = build_scene_variables(task.study, model)
     except UserError as error:
         yield SceneBuilt(None, error=error)
         return
-    keep_model(task.study, model, computed)
-    new = {key: value for key, value in computed.items() if key not in task.known}
-    yield SceneBuilt(describe_scene(model), variables, new)
+    packed = None if task.known else pack_model(model)
+    if packed is None and not task.known:
+        raise ValueError(f"the matrices of {task.study.scene.model} are not stored by rows")
+    yield SceneBuilt(describe_scene(model), variables, packed)

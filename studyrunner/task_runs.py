@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -12,11 +13,11 @@ from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Keep, Result, StartResult, Task
-from studyrunner.mpi.cost_model import CostModel
+from studyrunner.mpi.dispatch import CostModel
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Office, Run
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task
-from studyrunner.system.machine import MachineFaultError, is_fault_of_machine
+from studyrunner.system.machine import MachineFaultError, tells_of_machine
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
 
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel
 
 Models = Mapping[int, "ReducedModel"]
-
-_TRIES_AGAIN = 1
-"""Number of tries again of a task that a fault of the machine has ended."""
 
 _LATE = 0.3
 """Expected further time of a task that takes longer than estimated, over the time that it is late. For an estimate with
@@ -45,7 +43,7 @@ def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
 def evaluator() -> Run:
     """The function that does tasks on a rank, and builds scenes.
 
-    A task that breaks off gives failed results; the other tasks go on. A fault of the machine is no result.
+    A task that breaks off gives failed results; the other tasks go on. A fault of the machine raises MachineFaultError.
     """
     models: ModelCache[tuple[ReducedModel, ...]] = ModelCache()
 
@@ -70,10 +68,11 @@ def evaluator() -> Run:
         except Exception as error:
             # An exception from a signal is no failure of the task.
             raise_ending()
-            outcome = Outcome.NOT_COMPUTED if is_fault_of_machine(error) else Outcome.EXCEPTION
             message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
+            if isinstance(error, MachineFaultError) or tells_of_machine(message):
+                raise MachineFaultError(f"{message}, on {platform.node()}") from error
             for place in left:
-                yield task.failed(place, outcome, message)
+                yield task.failed(place, Outcome.EXCEPTION, message)
 
     return evaluate
 
@@ -91,7 +90,6 @@ class TaskProgress(Office):
         self._completion = completion
         self._sweeps = completion.sweeps_left()
         self.tasks = [*self._sweeps, *(task for task in completion.plan.results if not completion.is_finished(task))]
-        self._n_faults: Counter[str] = Counter()
         self._n_given: Counter[str] = Counter()
         self._words: dict[str, str] = {}  # where a sweep is
         self._shares: dict[str, tuple[float, float]] = {}  # what of a task is done, and when it said so, s
@@ -109,21 +107,17 @@ class TaskProgress(Office):
         yield from self._without_suspects(self._completion.waiting_for(None))
 
     def take(self, task: Task, result: Result) -> Sequence[Task]:
-        """Takes a result; returns tasks that the result makes possible, or that have to be done again."""
+        """Takes a result; returns tasks that the result makes possible."""
         self._n_given[task.key] += 1
-        is_first, is_last = self._n_given[task.key] == 1, self._n_given[task.key] == task.n_results
+        is_last = self._n_given[task.key] == task.n_results
         if is_last:
             del self._n_given[task.key]
-        self._left[task.group] -= task.cost_of(first=is_first)
+        self._left[task.group] -= task.cost / task.n_results
         self._shares.pop(task.key, None)
-        new: Sequence[Task] = ()
-        if not result.fault:
-            self._completion.add(task, result)
-            self.n_points += len(task.points(result.place))
-            new = self._start(task, result) if isinstance(result, StartResult) else ()
-        elif is_last:
-            new = self._try_again(task)
-        if task.key == self._tried and is_last and task.key not in {each.key for each in new}:
+        self._completion.add(task, result)
+        self.n_points += len(task.points(result.place))
+        new = self._start(task, result) if isinstance(result, StartResult) else ()
+        if task.key == self._tried and is_last:
             self._tried = ""
             new, self._suspects = [*new, *self._suspects], []
         return self._without_suspects(new)
@@ -143,8 +137,8 @@ class TaskProgress(Office):
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
         done = sum(map(self.costs.measured, factors))
         longest = 0.0
-        for task, n_left, elapsed in running:
-            expected = task.cost_of(first=n_left == task.n_results) * factors[task.group]
+        for task, _, elapsed in running:
+            expected = task.cost / task.n_results * factors[task.group]
             still = self._still(task, expected, elapsed)
             left += still - expected
             done += elapsed
@@ -182,15 +176,6 @@ class TaskProgress(Office):
                 self._suspects.append(task)
         return now
 
-    def _try_again(self, task: Task) -> Sequence[Task]:
-        """What is left of a task that a fault of the machine has ended, once; later it is left to another run."""
-        self._n_faults[task.key] += 1
-        again = self._completion.left(task) if self._n_faults[task.key] <= _TRIES_AGAIN else None
-        if again is None:
-            return ()
-        self._left[again.group] += again.cost
-        return [again]
-
     def _start(self, sweep: Task, result: StartResult) -> Sequence[Task]:
         """The tasks that begin from a start state, whose cost is known better now."""
         planned = self._completion.waiting_for((sweep.number, result.place))
@@ -201,7 +186,6 @@ class TaskProgress(Office):
         return new
 
     def _describe(self, task: Task, n_left: int) -> str:
-        """A running task in words."""
         what = task.describe(task.places[task.n_results - n_left])
         if task.key in self._shares:
             return f"{what} ({100.0 * self._shares[task.key][0]:.0f} %)"
@@ -216,21 +200,12 @@ class StudyRun(TaskProgress):
         self._store = completion.store
         self._models = models
         self.display = display
-        self._said: set[tuple[int, str]] = set()
         self._n_compiled: int | None = n_compiled()
 
     def prepare(self, rank: int, task: Task) -> Task:
         """The task with the models that the rank does not have."""
         self._store.note_begin(task.key)
         return self._models.with_model(rank, task)
-
-    def is_sick(self, rank: int, result: Result) -> bool:
-        """Whether the result is a fault of the machine."""
-        if result.fault and (rank, result.fault) not in self._said:
-            self._said.add((rank, result.fault))
-            again = "the task is tried once more, by another rank where there is one"
-            self.display.say(f"rank {rank}: {result.fault}: a fault of the machine; {again}")
-        return bool(result.fault)
 
     def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
         """Writes and shows what is due."""

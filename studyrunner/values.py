@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import decimal
 from collections.abc import Hashable, Iterable, Iterator, Sequence
-from fractions import Fraction as Rational
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar
 
@@ -116,24 +115,20 @@ class Range(Section):
     def values(self) -> tuple[float, ...]:
         """The values, each the number that a person would write: 212.8, not 212.79999999999998.
 
-        They are computed from the decimals of start and stop without round-off and rounded once, so that `sel` finds
-        them by the number written and a point is the same in a range and in a list. Raises WrongValueError.
+        They are computed from the decimals of start and stop and rounded once, so that `sel` finds them by the number
+        written and a point is the same in a range and in a list. Raises WrongValueError.
         """
         start, stop, num = self.start, self.stop, self.num
         if self.spacing == "log" and min(start, stop) <= 0.0:
             raise WrongValueError(min(start, stop), 'give start and stop above 0 with spacing = "log"')
         if num == 1:
             return (start,)
-        if self.spacing == "log":
-            with decimal.localcontext(prec=40):
-                first, last = (decimal.Decimal(repr(value)).ln() for value in (start, stop))
-                between = (((num - 1 - place) * first + place * last) / (num - 1) for place in range(1, num - 1))
-                return (start, *(float(value.exp()) for value in between), stop)
-        one, other = Rational(repr(start)), Rational(repr(stop))
-        whole = one.denominator * other.denominator
-        low, high = int(one * whole), int(other * whole)
-        # the quotient of two whole numbers is rounded correctly, whatever their length
-        return tuple((low * (num - 1 - place) + high * place) / (whole * (num - 1)) for place in range(num))
+        with decimal.localcontext(prec=60):
+            first, last = (decimal.Decimal(repr(value)) for value in (start, stop))
+            is_log = self.spacing == "log"
+            first, last = (first.ln(), last.ln()) if is_log else (first, last)
+            inner = (((num - 1 - place) * first + place * last) / (num - 1) for place in range(1, num - 1))
+            return (start, *(float(value.exp() if is_log else value) for value in inner), stop)
 
 
 def read_axis(value: object) -> tuple[Any, ...]:

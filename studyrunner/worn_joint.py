@@ -72,7 +72,7 @@ def compute_worn_joint(
         if result.has_modes or result.blocks is not None:
             raise UserError(str(path), "kind of study", None, "give a result of wear histories")
         shown, common = result.shown_point(), _overrides(result)
-        last = result.last_kept(shown)
+        last = result.last_reached(shown)
         title = f"worn by {result.cycle_label(last)} at {result.describe(shown, ('frequency', *result.varying))}"
         given, found = {**common, "scene.worn": _depths(result, shown, last)}, {}
         if loops:
@@ -119,7 +119,7 @@ def _overrides(result: Result) -> dict[str, Any]:
         elif name != "worn_cycle" and not (name == "frequency" and result.followed):
             given[f"axes.{name}"] = float(value) if name == "rtol" else value
     if result.followed:
-        given["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_kept(shown)))
+        given["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
     return given | _ALONE
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,38 +18,34 @@ HISTORY_SAFETY = 1.5
 
 PAIR_OVER_VOLUME = 2.0
 """Relative error of the depth of a pair over that of the worn volume, at least, where four or more pairs wear. With 1
-the deepest pairs of the dovetail at mu = 0.3 are outside of their errors by 2.7 times, and explicit steps at 212.5 Hz,
-48 pairs, by 3.2 times."""
+deep pairs of the dovetail are outside of their errors by 2.7 (mu = 0.3) to 3.2 times (212.5 Hz, 48 pairs, explicit)."""
 
 CROSSING_WINDOW = 0.5
-"""Fraction of the cycle count from which on the largest difference is the error: histories in which an event happens at
-different counts cross each other (dovetail, 211.25 Hz, steps of 2000 cycles: without it the estimate at the crossing is
-a quarter of the true error). Later differences are not used: an error does not depend on the length of the study."""
+"""Fraction of the cycle count from which on the largest difference is the error: histories with an event at different
+counts cross each other (dovetail, 211.25 Hz, steps of 2000 cycles: else a quarter of the true error at the crossing).
+Later differences are not used: an error does not depend on the length of the study."""
 
 
 @dataclass(frozen=True)
 class HistoryError:
     """Estimated errors of a history at its counts; inf where nothing confirms it, NaN beyond the end of the history.
 
-    worn_volume (n_output,): relative; 0 where nothing has worn.
-    wear_depth (n_output, n_contact): m.
-    response, wear_rate (n_output,): relative, of the state at a count.
-    frequency (n_output,): of the excitation, Hz.
+    worn_volume, response, wear_rate (n_output,): relative; of the volume 0 where nothing has worn.
+    wear_depth (n_output, n_contact): m. excitation_frequency (n_output,): Hz.
     """
 
     worn_volume: FloatArray
     wear_depth: FloatArray
     response: FloatArray
     wear_rate: FloatArray
-    frequency: FloatArray
+    excitation_frequency: FloatArray
 
 
 @dataclass(frozen=True)
 class Both:
     """Values of a history and of its reference solution at equal counts.
 
-    counts (n,): ascending. fine, reference: values by name as from `solver.wear.course.Course.read`; the reference has
-        NaN beyond its end, and nothing where there is none.
+    counts (n,): ascending. fine, reference: values as of `Course.read`, none where there is no reference solution.
     follows: whether the frequency of the excitation follows the structure.
     """
 
@@ -69,36 +65,41 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     outputs, steps: both solutions at the counts to report, the first 0, and at the ends of the steps.
     area (n_contact,): m2.
     """
-    fine, safety = outputs.fine, HISTORY_SAFETY
+    fine = outputs.fine
 
     def crossing(differences: FloatArray) -> FloatArray:
-        return safety * largest_before(steps.counts, differences, outputs.counts)
+        return HISTORY_SAFETY * largest_before(steps.counts, differences, outputs.counts)
+
+    def largest(change: Callable[[Both], FloatArray]) -> FloatArray:
+        return np.fmax(HISTORY_SAFETY * change(outputs), crossing(change(steps)))
 
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
-    difference, apart = safety * _depth_change(outputs), _depth_change(steps)
-    error = np.fmax(difference @ area, crossing(apart @ area))
-    # the error of the start state remains, even where later states agree by chance
-    at_start = np.fmax(_start_error(outputs, area), fine["wear_rate_error"][0])
+    difference = HISTORY_SAFETY * _depth_change(outputs)
+    error = np.fmax(difference @ area, crossing(_depth_change(steps) @ area))
+    # the error of the start state remains, even where later states agree by chance: its rates, pair by pair
+    rate, other = (rates[0] * area for rates in (fine["depth_rate"], outputs.other("depth_rate")))
+    known = rate.sum() > 0.0 and np.isfinite(other).all()
+    at_start = np.fmax(np.abs(rate - other).sum() / rate.sum() if known else 0.0, fine["wear_rate_error"][0])
     # start state and steps have nothing to do with each other: the worst case is their sum
     error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume + fine["local"])
-    # no pair is known better than the volume: one that agrees with the reference solution does so by chance. Without
-    # this 5 and 7 of 24 deep pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times
-    of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(_pairs_that_count(depth * area))) * _over(error, volume)
+    # a pair that agrees with the reference solution better than the volume does so by chance (else 5 and 7 of 24 deep
+    # pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times). By the root of the
+    # number of equal pairs that would share the volume its relative error is smaller than that of independent pairs
+    squares = ((depth * area) ** 2).sum(axis=1)
+    n_equal = np.divide(volume**2, squares, out=np.ones_like(squares), where=squares > 0.0)
+    of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(n_equal)) * _over(error, volume)
     with np.errstate(invalid="ignore"):
-        of_pairs = np.fmax(np.fmax(difference, crossing(apart)), np.where(depth > 0.0, of_pair[:, None] * depth, 0.0))
+        of_pairs = np.fmax(largest(_depth_change), np.where(depth > 0.0, of_pair[:, None] * depth, 0.0))
     unknown = np.asarray(~np.isfinite(difference).all(axis=1))
-    response = np.fmax(safety * _response_change(outputs), crossing(_response_change(steps)))
-    response = np.fmax(response, _change_within(volume, error, steps, area))
-    rate = np.fmax(safety * _rate_change(outputs), crossing(_rate_change(steps)))
-    frequency = _frequency_error(outputs, safety, 0.0)
-    return _known(outputs, HistoryError(error, of_pairs, response, rate, frequency), unknown, area)
+    response = np.fmax(largest(_response_change), _change_within(volume, error, steps, area))
+    frequency = _frequency_error(outputs, HISTORY_SAFETY, 0.0)
+    return _known(outputs, HistoryError(error, of_pairs, response, largest(_rate_change), frequency), unknown, area)
 
 
 def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray) -> HistoryError:
     """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter.
 
-    outputs: the history, and the adaptive one in place of the reference solution, at the counts to report.
-    adaptive: errors of the adaptive history at these counts. area (n_contact,): m2.
+    outputs: the history, and the adaptive one in place of the reference solution. adaptive: errors of the latter.
     """
     apart, other = _depth_change(outputs), outputs.other("wear_depth") @ area
     found = HistoryError(
@@ -107,7 +108,7 @@ def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray
         # both relative errors of the adaptive history are nearly those of this one: their values are as large
         _response_change(outputs) + adaptive.response,
         _rate_change(outputs) + adaptive.wear_rate,
-        _frequency_error(outputs, 1.0, adaptive.frequency),
+        _frequency_error(outputs, 1.0, adaptive.excitation_frequency),
     )
     return _known(outputs, found, ~np.isfinite(found.worn_volume), area)
 
@@ -132,25 +133,33 @@ def _known(outputs: Both, found: HistoryError, unknown: BoolArray, area: FloatAr
         np.where(reached[:, None], of_pairs, np.nan),
         of_state("response_error", found.response),
         of_state("wear_rate_error", found.wear_rate),
-        found.frequency,
+        found.excitation_frequency,
     )
 
 
 def error_of_target(
-    target: WearTarget, at: float, other: float, depth: FloatArray, error: HistoryError, rate: float, area: FloatArray
+    target: WearTarget,
+    at: float,
+    other: float,
+    fine: Mapping[str, Any],
+    last_rate: FloatArray,
+    error: HistoryError,
+    area: FloatArray,
 ) -> float:
     """Estimated error of the count at which a history reaches its target: its difference to the other solution, or the
     time that the error of the wear takes, if that is longer.
 
     at, other: counts at which both solutions reach the target; inf or NaN where the other one does not.
-    depth (n_contact,): at the target, m. error: of the history at two counts, of which the target is the second.
-    rate: growth per count of the largest depth, m, or of the worn volume, m3. area (n_contact,): m2.
+    fine, error: values and errors of the history at two counts, of which the target is the second.
+    last_rate (n_contact,): wear rates at the end of the history, m per count. area (n_contact,): m2.
     """
+    depth, weights = fine["wear_depth"][1], area
+    wrong = float(error.worn_volume[1] * (depth @ area))
     if target.quantity == "wear_depth":
         # any pair may have the largest depth within its error
+        weights = np.arange(depth.size) == depth.argmax()
         wrong = float((depth + error.wear_depth[1]).max(initial=0.0) - depth.max(initial=0.0))
-    else:
-        wrong = float(error.worn_volume[1] * (depth @ area))
+    rate = min(float(rates @ weights) for rates in (fine["depth_rate"][1], last_rate))
     by_wear = 0.0 if wrong == 0.0 else wrong / rate if rate > 0.0 else math.inf
     apart = abs(other - at)
     return max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0)
@@ -169,7 +178,7 @@ def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> Fl
 def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
     """Largest difference (n_output, ...) from `CROSSING_WINDOW` times each count up to this count; 0 if none.
 
-    cycles (n,): ascending counts of the differences (n, ...), which are NaN beyond the end of the reference solution.
+    cycles (n,): ascending counts of the differences (n, ...), NaN beyond the end of the reference solution.
     """
     known = np.isfinite(differences).all(axis=tuple(range(1, differences.ndim)))
     at, differences = cycles[known], differences[known]
@@ -179,11 +188,8 @@ def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArr
 
 
 def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: FloatArray) -> FloatArray:
-    """Relative change (n,) of the response while the worn volume passes the values within its error.
-
-    A state is not known better than the depths with which it vibrates.
-
-    volume, error (n,): worn volume and its error, m3. steps: the history at the ends of its steps.
+    """Relative change (n,) of the response while the worn volume (n,), m3, passes the values within its error (n,), m3:
+    a state is not known better than the depths with which it vibrates. steps: the history at the ends of its steps.
     """
     worn, response = steps.fine["wear_depth"] @ area, steps.fine["response"]
     known = np.isfinite(worn)
@@ -203,23 +209,6 @@ def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: Flo
         if size > 0.0:
             found[place] = np.linalg.norm(moved, axis=0).max() / size
     return found
-
-
-def _start_error(both: Both, area: FloatArray) -> float:
-    """Relative difference of the wear rates of both start states, pair by pair; 0 where nothing wears."""
-    rate, other = both.fine["depth_rate"][0] * area, both.other("depth_rate")[0] * area
-    whole = float(rate.sum())
-    return float(np.abs(rate - other).sum()) / whole if whole > 0.0 and np.isfinite(other).all() else 0.0
-
-
-def _pairs_that_count(volumes: FloatArray) -> FloatArray:
-    """Number (n,) of equal pairs that would share the volume as these (n, n_contact); 1 where nothing has worn.
-
-    The relative error of the volume is smaller than that of its pairs by the root of this number where their errors are
-    independent.
-    """
-    squares = (volumes**2).sum(axis=1)
-    return np.asarray(np.divide(volumes.sum(axis=1) ** 2, squares, out=np.ones_like(squares), where=squares > 0.0))
 
 
 def _depth_change(both: Both) -> FloatArray:

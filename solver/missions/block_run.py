@@ -12,7 +12,6 @@ from solver.accuracy.history_error import HISTORY_SAFETY
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import SMOOTH_CHANGE
-from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
@@ -29,8 +28,9 @@ from solver.results.verdict import first_cut_off
 from solver.settings import Direction, Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
-from solver.wear.integrate import Guide, Integrations, SlowTime
+from solver.wear.integrate import Integrations, SlowTime
 from solver.wear.rate_slope import rate_slope
+from solver.wear.slow_time import Guide
 from solver.wear.step import Adaptive
 from solver.wear.wearing_joint import WearingJoint, WearState
 
@@ -55,8 +55,7 @@ class Begun:
     """The way by which a block began in an earlier mission.
 
     nodes: frequencies, rad/s, or load factors of the nodes of its sweep; of a passage the frequencies that count, Hz.
-    start, resolution: the state to which the sweep led, with its errors, and harmonics and samples of the last node;
-        None for a passage.
+    start, resolution: state behind the sweep, and harmonics and samples of the last node; None for a passage.
     """
 
     nodes: tuple[float, ...]
@@ -67,12 +66,12 @@ class Begun:
 @packable
 @dataclass(frozen=True)
 class BlockRun:
-    """A block that was computed once. Rows of the responses: begin and end.
+    """A block that was computed once.
 
     growth (n_contact,): depth worn in the block, m.
-    response (2, n_response): complex first harmonic, m. peak (2, n_response): largest magnitude over a period, m.
+    response, response_peak (2, n_response): complex first harmonic and largest magnitude at begin and end, m.
     slope (n_contact, n_contact): derivative of the growth by the depth before, 1; None if not asked for.
-    response_error, growth_error: estimated relative errors of responses and growth.
+    response_error, growth_error: estimated relative errors.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
     held, cut_off: whether a joint that slides as a whole was held, or a pair at an edge of the contact carries load.
     guide, begun: what the reference solution takes over, and the next mission (None for a block that continues).
@@ -83,7 +82,7 @@ class BlockRun:
 
     growth: FloatArray
     response: ComplexArray
-    peak: FloatArray
+    response_peak: FloatArray
     slope: FloatArray | None = None
     response_error: float = 0.0
     growth_error: float = 0.0
@@ -141,7 +140,6 @@ class BlockCase:
         """The settings, with the time that is left."""
         return replace(self.mission.settings, time_limit=self.deadline - computing_time())
 
-    @property
     def run(self) -> Run:
         """A computation until the deadline."""
         return Run(self.mission.settings.tolerance, Budget(deadline=self.deadline))
@@ -158,9 +156,8 @@ class BlockCase:
         """The joint at the depth before the block, with harmonics, samples and penalty of a state, and this state."""
         friction, mission = self.block.friction_coefficient, self.mission
         case = build_case(self.model, friction, start.penalty_omega, self.settings, start.resolution)
-        work = WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
-        # the limit of the explicit step is not asked for
-        return work, work.begin(np.inf)
+        setup = WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
+        return setup, setup.begin()
 
 
 def run_block(case: BlockCase) -> BlockRun | Failure:
@@ -168,36 +165,37 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     start, begun = find_start(case)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    (work, _), cycles = case.begin(start), case.block.steady[1]
+    (setup, _), cycles = case.begin(start), case.block.steady[1]
     counts = np.array([0.0, cycles])
-    asked = SlowTime(work.wear_coefficient, Adaptive(work.case.settings.rtol), counts, law=work.law, ends_at_last=True)
-    solve = Integrations(work.case, start)
-    guide, every = case.guide, case.every
-    ended = solve.history(asked, stable_end=every) if guide is None else solve.reference(asked, guide, counts)
+    steps, solve = Adaptive(case.mission.settings.rtol), Integrations(setup.case, start)
+    asked = SlowTime(setup.wear_coefficient, steps, counts, law=setup.law, ends_at_last=True)
+    if case.guide is None:
+        ended = solve.history(asked, stable_end=case.every)
+    else:
+        ended = solve.reference(asked, case.guide, counts)
     state = ended.state
     if state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return ended.failure
-    values = ended.course.read(counts)
-    depth, at = values["wear_depth"], state.point.evaluation
-    volume, slope = float(depth[-1] @ work.area), None
+    values, slope = ended.course.read(counts), None
+    depth = values["wear_depth"]
+    volume = float(depth[-1] @ setup.area)
     if case.with_slope:
-        pairs = case.depth + depth[-1] > 0.0
-        rates = rate_slope(work.joint_of(state), at, work.gain(1.0), work.wearing, pairs, work.run)
         # the flow of the linearised wear rate
+        rates = rate_slope(setup, state, case.depth + depth[-1] > 0.0)
         slope = np.asarray(scipy.linalg.expm(cycles * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
     found = BlockRun(
         growth=depth[-1],
         response=values["response"],
-        peak=values["response_peak"],
+        response_peak=values["response_peak"],
         slope=slope,
         response_error=float(np.fmax.reduce(values["response_error"])),
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
         inaccurate=state.worst.largest if state.inaccurate_from <= cycles else 0.0,
         held=state.held_from <= cycles,
         cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
-        guide=Guide(ended.course.resolutions, state.step_limit),
+        guide=Guide(state.resolutions, state.first_length),
         last=_last(state, start) if case.is_continued else None,
         begun=begun,
         iterations=start.newton_iterations + ended.iterations,
@@ -208,16 +206,16 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
 
 def _last(state: WearState, start: StartState) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
-    at, choice = state.point.evaluation, state.choice
+    at = state.at
     assert start.state is not None
     here = replace(start.state, displacement_h=at.displacement_h, contact_force_h=at.force_h)
     return replace(
         start,
-        outcome=Outcome.CONVERGED if choice.accurate else Outcome.INACCURATE,
+        outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
         state=replace(here, start_history=state.point.history),
         resolution=state.resolution,
-        response_error=choice.estimate.response,
-        wear_rate_error=choice.estimate.wear_rate,
+        response_error=state.estimate.response,
+        wear_rate_error=state.estimate.wear_rate,
         message="",
         reference=None,
     )
@@ -240,28 +238,28 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
 
 
 def _again(case: BlockCase, begun: Begun) -> StartState | None:
-    """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None.
+    """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None: where the way
+    has jumped over a fold, there is no stable state, or the way may lead to another branch.
 
     With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
-    Where each pair slips or opens within the period, the state follows from the depths alone. None where the way has
-    jumped over a fold, where there is no stable state, or where the way may lead to another branch.
+    Where each pair slips or opens within the period, the state follows from the depths alone.
     """
-    start, run = begun.start, case.run
+    start, run = begun.start, case.run()
     if start is None or start.state is None or start.branch > 0:
         return None
-    ramp, omega, (work, begins) = case.block.way == "ramp", start.state.omega, case.begin(start)
-    path = LoadingPath(work.case, case.block.excitation_amplitude, omega if ramp else None)
-    at, target = begins.point.evaluation, 1.0 if ramp else omega
-    before = State(at, start.state.start_history, target)
+    ramp, omega, (setup, begins) = case.block.way == "ramp", start.state.omega, case.begin(start)
+    path = LoadingPath(setup.case, case.block.excitation_amplitude, omega if ramp else None)
+    target = 1.0 if ramp else omega
+    before = State(begins.at, start.state.start_history, target)
     try:
         found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if found is None or not path.forgets(found):
             every_node = 1 if case.guide is None else NODES_OF_A_REFERENCE_STEP
             found, most = _through_nodes(path, begun, target, every_node, run), CHANGE_OF_A_WAY
-        if found is None or vibration_change(at, found.evaluation) > most:
+        if found is None or vibration_change(begins.at, found.evaluation) > most:
             return None
         joint = path.joint_at(target)
-        if find_instability(work.case, joint, found.evaluation, run, case.every):
+        if find_instability(setup.case, joint, found.evaluation, run, case.every):
             return None
     except np.linalg.LinAlgError:
         return None
@@ -279,12 +277,10 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: i
     if not isinstance(found, State):
         return None
     states: tuple[State, ...] = (replace(found, parameter=first),)
-    ahead, halvings = [*nodes, target], 0
+    ahead, halvings, rough = [*nodes, target], 0, run.to(coarse.case.settings.rough_tolerance)
     while ahead:
         here, parameter = states[-1], ahead[0]
-        after = coarse.solve(
-            states, parameter, run if parameter == target else run.to(coarse.case.settings.rough_tolerance)
-        )
+        after = coarse.solve(states, parameter, run if parameter == target else rough)
         if after is not None and coarse.change(here, after, float(every_node)) <= LARGEST_CHANGE:
             states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)
@@ -301,13 +297,12 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
     carried: state at the end of the block before, solved first at the depth before the block. Then amplitude and
     frequency change, one after the other, the frequency at the smaller amplitude. Raises OutOfTimeError, LinAlgError.
     """
-    before, run, frequency = carried.state, case.run, case.block.steady[0]
+    before, run, frequency = carried.state, case.run(), case.block.steady[0]
     assert before is not None
-    work, begins = case.begin(carried)
-    at = begins.point.evaluation
-    balance = Balance(work.joint_of(begins), at.history, at.wear_depth)
-    found = run.solve(balance, at.predicted_h)
-    if not found.converged:
+    setup, begins = case.begin(carried)
+    balance = setup.balance_of(begins)
+    found = run.state(balance, begins.at.predicted_h)
+    if found is None:
         return replace(carried, state=None, outcome=Outcome.BRANCH_LOST)
     start = replace(carried, state=periodic_state(balance.joint, State(found.evaluation, before.start_history)))
     along: Direction = "up" if 2.0 * np.pi * frequency > before.omega else "down"
@@ -324,9 +319,9 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
             break
         if here.excitation_amplitude == load if way == "ramp" else here.omega == 2.0 * np.pi * target:
             continue
-        line, (work, begins) = case.line(way, load), case.begin(start)
+        line, (setup, begins) = case.line(way, load), case.begin(start)
         parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
-        if not line.go_on_from(work.case, replace(begins.point, parameter=parameter), target):
+        if not line.go_on_from(setup.case, replace(begins.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)
         _, after = next(follow_line(line, np.array([target])))
         start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)

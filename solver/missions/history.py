@@ -1,24 +1,161 @@
-"""One mission history: integration over the missions, comparison with the reference solution, outcome."""
+"""One mission history: the problem over the slow time, comparison with the reference solution, outcome."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from solver.accuracy.history_error import Both, HistoryError, error_of_target, history_error
+from solver.accuracy.history_error import HistoryError, error_of_target
+from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.missions.integrate import MissionCourse, Missions, worn_by
-from solver.missions.mission import Mission, MissionHistory
-from solver.missions.passage import LARGEST_SWEEP_RATE
+from solver.missions.block_run import Begun, BlockCase, BlockRun, run_block
+from solver.missions.mission import Mission, MissionHistory, Passage
+from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
+from solver.missions.step import Nodes, Step, attempt_step, values_of
 from solver.model import FloatArray
+from solver.newton.run import Budget
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
-from solver.packing import Packed, unpack
+from solver.packing import Packed, packable
 from solver.results.verdict import describe_cut_off, describe_uncertain
-from solver.wear.integrate import ENDS_ALL
+from solver.wear.course import Course, Node
+from solver.wear.history import compare
+from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Ended, Guide, Integrator, Solutions, guarded
+
+STEP_ERROR = 0.5
+"""Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
+Missions of a slider: estimated over true error at least 1.7. With 0.25 two cases of the tests compute 21.5 and 33 of
+2000 missions, with 0.5 fewer than 20 and 30."""
+
+
+@packable
+@dataclass(frozen=True)
+class MissionState:
+    """A joint after some missions; the next step depends on it alone.
+
+    nodes: ends of the last three steps. inaccurate, sweep_rate (n_block,): largest values of the blocks so far.
+    length: missions of the next step. runs, first: blocks of the last and of the first mission.
+    held_from, cut_off_from: missions before the first step with such a block, inf if never.
+    """
+
+    nodes: Nodes
+    inaccurate: FloatArray
+    sweep_rate: FloatArray
+    length: float = 1.0
+    runs: tuple[BlockRun, ...] = ()
+    first: tuple[BlockRun, ...] = ()
+    held_from: float = math.inf
+    cut_off_from: float = math.inf
+
+
+class MissionProblem:
+    """A mission history, or its reference solution, as a problem over the slow time; the line of `take_step`.
+
+    fine: the history of which it is the reference solution; None for a history.
+    """
+
+    # each step computes at least one mission
+    iterations_per_save = 0
+
+    def __init__(self, mission: Mission, fine: Ended | None = None) -> None:
+        self.mission, self.fine, self.budget = mission, fine, Budget()
+        self.last = mission.missions[-1] if fine is None else int(fine.course.ends[-1])
+        # how each block began last, and why a step was not found
+        self._begun: list[Begun | None] = []
+        self._failure = Failure(Outcome.MARCH_FAILED)
+
+    def saved(self, state: MissionState) -> MissionState:
+        """As in SlowProblem: blocks are as read from a file."""
+        return state
+
+    def advance(self, state: MissionState | None, course: Course) -> tuple[MissionState, Course] | Failure:
+        """As in SlowProblem."""
+        if state is None:
+            nothing = np.zeros(len(self.mission.blocks))
+            state = MissionState(course.nodes, nothing, nothing)
+        done = int(course.ends[-1])
+        if done >= self.last or (self.fine is None and not math.isnan(course.reached)):
+            return AS_ASKED
+        longest = min(self.last - done, self.mission.largest_step or self.last)
+        longest = min(longest, self.last if len(course.ends) > 2 else 1)
+        begins = state.runs if done or self.fine is None else self.fine.state.first
+        self._begun = [run.begun for run in begins] or [None] * len(self.mission.blocks)
+        taken = take_step(self, state, min(state.length, longest), Lengths(2, shortest=1, rescue=1))
+        if isinstance(taken, Failure):
+            return taken
+        step, length = taken
+        runs = tuple(replace(run, slope=None) for run in step.runs)
+        after = replace(
+            state,
+            nodes=(*state.nodes, step.node)[-3:],
+            length=length,
+            runs=runs,
+            first=state.first or tuple(replace(run, last=None) for run in runs),
+            inaccurate=np.maximum([run.inaccurate for run in runs], state.inaccurate),
+            sweep_rate=np.maximum([run.sweep_rate for run in runs], state.sweep_rate),
+            held_from=min(state.held_from, done if any(run.held for run in runs) else math.inf),
+            cut_off_from=min(state.cut_off_from, done if any(run.cut_off for run in runs) else math.inf),
+        )
+        if not done:
+            # the rate and the values of the unworn joint are those of the first mission
+            course = replace(course, nodes=(replace(step.node, count=0.0, depth=course.nodes[0].depth),))
+        return after, course.after(step.node)
+
+    def attempt(self, state: MissionState, length: float) -> Step | None:
+        """As in Line. The last mission of the step is computed."""
+        rtol = self.mission.settings.rtol * (1.0 if self.fine is None else RTOL_RATIO)
+        run = partial(self._mission, state, int(state.nodes[-1].count + length))
+        found = attempt_step(state.nodes, int(length), self.mission.area, run, STEP_ERROR * rtol)
+        if isinstance(found, Step):
+            return found
+        self._failure = found
+        return None
+
+    def judge(self, _: MissionState, end: Step, __: float) -> float:
+        """As in Line."""
+        return end.ratio
+
+    def rescue(self, _: MissionState, __: float) -> Failure:
+        """As in Line: a mission that fails by itself ends the history."""
+        return self._failure
+
+    def _mission(
+        self, state: MissionState, number: int, depth: FloatArray, with_slopes: bool
+    ) -> tuple[BlockRun, ...] | Failure:
+        """Compute the blocks of the mission of a number behind a state. depth (n_contact,): m, before the mission."""
+        mission, carried = self.mission, state.runs[-1].last if state.runs else None
+        guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
+        if self.fine is not None:
+            guides = self.fine.course.nodes[int(np.searchsorted(self.fine.course.counts, number))].guides
+        # as in a wear history: stability is tested at the begin and the end
+        every = self.fine is None and number in (1, mission.missions[-1])
+        runs: list[BlockRun] = []
+        for place, (block, guide, begun) in enumerate(zip(mission.blocks, guides, self._begun, strict=True)):
+            case = BlockCase(mission, place, depth, self.budget.deadline, carried, begun, guide, with_slopes, every)
+            through = run_passage if isinstance(block.frequency, Passage) else run_block
+            found = guarded(partial(through, case))
+            if isinstance(found, Failure):
+                said = f"in mission {number}, {mission.called(place)}"
+                return Failure(found.outcome, ": ".join(filter(None, (said, found.message))))
+            runs.append(found)
+            self._begun[place] = found.begun or begun
+            self.budget.iterations += found.iterations
+            depth, carried = depth + found.growth, found.last
+        return tuple(runs)
+
+
+def unworn_course(mission: Mission) -> Course:
+    """The course before the first mission, whose blocks have no values yet."""
+    nothing = np.zeros(mission.area.size)
+    unknown = np.full((2, len(mission.blocks[0].model.response_names)), np.nan)
+    runs = (BlockRun(nothing, unknown.astype(complex), unknown),) * len(mission.blocks)
+    course = Course(mission.area, np.array(mission.missions, np.float64), mission.until)
+    row = np.tile(nothing, len(runs))
+    return course.after(Node(0.0, row, row, values_of(runs) | {"local": nothing}))
 
 
 def integrate_missions(
@@ -29,34 +166,34 @@ def integrate_missions(
     keep: called after each step with the progress. resume: such progress of an equal mission, which goes on from there
     with a result that is equal to the last bit, except `run_time`.
     """
-    missions = Missions(mission, keep, None if resume is None else unpack(resume))
-    fine, reference = missions.history(), MissionCourse.unworn(mission)
-    if len(fine.nodes) > 1 and (fine.failure is None or fine.failure.outcome not in ENDS_ALL):
-        reference = missions.reference(fine)
-        if reference.failure is not None and reference.failure.outcome in ENDS_ALL:
-            fine = replace(fine, failure=reference.failure)
-    history = replace(_assembled(mission, fine, reference), run_time=missions.spent)
+    unworn, integrator = unworn_course(mission), Integrator(mission.settings.time_limit, keep, resume)
+    fine = integrator.integrate("history", MissionProblem(mission), unworn)
+    solutions = Solutions(fine, fine)
+    if fine.state is not None and fine.failure.outcome not in ENDS_ALL:
+        reference = integrator.integrate("reference", MissionProblem(mission, fine), unworn, fine.seconds)
+        solutions = Solutions(fine, fine, reference)
+    history = _assembled(mission, solutions, unworn if solutions.reference is None else solutions.reference.course)
     if history.outcome is not Outcome.CONVERGED:
         return history
-    failure = _judged(mission, fine, history)
+    failure = _judged(mission, solutions, history)
     return replace(history, outcome=failure.outcome, message=failure.message)
 
 
-def _assembled(mission: Mission, fine: MissionCourse, reference: MissionCourse) -> MissionHistory:
+def _assembled(mission: Mission, solutions: Solutions, reference: Course) -> MissionHistory:
     """The result, from both solutions."""
-    counts, area = np.array(mission.missions, np.float64), mission.area
-    growth, values = fine.growth_at(counts), fine.values_at(counts)
+    course, state, failure = solutions.own.course, solutions.own.state, solutions.failure
+    counts, area, n_block = np.array(mission.missions, np.float64), mission.area, len(mission.blocks)
+    values, target = course.read(counts), course.reached
+    growth = values["wear_depth"].reshape(counts.size, n_block, -1)
     depth = growth.sum(axis=1)
-    whole, *blocks = _errors(mission, counts, fine, reference)
+    whole, *blocks = _errors(mission, counts, course, reference)
     reached = np.flatnonzero(np.isfinite(whole.worn_volume))
-    failure, target = fine.failure or Failure(Outcome.CONVERGED), fine.missions_to_target(mission)
-    if math.isinf(target):
-        target = math.nan
+    other = reference.read(counts)["wear_depth"].reshape(growth.shape).sum(axis=1)
     return MissionHistory(
         response_begin=values["response"][:, :, 0],
         response_end=values["response"][:, :, 1],
-        response_peak_begin=values["peak"][:, :, 0],
-        response_peak_end=values["peak"][:, :, 1],
+        response_peak_begin=values["response_peak"][:, :, 0],
+        response_peak_end=values["response_peak"][:, :, 1],
         response_error=np.array([each.response for each in blocks]).T,
         excitation_frequency=np.array([block.ends for block in mission.blocks]),
         outcome=failure.outcome,
@@ -68,37 +205,33 @@ def _assembled(mission: Mission, fine: MissionCourse, reference: MissionCourse) 
         wear_depth_error=whole.wear_depth,
         block_volume=growth @ area,
         block_volume_error=np.array([each.worn_volume for each in blocks]).T,
-        reference_volume=reference.growth_at(counts).sum(axis=1) @ area,
-        sweep_rate=fine.largest("sweep_rate"),
+        reference_volume=other @ area,
+        sweep_rate=np.zeros(n_block) if state is None else state.sweep_rate,
         error_estimate=float(whole.worn_volume[reached[-1]]) if reached.size else math.nan,
-        last_mission=float(fine.ends[-1]),
-        steps=np.diff(fine.ends),
+        last_mission=course.ends[-1],
+        steps=np.diff(course.ends),
         missions_to_target=target,
-        missions_to_target_error=_target_error(mission, target, fine, reference),
-        newton_iterations=fine.iterations + reference.iterations,
-        run_time=math.nan,
+        missions_to_target_error=_target_error(mission, target, course, reference),
+        newton_iterations=sum(each.iterations for each in solutions.all),
+        run_time=sum(each.seconds for each in solutions.all),
     )
 
 
-def _errors(mission: Mission, counts: FloatArray, fine: MissionCourse, reference: MissionCourse) -> list[HistoryError]:
+def _errors(mission: Mission, counts: FloatArray, fine: Course, reference: Course) -> list[HistoryError]:
     """Errors of the whole wear, and of wear and responses of each block, at the counts (n_output,), the first 0."""
-    blocks = list(range(len(mission.blocks)))
-    found = []
-    for chosen in (blocks, *([place] for place in blocks)):
-        outputs, steps = (
-            Both(rows, _values_of(chosen, mission.area, fine, rows), _values_of(chosen, mission.area, reference, rows))
-            for rows in (counts, fine.ends)
-        )
-        found.append(history_error(outputs, steps, mission.area))
+    n_block, area = len(mission.blocks), mission.area
+    parts = (slice(None), *(slice(place, place + 1) for place in range(n_block)))
+    whole, *blocks = (compare(counts, fine, reference, area, partial(_of_blocks, part, area))[1] for part in parts)
     # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
-    local = np.where(counts[:, None] > 0.0, fine.values_at(counts)["local"], 0.0)
-    return [replace(found[0], wear_depth=np.fmax(found[0].wear_depth, local)), *found[1:]]
+    local = np.where(counts[:, None] > 0.0, fine.read(counts)["local"], 0.0)
+    return [replace(whole, wear_depth=np.fmax(whole.wear_depth, local)), *blocks]
 
 
-def _values_of(chosen: list[int], area: FloatArray, course: MissionCourse, missions: FloatArray) -> dict[str, Any]:
-    """Wear of some blocks together, and their responses, at numbers of missions, in the terms of a wear history."""
-    n, growth, values = missions.size, course.growth_at(missions), course.values_at(missions)
-    rates = values["rate"][:, chosen]
+def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[str, Any]:
+    """Wear of some blocks together, and their responses, in the terms of a wear history."""
+    n = len(values["local"])
+    growth, rates = (values[name].reshape(n, -1, area.size) for name in ("wear_depth", "depth_rate"))
+    rates = rates[:, chosen]
     volumes = np.nan_to_num(rates @ area)
     errors = np.nan_to_num(values["growth_error"][:, chosen], posinf=np.inf)
     # the error of a block that wears nothing may be unknown
@@ -116,42 +249,39 @@ def _values_of(chosen: list[int], area: FloatArray, course: MissionCourse, missi
         "wear_rate_error": rate_error,
         "local": np.fmax(share * (values["local"] @ area) - first * (depth @ area), 0.0),
         "response": values["response"][:, chosen].reshape(n, -1),
-        "response_peak": values["peak"][:, chosen].reshape(n, -1),
+        "response_peak": values["response_peak"][:, chosen].reshape(n, -1),
         "response_error": np.fmax.reduce(values["response_error"][:, chosen], axis=1),
     }
 
 
-def _target_error(mission: Mission, at: float, fine: MissionCourse, reference: MissionCourse) -> float:
-    """Estimated error of the number of missions to the target, NaN where it was never reached.
-
-    The rate of the wear is that of the last step.
-    """
+def _target_error(mission: Mission, at: float, fine: Course, reference: Course) -> float:
+    """Estimated error of the number of missions to the target, NaN where it was never reached."""
     if mission.until is None or math.isnan(at):
         return math.nan
-    whole, *_ = _errors(mission, np.array([0.0, at]), fine, reference)
-    depth = fine.growth_at(np.array([at])).sum(axis=1)[0]
-    before, end = fine.nodes[-2:]
-    per_mission = (worn_by(mission, end.growth) - worn_by(mission, before.growth)) / (end.mission - before.mission)
-    other = reference.missions_to_target(mission)
-    return error_of_target(mission.until, at, other, depth, whole, per_mission, mission.area)
+    counts, ahead = np.array([0.0, at]), reference.reach_ahead(mission.until)
+    whole, *_ = _errors(mission, counts, fine, reference)
+    values = _of_blocks(slice(None), mission.area, fine.read(counts))
+    last_rate = fine.nodes[-1].rate.reshape(-1, mission.area.size).sum(axis=0)
+    return error_of_target(mission.until, at, ahead, values, last_rate, whole, mission.area)
 
 
-def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> Failure:
+def _judged(mission: Mission, solutions: Solutions, history: MissionHistory) -> Failure:
     """The outcome of a complete history, and its sentence."""
-    rtol, held, cut_off = mission.settings.rtol, fine.first_with("held"), fine.first_with("cut_off")
-    if cut_off < math.inf:
-        return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(cut_off).replace("cycle", "mission"))
-    inaccurate, outcome, said = fine.largest("inaccurate"), Outcome.CONVERGED, []
-    worst = int(np.argmax(inaccurate))
+    rtol, state = mission.settings.rtol, solutions.own.state
+    if state.cut_off_from < math.inf:
+        return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(state.cut_off_from).replace("cycle", "mission"))
+    outcome, said, worst = Outcome.CONVERGED, [], int(np.argmax(state.inaccurate))
     if history.error_estimate > SENSITIVE_ERROR:
         outcome, last = Outcome.SENSITIVE, np.flatnonzero(np.isfinite(history.worn_volume))[-1]
         volumes = history.worn_volume[last], history.reference_volume[last]
         said.append(describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps"))
-    elif inaccurate[worst] > 0.0:
+    elif state.inaccurate[worst] > 0.0:
         outcome = Outcome.INACCURATE
-        said.append(f"in {mission.called(worst)} the vibration {known_to(float(inaccurate[worst]), rtol)}")
-    if held < math.inf:
-        said.append(f"from mission {held:.0f} on only friction holds the joint in one direction: it is held there")
+        said.append(f"in {mission.called(worst)} the vibration {known_to(float(state.inaccurate[worst]), rtol)}")
+    if state.held_from < math.inf:
+        said.append(
+            f"from mission {state.held_from:.0f} on only friction holds the joint in one direction: it is held there"
+        )
     for place in np.flatnonzero(history.sweep_rate > LARGEST_SWEEP_RATE):
         name, rate = mission.called(int(place)), history.sweep_rate[place]
         passes = f"passes at {rate:.2g} (zeta f)^2" if np.isfinite(rate) else "has no damping where the joint sticks"

@@ -8,7 +8,7 @@ from typing import Literal
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.outcome import Outcome
-from solver.presentation import PresentedHistory
+from solver.presentation import Presented
 from solver.settings import Direction, SolverSettings, WearTarget
 
 Begin = Literal["ramp", "up", "down", "continue"]
@@ -39,8 +39,7 @@ class Block:
     """A part of a mission: steady vibration for a number of cycles, or a passage (`solver.missions.passage`).
 
     - model: the joint, e.g. at the speed of the block. All blocks of a mission have equal contact pairs.
-    - frequency: Hz, or a passage.
-    - excitation_amplitude: N.
+    - frequency: Hz, or a passage. excitation_amplitude: N.
     - friction_coefficient: one number, (n_contact,) for each pair, or None for the model's own.
     - cycles: of the block in one mission, above 0; None for a passage, whose cycles follow from its rate.
     - begin: "ramp", "up" and "down": from the static state of the model with the depths worn so far, as `sweep` of
@@ -113,7 +112,7 @@ class Mission:
 
 
 @dataclass(frozen=True, repr=False)
-class MissionHistory(PresentedHistory):
+class MissionHistory(Presented):
     """A joint over its missions, at `n_output` numbers of missions. Values not reached are NaN, all errors estimated.
 
     - missions (n_output,): numbers of missions.

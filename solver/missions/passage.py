@@ -13,15 +13,14 @@ the first frequencies acts back on the later ones: the depth y since the start o
 with the implicit trapezoidal rule in the order of the passage. The square of this correction, relative to the wear, is
 a part of the error, and falls with the wear of one passage.
 
-The vibration follows the frequency with a delay: what it differs from that of the steady state dies out as
-exp(-zeta omega t), so that it belongs to a frequency passed before, by the lag |df/dt| / (2 pi zeta f). A passage wears
-less or more than its steady states by at most the lag times the largest wear over frequency: a part of the error. The
-damping ratio zeta is that of the structure with its closed pairs sticking; friction damps more where pairs slip. The
-sweep rate |df/dt| / (zeta f)^2 says how fast a passage is. Without damping the wear is not known.
+The vibration follows the frequency with a delay: its difference to the steady state dies out as exp(-zeta omega t), so
+that it belongs to a frequency passed before, by the lag |df/dt| / (2 pi zeta f). A passage wears less or more than its
+steady states by at most the lag times the largest wear over frequency: a part of the error. The damping ratio zeta is
+that of the structure with its closed pairs sticking; friction damps more where pairs slip. The sweep rate
+|df/dt| / (zeta f)^2 says how fast a passage is. Without damping the wear is not known.
 
-A vibration passes df in the time df / |df/dt|, in which it does not tell apart frequencies that are closer than
-1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of frequencies suffices at
-the resonance of a structure without damping that friction does not limit: its integral is infinite.
+A vibration does not tell apart frequencies that are closer than the inverse of the time between them: an interval far
+below sqrt(|df/dt|) is not divided. At a resonance without damping or friction the integral is infinite.
 """
 
 from __future__ import annotations
@@ -44,8 +43,8 @@ from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
 from solver.structure.joint import friction_of_pairs
-from solver.wear.integrate import RTOL_RATIO, Guide
 from solver.wear.rate_slope import rate_slope
+from solver.wear.slow_time import RTOL_RATIO, Guide
 
 FIRST_FREQUENCIES = 17
 """Frequencies before those that are added."""
@@ -104,38 +103,35 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
     states = ascending[:: 1 if passage.sweep == "up" else -1]
     starts, parts = [state.start for state in ascending], parts_of(ascending)
     volume = float(parts.sum(axis=0) @ area)
-
-    def slope_of(state: SweptState) -> FloatArray:
-        """Derivative (n_contact, n_contact) of the density with respect to the depths, 1/Hz."""
-        pairs = (state.density > 0.0) | (case.depth > 0.0)
-        if not state.density.any():
-            return np.zeros((pairs.size, pairs.size))
-        work, begun = case.begin(state.start)
-        slope = rate_slope(work.joint_of(begun), begun.point.evaluation, work.gain(1.0), work.wearing, pairs, work.run)
-        return np.asarray(slope * state.frequency / passage.rate)
-
-    growth, slope = in_order(states, map(slope_of, states))
+    growth, slope = in_order(states, (_slope_of(case, state) for state in states))
     sweep_rate, lag = delay_of(case, ascending)
     error = swept.error + float((parts @ area) @ [start.wear_rate_error for start in starts])
     error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
     error += min(lag * max(float(state.density @ area) for state in states), volume)
     ends, inaccurate = (states[0], states[-1]), [each for each in starts if each.outcome is Outcome.INACCURATE]
-    resolutions = tuple((state.frequency, state.start.resolution) for state in ascending)
     found = BlockRun(
         growth=growth,
         response=np.array([state.response for state in ends]),
-        peak=np.array([state.peak for state in ends]),
+        response_peak=np.array([state.peak for state in ends]),
         slope=slope if case.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
         inaccurate=max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0),
-        guide=Guide(resolutions, math.nan),
+        guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start if case.is_continued else None,
         begun=Begun(swept.needed),
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
     return in_rows(found)
+
+
+def _slope_of(case: BlockCase, state: SweptState) -> FloatArray:
+    """Derivative (n_contact, n_contact) of the density of a state with respect to the depths, 1/Hz."""
+    if not state.density.any():
+        return np.zeros((state.density.size, state.density.size))
+    slope = rate_slope(*case.begin(state.start), (state.density > 0.0) | (case.depth > 0.0))
+    return np.asarray(slope * state.frequency / case.block.passage.rate)
 
 
 def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -171,10 +167,9 @@ def find_states(case: BlockCase) -> Swept | Failure:
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
-    wanted = list(case.begun.nodes if case.begun else least)
+    wanted, iterations = list(case.begun.nodes if case.begun else least), 0
     states: list[SweptState] = []
-    iterations = 0
-    while True:
+    while wanted:
         found = states_at(case, np.array(sorted(wanted)))
         if isinstance(found, Failure):
             return found
@@ -190,8 +185,7 @@ def find_states(case: BlockCase) -> Swept | Failure:
         if error > allowed and len(states) < MOST_FREQUENCIES:
             for place in np.flatnonzero(errors > allowed / len(errors)):
                 wanted.extend(_between(states[place], states[place + 1], FINEST_INTERVAL * passage.rate**0.5))
-        if not wanted:
-            return Swept(tuple(states), error, iterations, _needed(states, errors, allowed / len(errors), least))
+    return Swept(tuple(states), error, iterations, _needed(states, errors, allowed / len(errors), least))
 
 
 def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least: Sequence[float]) -> tuple[float, ...]:
@@ -210,8 +204,9 @@ def _between(one: SweptState, other: SweptState, finest: float) -> list[float]:
     """Further frequencies between two, Hz: both sides of a jump, or the middle of an interval above `finest`, Hz."""
     low, high = one.frequency, other.frequency
     near = NEGLIGIBLE * low
-    jumps = {state.start.fold_frequency for state in (one, other)}
-    folds = [fold for fold in sorted(jumps) if low + near < fold < high - near]
+    folds = [
+        fold for fold in sorted({each.start.fold_frequency for each in (one, other)}) if low + near < fold < high - near
+    ]
     if one.start.branch != other.start.branch and folds:
         return [side for fold in folds for side in (fold - near, fold + near)]
     return [0.5 * (low + high)] if high - low > max(2.0 * near, finest) else []
@@ -226,11 +221,11 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
     at, density = np.array([state.frequency for state in states]), np.array([state.density for state in states])
     branch = np.array([state.start.branch for state in states])
     width, rise = np.diff(at), np.diff(density, axis=0)
-    # divided differences of three states (n - 2, n_contact), NaN across a jump
-    bent = np.abs(np.diff(rise / width[:, None], axis=0)) / (at[2:] - at[:-2])[:, None]
-    bent[(branch[2:] != branch[1:-1]) | (branch[1:-1] != branch[:-2])] = np.nan
-    padded = np.vstack([np.full((1, area.size), np.nan), bent, np.full((1, area.size), np.nan)])
-    second = np.fmax(padded[:-1], padded[1:])
+    # divided differences of three states (n, n_contact), NaN across a jump and at both ends
+    bent = np.full_like(density, np.nan)
+    bent[1:-1] = np.abs(np.diff(rise / width[:, None], axis=0)) / (at[2:] - at[:-2])[:, None]
+    bent[1:-1][(branch[2:] != branch[1:-1]) | (branch[1:-1] != branch[:-2])] = np.nan
+    second = np.fmax(bent[:-1], bent[1:])
     errors = np.where(np.isnan(second), 0.5 * width[:, None] * np.abs(rise), second * width[:, None] ** 3 / 6.0)
     return np.asarray(errors @ area)
 
@@ -247,11 +242,11 @@ def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Fa
             return Failure(start.outcome, start.message)
         if computing_time() > case.deadline:
             return Failure(Outcome.TIME_LIMIT)
-        work, begun = case.begin(start)
-        at, joint, frequency = begun.point.evaluation, work.joint_of(begun), float(frequencies[index])
-        density = work.rate(at) * frequency / passage.rate
-        response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
-        found.append(SweptState(frequency, start, density, response, largest_responses(joint, at)))
+        setup, begun = case.begin(start)
+        joint, frequency = setup.joint_of(begun), float(frequencies[index])
+        density = setup.rate(begun.at) * frequency / passage.rate
+        response = to_complex(joint.structure.response_h(joint.to_relative(begun.at.displacement_h)))[:, 0]
+        found.append(SweptState(frequency, start, density, response, largest_responses(joint, begun.at)))
     return found
 
 

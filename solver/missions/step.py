@@ -16,15 +16,15 @@ falls, and each block has its part of the sum. With the third divided difference
     e = w H (H + a) (H - 1) (H - 1 + a) / (2H - 1 + a).
 
 Z is found by Newton's method. The derivative of R is the product of the flows of the linearised wear rates of the
-blocks, corrected by Broyden's method where a second iteration is needed. As the parabola through three nodes before is
-near, one mission is enough for most steps: by how much the derivative misses the change of the wear since the last
-node is a part of the error of the step.
+blocks, corrected by Broyden's method where a second iteration is needed. Mostly one mission is enough: by how much the
+derivative misses the change of the wear since the last node is a part of the error of the step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,11 +32,15 @@ from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
 from solver.model import FloatArray
 from solver.outcome import Outcome
-from solver.packing import packable
+from solver.wear.course import Node
 from solver.wear.step import allowed_error
 
 RunMission = Callable[[FloatArray, bool], tuple[BlockRun, ...] | Failure]
 """Computes the blocks of a mission: depth before (n_contact,), m, and whether slopes are asked for."""
+
+Nodes = tuple[Node, ...]
+"""Ends of steps, of which the last missions were computed, with the depths and rates of all blocks in one row. Values
+(n_block, ...) by their names in `BlockRun`, and `local` (n_contact,): sum of the errors of steps and blocks, m."""
 
 MOST_ITERATIONS = 6
 """Most missions computed for a step. Sliders and roots need 1 to 3."""
@@ -45,34 +49,12 @@ DEPTH_TOLERANCE = 0.1
 """Error of the depth before the mission, as worn volume, over the allowed error of the step."""
 
 
-@packable
-@dataclass(frozen=True)
-class MissionNode:
-    """The end of a step over missions, of which the last mission was computed.
-
-    mission: missions computed so far. growth (n_block, n_contact): depth worn by each block so far, m.
-    rate (n_block, n_contact): in the last mission, m; in the first node in the first mission.
-    local (n_contact,): sum of the local errors of the steps and of the errors of the blocks so far, m.
-    runs: the blocks of the last mission; without values in the first node.
-    """
-
-    mission: int
-    growth: FloatArray
-    rate: FloatArray
-    local: FloatArray
-    runs: tuple[BlockRun, ...]
-
-    @property
-    def depth(self) -> FloatArray:
-        """Worn depth (n_contact,), m."""
-        return np.asarray(self.growth.sum(axis=0))
-
-
 @dataclass(frozen=True)
 class Step:
-    """A step that was computed. node: its end. ratio: estimated local error over the allowed one."""
+    """A computed step: its end, the blocks of its last mission, and its estimated local error over the allowed one."""
 
-    node: MissionNode
+    node: Node
+    runs: tuple[BlockRun, ...]
     ratio: float
 
 
@@ -92,35 +74,33 @@ class Formula:
     share: float
 
     @classmethod
-    def of(cls, nodes: tuple[MissionNode, ...], length: int) -> Formula:
+    def of(cls, nodes: Nodes, length: int, area: FloatArray) -> Formula:
         """The formula of a step of some missions."""
-        past, before, now = nodes[-3:]
-        h, a, b = float(length), float(now.mission - before.mission), float(before.mission - past.mission)
-        last = (now.growth - before.growth) / a
-        turn = (last - (before.growth - past.growth) / b) / (a + b)
-        first, ahead = ((now.growth + at * last + at * (at + a) * turn).sum(axis=0) for at in (h - 1.0, h))
+        past, before, now = (node.depth.reshape(-1, area.size) for node in nodes[-3:])
+        h, (b, a) = float(length), np.diff([node.count for node in nodes[-3:]])
+        last = (now - before) / a
+        turn = (last - (before - past) / b) / (a + b)
+        first, ahead = ((now + at * last + at * (at + a) * turn).sum(axis=0) for at in (h - 1.0, h))
         whole = 2.0 * h - 1.0 + a
-        base = now.growth + (h - 1.0) * h / whole * last
-        factor = (h - 1.0) * (h - 1.0 + a) / whole
-        return cls(base, factor, np.maximum(first, base.sum(axis=0)), ahead, factor / (h + a + b))
+        base = now + (h - 1.0) * h / whole * last
+        factor = float((h - 1.0) * (h - 1.0 + a) / whole)
+        return cls(base, factor, np.maximum(first, base.sum(axis=0)), ahead, float(factor / (h + a + b)))
 
 
-def attempt_step(
-    nodes: tuple[MissionNode, ...], length: int, area: FloatArray, run: RunMission, share: float
-) -> Step | Failure:
+def attempt_step(nodes: Nodes, length: int, area: FloatArray, run: RunMission, share: float) -> Step | Failure:
     """A step over missions; over more than one from the third mission on.
 
-    nodes: ends of all steps before. area (n_contact,): m2. share: allowed error as in `allowed_error`.
+    nodes: ends of the last three steps, or of all. area (n_contact,): m2. share: as in `allowed_error`.
     """
     now = nodes[-1]
+    depth_now, rate_before = (row.reshape(-1, area.size).sum(axis=0) for row in (now.depth, now.rate))
     if length == 1:
-        runs = run(now.depth, False)
+        runs = run(depth_now, False)
         return runs if isinstance(runs, Failure) else _one_mission(nodes, area, runs, share)
-    formula, unit = Formula.of(nodes, length), np.eye(now.depth.size)
+    formula, unit = Formula.of(nodes, length, area), np.eye(area.size)
     base, factor, depth = formula.base.sum(axis=0), formula.factor, formula.first
     slope, last = np.zeros_like(unit), None
-    rate_before = now.rate.sum(axis=0)
-    depth_before = now.depth - rate_before
+    depth_before = depth_now - rate_before
     for _ in range(MOST_ITERATIONS):
         runs = run(depth, last is None)
         if isinstance(runs, Failure):
@@ -128,7 +108,11 @@ def attempt_step(
         rates = np.array([each.growth for each in runs])
         rate = rates.sum(axis=0)
         if last is None:
-            slope = mission_slope(runs)
+            whole = unit
+            for each in runs:
+                assert each.slope is not None
+                whole = (unit + each.slope) @ whole
+            slope = whole - unit
         else:
             moved, change = depth - last[0], rate - last[1]
             slope = slope + np.outer(change - slope @ moved, moved) / max(float(moved @ moved), 1e-300)
@@ -148,45 +132,43 @@ def attempt_step(
         part = np.abs(depth - last[0]) @ area / max(float(np.abs(last[0] - depth_before) @ area), 1e-300)
         left = factor * part * missed
         error = np.abs(formula.share * (end - formula.ahead)) + left
-        most = allowed_error(share, float(now.depth @ area), float(end @ area), now.mission, length)
+        most = allowed_error(share, float(depth_now @ area), float(end @ area), now.count, length)
         ratio = float(error @ area) / most
         if ratio > 1.0 or left @ area <= DEPTH_TOLERANCE * most:
-            return Step(_node(now, length, formula.base + (factor + 1.0) * rates, rates, runs, error), ratio)
-    said = f"the depth before mission {now.mission + length}, {length} missions at once, was not found"
+            return Step(_end_of(now, length, formula.base + (factor + 1.0) * rates, rates, runs, error), runs, ratio)
+    said = f"the depth before mission {now.count + length:.0f}, {length} missions at once, was not found"
     return Failure(Outcome.MARCH_FAILED, said)
 
 
-def _one_mission(nodes: tuple[MissionNode, ...], area: FloatArray, runs: tuple[BlockRun, ...], share: float) -> Step:
+def _one_mission(nodes: Nodes, area: FloatArray, runs: tuple[BlockRun, ...], share: float) -> Step:
     """A step of one mission, whose error is 0; its ratio is that of two missions, for the length of the next step."""
     now, rates = nodes[-1], np.array([each.growth for each in runs])
-    end = _node(now, 1, now.growth + rates, rates, runs, np.zeros_like(now.depth))
+    grown = now.depth.reshape(rates.shape)
+    end = _end_of(now, 1, grown + rates, rates, runs, np.zeros(area.size))
     if len(nodes) < 3:
-        return Step(end, 0.0)
-    a, b = (float(after.mission - before.mission) for before, after in ((nodes[-2], now), (nodes[-3], nodes[-2])))
-    two = Formula.of(nodes, 2)
+        return Step(end, runs, 0.0)
+    two, (b, a) = Formula.of(nodes, 2, area), np.diff([node.count for node in nodes[-3:]])
     # the error grows with the third divided difference
     growth = 2.0 * (2.0 + a) * (2.0 + a + b) / ((1.0 + a) * (1.0 + a + b))
-    error = two.share * growth * float(np.abs(end.depth - two.first) @ area)
-    most = 2.0 * allowed_error(share, float(now.depth @ area), float(end.depth @ area), now.mission, 1)
-    return Step(end, min(0.25 * error / most, 1.0))
+    before, after = grown.sum(axis=0), (grown + rates).sum(axis=0)
+    error = two.share * growth * float(np.abs(after - two.first) @ area)
+    most = 2.0 * allowed_error(share, float(before @ area), float(after @ area), now.count, 1)
+    return Step(end, runs, float(min(0.25 * error / most, 1.0)))
 
 
-def mission_slope(runs: tuple[BlockRun, ...]) -> FloatArray:
-    """Derivative (n_contact, n_contact) of the wear of a mission with respect to the depth before it."""
-    unit = np.eye(runs[0].growth.size)
-    whole = unit
-    for each in runs:
-        assert each.slope is not None
-        whole = (unit + each.slope) @ whole
-    return np.asarray(whole - unit)
+def values_of(runs: tuple[BlockRun, ...]) -> dict[str, Any]:
+    """Values (n_block, ...) of the blocks, by their names."""
+    names = ("response", "response_peak", "response_error", "growth_error")
+    return {name: np.array([getattr(run, name) for run in runs]) for name in names}
 
 
-def _node(
-    now: MissionNode, length: int, growth: FloatArray, rates: FloatArray, runs: tuple[BlockRun, ...], error: FloatArray
-) -> MissionNode:
+def _end_of(
+    now: Node, length: int, growth: FloatArray, rates: FloatArray, runs: tuple[BlockRun, ...], error: FloatArray
+) -> Node:
     """The end of a step from its growth, its last mission, (n_block, n_contact), m, and its error (n_contact,), m."""
-    known = np.array([run.growth_error for run in runs])[:, None]
+    values = values_of(runs)
     # the error of a block that wears nothing may be unknown
-    of_blocks = np.where(rates > 0.0, known * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
-    kept = tuple(replace(run, slope=None) for run in runs)
-    return MissionNode(now.mission + length, growth, rates, now.local + error + length * of_blocks, kept)
+    of_blocks = np.where(rates > 0.0, values["growth_error"][:, None] * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
+    local = now.values["local"] + error + length * of_blocks
+    guides = tuple(run.guide for run in runs)
+    return Node(now.count + length, growth.ravel(), rates.ravel(), values | {"local": local}, guides)

@@ -10,7 +10,7 @@ import numpy as np
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.presentation import PresentedHistory
+from solver.presentation import Presented
 from solver.settings import Resolution
 
 
@@ -19,8 +19,7 @@ from solver.settings import Resolution
 class PeriodicState:
     """One periodic state of the joint.
 
-    omega: angular frequency, rad/s.
-    excitation_amplitude: N.
+    omega: angular frequency, rad/s. excitation_amplitude: N.
     displacement_h (n_contact, 3, 2H+1): relative displacement, m, harmonics ordered 0, cos 1, sin 1, ...
     contact_force_h (n_contact, 3, 2H+1): contact force, N, compression positive.
     start_history (n_contact, 2): corrected slip X_T at the start of the solution, m, which reproduces the state. The
@@ -68,7 +67,7 @@ class StartState:
 
 
 @dataclass(frozen=True, repr=False)
-class WearHistory(PresentedHistory):
+class WearHistory(Presented):
     """A point of a study on the slow time scale, at `n_output` cycle counts; not reached: NaN, whole numbers 0.
 
     - cycles (n_output,): counts; worn_volume, m3, wear_rate, m3 per cycle; wear_depth (n_output, n_contact), m.
@@ -98,8 +97,7 @@ class WearHistory(PresentedHistory):
     - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.rate_slope`); or inf.
     - newton_iterations; run_time: CPU seconds of the computing thread, both with those of the start state.
     - branch, fold_frequency: of the start state.
-    - outcome, message: how the history ended; an unexpected error, the cycle from which on a condition is violated, or
-      the error reached.
+    - outcome, message: how the history ended, and a sentence about it.
     """
 
     OVER = ("cycles", "cycle")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -11,10 +11,8 @@ from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, largest_responses
-from solver.model import ComplexArray, FloatArray
-from solver.packing import packable
+from solver.model import FloatArray
 from solver.results.history import PeriodicState
-from solver.settings import Resolution
 from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import Joint
@@ -26,46 +24,14 @@ LOOP_PHASES = 128
 def periodic_state(joint: Joint, point: State) -> PeriodicState:
     """The state as a result in physical units; its arrays lie in rows, as when read from a file."""
     at = point.evaluation
-    return PeriodicState(
-        omega=joint.omega,
-        excitation_amplitude=joint.excitation_amplitude,
-        displacement_h=np.array(at.displacement_h, order="C"),
-        contact_force_h=np.array(at.force_h, order="C"),
-        start_history=np.array(at.history, order="C"),
-        wear_depth=np.array(at.wear_depth, order="C"),
-    )
+    arrays = (at.displacement_h, at.force_h, at.history, at.wear_depth)
+    return PeriodicState(joint.omega, joint.excitation_amplitude, *(np.array(each, order="C") for each in arrays))
 
 
 def evaluated(joint: Joint, state: PeriodicState) -> tuple[Balance, Evaluation]:
     """The balance of a state of a joint whose gaps hold the wear, and its evaluation."""
     balance = Balance(joint, state.start_history, np.zeros_like(state.wear_depth))
     return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
-
-
-@packable
-@dataclass(frozen=True)
-class StateReport:
-    """Reported values of a state; units and shapes as in `WearHistory`, without the dimension n_output.
-
-    resonance: `resonance_frequency`, rad/s, and its estimated relative error; NaN where not asked for. Errors are those
-    by the harmonics and samples of the state.
-    """
-
-    wear_depth: FloatArray
-    mean_pressure: FloatArray
-    slip_range: FloatArray
-    open_fraction: FloatArray
-    response: ComplexArray
-    response_mean: FloatArray
-    response_peak: FloatArray
-    loop_displacement: FloatArray
-    loop_force: FloatArray
-    certificate: Certificate
-    resolution: Resolution
-    excitation_frequency: float = float("nan")
-    excitation_frequency_error: float = 0.0
-    resonance: float = float("nan")
-    resonance_error: float = float("nan")
 
 
 def report_state(
@@ -75,27 +41,33 @@ def report_state(
     loops: tuple[int, ...] = (),
     *,
     with_resonance: bool = False,
-) -> StateReport:
-    """Report of a converged state. loops: pairs with fretting loops. with_resonance: whether with the resonance."""
+) -> dict[str, Any]:
+    """Values of a converged state by their names in `WearHistory`, without the dimension n_output.
+
+    loops: pairs with fretting loops. with_resonance: whether also with `resonance`, see `resonance_frequency`, and its
+    estimated relative error `resonance_error`. Errors are those by the harmonics and samples of the state.
+    """
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
-    resonance, slope = resonance_frequency(joint, evaluation) if with_resonance else (float("nan"),) * 2
-    return StateReport(
-        wear_depth=evaluation.wear_depth,
-        mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
-        slip_range=largest_distance(evaluation.state_t) / joint.law.state_stiffness,
-        open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
-        response=to_complex(response_h)[:, 0],
-        response_mean=response_h[:, 0],
-        response_peak=largest_responses(joint, evaluation),
-        loop_displacement=loop_displacement,
-        loop_force=loop_force,
-        certificate=certificate,
-        resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
-        excitation_frequency=joint.omega / (2.0 * np.pi),
-        resonance=resonance,
-        resonance_error=slope * certificate.response_error,
-    )
+    found = {
+        "mean_pressure": evaluation.force_h[:, 0, 0] / joint.contact.area,
+        "slip_range": largest_distance(evaluation.state_t) / joint.law.state_stiffness,
+        "open_fraction": (evaluation.status_t == SEPARATED).mean(axis=1),
+        "response": to_complex(response_h)[:, 0],
+        "response_mean": response_h[:, 0],
+        "response_peak": largest_responses(joint, evaluation),
+        "loop_displacement": loop_displacement,
+        "loop_force": loop_force,
+        "excitation_frequency": joint.omega / (2.0 * np.pi),
+        "excitation_frequency_error": 0.0,
+        "harmonics_used": max(joint.basis.orders, default=0),
+        "samples_used": joint.basis.n_samples,
+        **{name: value for name, value in vars(certificate).items() if name != "periodicity_error"},
+    }
+    if with_resonance:
+        resonance, slope = resonance_frequency(joint, evaluation)
+        found |= {"resonance": resonance, "resonance_error": slope * certificate.response_error}
+    return found
 
 
 def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, float]:
@@ -112,9 +84,7 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
     moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
     inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
-    if not inertia > 0.0:
-        return float("nan"), float("nan")
-    square = joint.omega**2 + work.real / inertia
+    square = joint.omega**2 + work.real / inertia if inertia > 0.0 else -1.0
     return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
 
 

@@ -26,21 +26,25 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     if not rows.size:
         return Outcome.CONVERGED, ""
     last = int(rows[-1])
-    held = math.inf > history.held_from <= history.cycles[last]
-    remarks = [describe_hold(history.held_from / slower)] if held else []
     if history.cycles[last] >= history.cut_off_cycle:
         return Outcome.CONTACT_CUT_OFF, describe_cut_off(history.cut_off_cycle / slower)
+    outcome, said = Outcome.CONVERGED, []
     error = float(history.worn_volume_error[last])
     if error > SENSITIVE_ERROR:
         volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
         coarser = "with longer steps, fewer harmonics and a coarser sweep"
-        return Outcome.SENSITIVE, "; ".join((describe_uncertain(*volumes, error, rtol, coarser), *remarks))
+        outcome, said = Outcome.SENSITIVE, [describe_uncertain(*volumes, error, rtol, coarser)]
     # inf means "never", but is the count of a final state, too
-    if math.inf > history.inaccurate_from <= history.cycles[last]:
+    elif math.inf > history.inaccurate_from <= history.cycles[last]:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
-        said = begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"
-        return Outcome.INACCURATE, "; ".join((said, *remarks))
-    return Outcome.CONVERGED, "; ".join(remarks)
+        said = [begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"]
+        outcome = Outcome.INACCURATE
+    if math.inf > history.held_from <= history.cycles[last]:
+        said.append(
+            f"from cycle {in_digits(history.held_from / slower)} on every pair slips and only friction holds the joint"
+            f" in one direction: its mean position is held there, by at most {HELD_FORCE:g} of the friction"
+        )
+    return outcome, "; ".join(said)
 
 
 def last_error(history: WearHistory, rows: IntArray, last: float) -> float:
@@ -66,14 +70,6 @@ def describe_uncertain(volume: float, other: float, error: float, rtol: float, c
     if abs(volume - other) < 0.5 * error * volume:
         return f"{own}, {known}: {its}, but worn at other pairs or counts"
     return f"{own}, but {its}: {known}"
-
-
-def describe_hold(cycle: float) -> str:
-    """Sentence with the count from which on a joint that slides as a whole is held."""
-    return (
-        f"from cycle {in_digits(cycle)} on every pair slips and only friction holds the joint in one direction: its"
-        f" mean position is held there, by at most {HELD_FORCE:g} of the friction"
-    )
 
 
 def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:

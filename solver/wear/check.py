@@ -7,8 +7,9 @@ one. A joint that slips everywhere under a load that nothing else carries has no
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -19,12 +20,13 @@ from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome, in_digits
-from solver.results.state_report import StateReport, report_state
+from solver.results.state_report import report_state
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.course import Course
 from solver.wear.jump import creeps, free_slide
-from solver.wear.wearing_joint import Choice, WearingJoint, WearState
+from solver.wear.slow_time import AS_ASKED
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
 """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
@@ -34,149 +36,131 @@ STEPS_TO_THE_END, LONGEST_HISTORY = 20_000, 1e25
 """Most steps and most cycles of a history without a steady state; a joint takes 2 to 10 steps a pair."""
 
 ACTED_BACK = 100.0
-"""Change of the normal force by the depth of one pair alone, all other pairs held, over the normal force of this pair.
-A wear rate counts as steady above only: less wear may not have acted back on the joint yet. Long waves of n pairs are
-about n times as soft."""
+"""Change of the normal force by the depth of one pair alone, all other pairs held, over the normal force of this pair,
+above which a wear rate may be steady: less wear has not acted back yet. Long waves of n pairs are n times as soft."""
 
-AS_ASKED = Failure(Outcome.CONVERGED)
-"""The regular end of a history."""
-
-
-Checked = tuple[WearState, StateReport]
+Checked = tuple[WearState, dict[str, Any]]
 """A state that passed the check, possibly with other harmonics than before, and its report."""
 
 
 def full_check(
-    work: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
+    setup: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
 ) -> Checked | Failure:
-    """A state of a reported history with its report, or the reason of its rejection.
-
-    loops: pairs with reported fretting loops. with_resonance: whether the resonance of the vibration is reported.
-    Raises OutOfTimeError, LinAlgError.
-    """
-
-    def report(chosen: WearState | Failure) -> Checked | Failure:
-        """Report with certificate; its estimated errors come from the last choice of the harmonics."""
-        if isinstance(chosen, Failure):
-            return chosen
-        joint, at, estimate = work.joint_of(chosen), chosen.point.evaluation, chosen.choice.estimate
-        certificate = replace(
-            certify(joint, at),
-            response_error=estimate.response,
-            wear_rate_error=work.wearing.amplification(*worn_by(at)) * estimate.wear_rate,
-        )
-        if not certificate.holds(work.case.settings.tolerance):
-            return Failure(Outcome.CERTIFICATE_FAILED)
-        found = report_state(joint, at, certificate, loops, with_resonance=with_resonance)
-        return chosen, replace(found, excitation_frequency_error=work.frequency_error(chosen))
-
-    anew = chosen_for_another(work, state)
-    checked = report(choose_anew(work, state) if anew else state)
-    if isinstance(checked, Failure) and not anew and state.choice.accurate and work.case.settings.automatic:
+    """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
+    anew, certified = chosen_for_another(setup, state), partial(_certified, setup, loops, with_resonance=with_resonance)
+    checked = certified(choose_anew(setup, state) if anew else state)
+    if isinstance(checked, Failure) and not anew and state.accurate and setup.case.settings.automatic:
         # more harmonics or samples may suffice
-        checked = report(choose_anew(work, state))
+        checked = certified(choose_anew(setup, state))
     if isinstance(checked, Failure):
         return checked
-    (state, reported), at = checked, checked[0].point.evaluation
-    estimate, worst = state.choice.estimate, state.worst
+    state, reported = checked
+    estimate, worst = state.estimate, state.worst
     # NaN for given harmonics and samples, where no state with others was found for a comparison
     unknown = np.isnan(estimate.largest)
-    if unknown or not state.choice.accurate:
+    if unknown or not state.accurate:
         if not estimate.largest < worst.largest:
             worst = UNKNOWN if unknown else estimate
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
-    if state.hold is not None and creeps(work.joint_of(state), state.hold, at):
+    case, joint = setup.of(state)
+    if state.hold is not None and creeps(joint, state.hold, state.at):
         return Failure(Outcome.ADRIFT)
     if _vibrates_otherwise(state):
-        if (unstable := find_instability(work.case, work.joint_of(state), at, work.run, False)) is not None:
+        if (unstable := find_instability(case, joint, state.at, setup.run, False)) is not None:
             return unstable
-        state = replace(state, judged_h=at.predicted_h)
+        state = replace(state, judged_h=state.at.predicted_h)
     return state, reported
 
 
+def _certified(
+    setup: WearingJoint, loops: tuple[int, ...], state: WearState | Failure, *, with_resonance: bool
+) -> Checked | Failure:
+    """A state with its report, whose estimated errors come from the last choice of the harmonics."""
+    if isinstance(state, Failure):
+        return state
+    joint, estimate = setup.joint_of(state), state.estimate
+    wear_rate_error = setup.wearing.amplification(*worn_by(state.at)) * estimate.wear_rate
+    certificate = certify(joint, state.at)
+    certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
+    if not certificate.holds(setup.case.settings.tolerance):
+        return Failure(Outcome.CERTIFICATE_FAILED)
+    report = report_state(joint, state.at, certificate, loops, with_resonance=with_resonance)
+    return state, report | {"excitation_frequency_error": setup.frequency_error(state)}
+
+
 def report_only(
-    work: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
+    setup: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
 ) -> Checked:
     """A state of a reference solution with its report, with the harmonics wanted at its count where it is found there.
 
-    resolutions: cycle count from which on a resolution holds, and this resolution; ascending counts, the first 0.
+    resolutions: as in `Guide`, of the reference solution.
     """
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
-        # sets `work.case` to that of the state, with its harmonics and its hold
-        work.joint_of(state)
-        joint = work.case.at(wanted).joint(state.omega, work.excitation_amplitude)
-        point = work.run.move(work.case, joint, state.point)
-        moved = point and work.at_followed(replace(state, point=point, resolution=wanted))
+        case, _ = setup.of(state)
+        point = setup.run.move(case, case.at(wanted).joint(state.omega, setup.excitation_amplitude), state.point)
+        moved = point and setup.at_followed(replace(state, point=point, resolution=wanted))
         state = moved if isinstance(moved, WearState) else state
-    return state, report_state(
-        work.joint_of(state), state.point.evaluation, NOT_CERTIFIED, with_resonance=with_resonance
-    )
+    return state, report_state(setup.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=with_resonance)
 
 
-def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
-    """Whether the state differs so much from the last choice of harmonics and samples that a new choice is necessary.
-
-    The part of the contact force in harmonics that are left out grows with the error of the state. A new choice is
-    necessary where this part is so large that the error may be above rtol, or so small that fewer harmonics may do.
+def chosen_for_another(setup: WearingJoint, state: WearState) -> bool:
+    """Whether harmonics and samples have to be chosen again: where the part of the contact force in harmonics that are
+    left out, which grows with the error, is so large that the error may be above rtol, or so small that fewer may do.
     """
-    choice, at, settings = state.choice, state.point.evaluation, work.case.settings
+    settings, orders = setup.case.settings, state.resolution.orders
     if not settings.automatic:
         return False
-    if settings.harmonics == "auto" and lacks_even(state.resolution.orders, at):
+    if settings.harmonics == "auto" and lacks_even(orders, state.at):
         return True
-    now, error = left_out(state.resolution.orders, at), choice.estimate.largest
+    now, error = left_out(orders, state.at), state.estimate.largest
     if not np.isfinite(error):
         return _vibrates_otherwise(state)
     if error == 0.0:
         # the last choice was for a joint without slip and separation
         return now > NEGLIGIBLE
-    if now > LEFT_OUT_GROWN * choice.left_out:
-        return error * now > settings.rtol * choice.left_out
-    return now < KEPT_FRACTION**2 * choice.left_out
+    if now > LEFT_OUT_GROWN * state.left_out:
+        return error * now > settings.rtol * state.left_out
+    return now < KEPT_FRACTION**2 * state.left_out
 
 
-def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
+def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    work.joint_of(state)
-    refined = refine(work.case, state.omega, work.excitation_amplitude, state.point, work.run)
-    resolution = refined.case.resolution
-    choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
-    return work.at_followed(replace(state, point=refined.point, resolution=resolution, choice=choice))
+    refined = refine(setup.of(state)[0], state.omega, setup.excitation_amplitude, state.point, setup.run)
+    resolution, point = refined.case.resolution, refined.point
+    state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
+    return setup.at_followed(replace(state, estimate=refined.estimate, accurate=refined.accurate))
 
 
 def _vibrates_otherwise(state: WearState) -> bool:
     """Whether the vibration differs from the vibration of the last stability check."""
-    if state.judged_h is None or state.judged_h.shape != state.point.evaluation.predicted_h.shape:
+    if state.judged_h is None or state.judged_h.shape != state.at.predicted_h.shape:
         return True
-    before, now = state.judged_h[:, 1:], state.point.evaluation.predicted_h[:, 1:]
+    before, now = state.judged_h[:, 1:], state.at.predicted_h[:, 1:]
     return float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
 
 
-def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
+def unstable_at_end(setup: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
-    if state.cycle == 0.0 and work.follow is None and not _vibrates_otherwise(state):
+    if state.cycle == 0.0 and setup.follow is None and not _vibrates_otherwise(state):
         return None
-    joint, at = work.joint_of(state), state.point.evaluation
+    case, joint = setup.of(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, at) is None and not work.is_stable(joint, at):
+    if free_slide(joint, state.at) is None and not setup.is_stable(state):
         return Failure(Outcome.UNSTABLE)
-    return find_instability(work.case, joint, at, work.run, True)
+    return find_instability(case, joint, state.at, setup.run, True)
 
 
-def why_ended(work: WearingJoint, state: WearState, course: Course) -> Failure | None:
-    """Why a history ends at a state: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
-    reached = not math.isnan(course.reached)
-    if reached or not state.wears or state.cycle >= course.end * (1.0 - 1e-12):
-        return AS_ASKED
-    if course.end < math.inf:
-        return None
-    # over where the rate of every pair is below a share of its largest one
-    share, largest = course.final_share, state.largest_rates[:-1]
-    if (state.rates[:-1] <= share * np.maximum(largest, share * float(largest.max(initial=0.0)))).all():
+def why_endless(setup: WearingJoint, state: WearState, course: Course, final_share: float) -> Failure | None:
+    """Why a history to the end of wear ends: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on.
+
+    final_share: as in `ToTheEnd`.
+    """
+    largest = state.largest_rates[:-1]
+    if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():
         return AS_ASKED
     rate, n_steps = float(state.rates[-1]), len(course.ends) - 1
-    if is_steady(work, state, course):
+    if is_steady(setup, state, course):
         steady = f"from cycle {in_digits(state.cycle, 4)} on they wear at a steady rate of {rate:.6g} m3 a cycle"
         return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
     if n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
@@ -185,24 +169,21 @@ def why_ended(work: WearingJoint, state: WearState, course: Course) -> Failure |
     return None
 
 
-def is_steady(work: WearingJoint, state: WearState, course: Course) -> bool:
-    """Whether wear goes on without end.
-
-    Every pair that carries load slips, and the wear rate is constant although the wear is deep enough to act back.
+def is_steady(setup: WearingJoint, state: WearState, course: Course) -> bool:
+    """Whether wear goes on without end: every pair that carries load slips, and the wear rate is constant although the
+    wear is deep enough to act back.
     """
-    joint, at = work.joint_of(state), state.point.evaluation
-    normal = at.force_h[:, 0, 0]
+    normal = state.at.force_h[:, 0, 0]
     pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))
-    if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
+    if not pressed.any() or not (state.at.slip_work[pressed] > 0.0).all():
         return False
-    volumes, rates = course.volumes, course.dense.rate @ work.area
+    volumes, rates = course.volumes, course.rates @ setup.area
     # over the last nine tenths of the worn volume, to the accuracy of a rate
     first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
-    varies = np.abs(rates[first:] - rates[-1]) > work.case.settings.rtol * rates[-1]
+    varies = np.abs(rates[first:] - rates[-1]) > setup.case.settings.rtol * rates[-1]
     if volumes[first] > 0.1 * volumes[-1] or varies.any():
         return False
-    rows = np.flatnonzero(joint.component_index % 3 == 0)
-    rows = rows[pressed[joint.component_index[rows] // 3]]
-    pair = joint.component_index[rows] // 3
-    moved = joint.structure.static_stiffness[rows, rows] * at.wear_depth[pair]
-    return bool((moved >= ACTED_BACK * normal[pair]).all())
+    joint = setup.joint_of(state)
+    pair, component = joint.component_index // 3, joint.component_index % 3
+    acted = np.diag(joint.structure.static_stiffness) * state.depth[pair] >= ACTED_BACK * normal[pair]
+    return bool(acted[(component == 0) & pressed[pair]].all())

@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
+from solver.accuracy.certificate import NOT_CERTIFIED
 from solver.accuracy.history_error import Both, HistoryError, error_of_given_steps, error_of_target, history_error
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
-from solver.packing import Packed, unpack
+from solver.packing import Packed
 from solver.results.history import StartState, WearHistory
+from solver.results.state_report import LOOP_PHASES
 from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
-from solver.wear.course import unknown_course
-from solver.wear.integrate import ENDS_ALL, Ended, Guide, Integrations, SlowTime
+from solver.wear.course import Course, Node
+from solver.wear.integrate import Integrations, SlowTime
+from solver.wear.slow_time import ENDS_ALL, Ended, Guide, Integrator, Solutions
+from solver.wear.step import Adaptive
+from solver.wear.wearing_joint import WearState
+
+_REPORTED = frozenset(each.name for each in fields(WearHistory))
 
 
 def integrate_together(
@@ -35,19 +42,17 @@ def integrate_together(
 
     Each is that which it would be alone. All those with given steps are compared with one adaptive history.
 
-    model, friction_coefficient, settings, start: the case, and the unworn state at the start of the histories.
-    asked: steps of each history; they differ in nothing else but their counts up to one last count.
-    keep: called from time to time with the progress.
-    resume: progress, as given to `keep`, of a computation of some of these histories, which goes on from there. The
-        results are equal to the last bit, except `run_time`.
+    asked: they differ in nothing else but their steps, and their counts up to one last count.
+    keep: called from time to time with the progress. resume: such progress of some of these histories, which go on from
+        there; the results are equal to the last bit, except `run_time`.
     """
     integrations = None
     if start.state is not None:
         case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
-        integrations = Integrations(case, start, keep, None if resume is None else unpack(resume))
+        integrations = Integrations(case, start, Integrator(settings.time_limit, keep, resume))
     for each in asked:
         if integrations is None:
-            nothing = Ended(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)), 0, 0.0)
+            nothing = Ended(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)))
             solutions = Solutions(nothing, nothing)
         else:
             solutions = _solve(integrations, model, each, settings.rtol)
@@ -61,27 +66,16 @@ def integrate_together(
         yield history
 
 
-@dataclass(frozen=True)
-class Solutions:
-    """A history, the adaptive history with which one with given steps is compared, and its reference solution.
-
-    adaptive: the history itself where its steps are adaptive. reference: None where there is none.
-    """
-
-    own: Ended
-    adaptive: Ended
-    reference: Ended | None = None
-
-    @property
-    def all(self) -> tuple[Ended, ...]:
-        """Each of them once."""
-        adaptive = () if self.adaptive is self.own else (self.adaptive,)
-        return (self.own, *adaptive, *(() if self.reference is None else (self.reference,)))
-
-    @property
-    def failure(self) -> Failure:
-        """The end of the history."""
-        return next((each.failure for each in self.all if each.failure.outcome in ENDS_ALL), self.own.failure)
+def unknown_course(model: ReducedModel, n_loops: int) -> Course:
+    """The course of a history without any state: all values are NaN."""
+    of_pairs, of_responses = np.full(model.contact.n_contact, np.nan), np.full(len(model.response_names), np.nan)
+    values: dict[str, Any] = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), of_pairs)
+    values |= dict.fromkeys(("response_mean", "response_peak"), of_responses) | {"response": of_responses + 0j}
+    values |= dict.fromkeys(("loop_displacement", "loop_force"), np.full((n_loops, LOOP_PHASES, 3), np.nan))
+    values |= dict.fromkeys(("excitation_frequency", "excitation_frequency_error", "local"), math.nan)
+    values |= vars(NOT_CERTIFIED) | {"harmonics_used": 0, "samples_used": 0}
+    # before all counts
+    return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
 
 
 def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rtol: float) -> Solutions:
@@ -98,18 +92,20 @@ def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rto
         return Solutions(own, own)
     adaptive, spent = own, own.seconds
     if not asked.adaptive:
-        asked = asked.adaptive_to(min(own.course.ends[-1], asked.end), rtol)
+        # one for all given steps to one last count; to another end no longer than needed
+        known = asked.end < math.inf and asked.until is None
+        cycles = asked.cycles if known else np.array([0.0, min(own.course.ends[-1], asked.end)])
+        never = asked.until and replace(asked.until, value=math.inf)
+        asked = replace(asked, steps=Adaptive(rtol), cycles=cycles, until=never)
         adaptive = integrations.history(asked, spent)
         spent += adaptive.seconds
-    if adaptive.state is None or not is_compared(adaptive):
+    if not is_compared(adaptive):
         return Solutions(own, adaptive)
-    guide = Guide(adaptive.course.resolutions, adaptive.state.step_limit)
+    guide = Guide(adaptive.state.resolutions, adaptive.state.first_length)
     # NaN where no target was reached
-    compared = np.concatenate([[0.0, adaptive.course.reached], _counts(asked, adaptive), adaptive.course.dense.counts])
-    reached = min(adaptive.course.ends[-1], asked.end)
-    return Solutions(
-        own, adaptive, integrations.reference(asked, guide, np.unique(compared[compared <= reached]), spent)
-    )
+    compared = np.concatenate([[0.0, adaptive.course.reached], _counts(asked, adaptive), adaptive.course.counts])
+    compared = np.unique(compared[compared <= min(adaptive.course.ends[-1], asked.end)])
+    return Solutions(own, adaptive, integrations.reference(asked, guide, compared, spent))
 
 
 def _counts(asked: SlowTime, fine: Ended) -> FloatArray:
@@ -119,54 +115,49 @@ def _counts(asked: SlowTime, fine: Ended) -> FloatArray:
     return np.zeros(asked.cycles.n_outputs) if fine.state is None else fine.course.even_counts(asked.cycles.n_outputs)
 
 
-def _compare(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
-    """A history beside what it is compared with at ascending counts, and its errors there.
+def compare(
+    counts: FloatArray,
+    fine: Course,
+    reference: Course | None,
+    area: FloatArray,
+    part: Callable[[dict[str, Any]], dict[str, Any]] = lambda values: values,
+    *,
+    follows: bool = False,
+) -> tuple[Both, HistoryError]:
+    """An adaptive history beside its reference solution at ascending counts (n,), and its errors there.
 
-    follows: whether the frequency of the excitation follows the structure.
+    part: what is compared of the values of both. follows: whether the frequency of the excitation is followed.
     """
+    known = reference if reference is not None and reference.nodes else None
+    both, steps = (
+        Both(at, part(fine.read(at)), {} if known is None else part(known.read(at)), follows)
+        for at in (counts, fine.counts)
+    )
+    return both, history_error(both, steps, area)
 
-    def at(fine: Ended, other: Ended | None, counts: FloatArray) -> Both:
-        there = other.course.read(counts) if other is not None and other.course.nodes else {}
-        return Both(counts, fine.course.read(counts), there, follows)
 
-    own = solutions.own
-    adaptive = own if solutions.adaptive.state is None else solutions.adaptive
-    area, course = own.course.area, adaptive.course
-    both, steps = (at(adaptive, solutions.reference, each) for each in (counts, course.dense.counts))
-    error = history_error(both, steps, area)
+def _compare(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
+    """A history beside what it is compared with at ascending counts, and its errors there."""
+    own, reference = solutions.own.course, solutions.reference
+    adaptive = own if solutions.adaptive.state is None else solutions.adaptive.course
+    both, error = compare(counts, adaptive, None if reference is None else reference.course, own.area, follows=follows)
     if adaptive is own:
         return both, error
-    both = at(own, adaptive, counts)
-    return both, error_of_given_steps(both, error, area)
+    both = Both(counts, own.read(counts), adaptive.read(counts), follows)
+    return both, error_of_given_steps(both, error, own.area)
 
 
 def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, solutions: Solutions) -> WearHistory:
     """The result, not judged yet."""
     fine, area, counts = solutions.own, model.contact.area, _counts(asked, solutions.own)
-    state, failure = fine.state, solutions.failure
+    failure = solutions.failure
     both, error = _compare(solutions, counts, follows=asked.follow is not None)
     own, target = both.fine, fine.course.reached
-    ends_at_target, of_state = target <= asked.end, dict[str, Any]()
-    if state is not None:
-        of_state = {
-            "step_limit": state.step_limit if state.step_limit > 0.0 else math.inf,
-            "inaccurate_from": state.inaccurate_from,
-            "inaccurate_in": "wear rate" if state.worst.wear_rate >= state.worst.response else "response",
-            "inaccurate_error": state.worst.largest,
-            "held_from": math.inf if math.isnan(state.held_from) else state.held_from,
-            # adaptive steps go beyond the last count
-            "jump_cycle": state.jump_cycle if state.jump_cycle <= asked.end else math.nan,
-        }
+    ends_at_target = target <= asked.end
     return WearHistory(
-        **{name: value for name, value in own.items() if name not in ("local", "depth_rate")}
-        | {
-            "response_error": error.response,
-            "wear_rate_error": error.wear_rate,
-            "worn_volume_error": error.worn_volume,
-            "wear_depth_error": error.wear_depth,
-            "excitation_frequency_error": error.frequency,
-        }
-        | of_state,
+        **{name: value for name, value in own.items() if name in _REPORTED}
+        | {f"{name}_error": values for name, values in vars(error).items()}
+        | ({} if fine.state is None else _of_state(fine.state, asked.end)),
         outcome=failure.outcome,
         message=failure.message,
         cycles=counts,
@@ -175,13 +166,26 @@ def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, solution
         error_estimate=math.nan,
         newton_iterations=start.newton_iterations + sum(each.iterations for each in solutions.all),
         run_time=start.run_time + sum(each.seconds for each in solutions.all),
-        last_cycle=math.nan if state is None else min(fine.course.ends[-1], float(counts[-1])),
+        last_cycle=math.nan if fine.state is None else min(fine.course.ends[-1], float(counts[-1])),
         branch=start.branch,
         fold_frequency=start.fold_frequency,
         cycles_to_target=target if ends_at_target else math.nan,
         cycles_to_target_error=_target_error(solutions, asked) if ends_at_target else math.nan,
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
     )
+
+
+def _of_state(state: WearState, end: float) -> dict[str, Any]:
+    """What the last state says of its history up to a count."""
+    return {
+        "step_limit": state.step_limit if state.step_limit > 0.0 else math.inf,
+        "inaccurate_from": state.inaccurate_from,
+        "inaccurate_in": "wear rate" if state.worst.wear_rate >= state.worst.response else "response",
+        "inaccurate_error": state.worst.largest,
+        "held_from": math.inf if math.isnan(state.held_from) else state.held_from,
+        # adaptive steps go beyond the last count
+        "jump_cycle": state.jump_cycle if state.jump_cycle <= end else math.nan,
+    }
 
 
 def _target_error(solutions: Solutions, asked: SlowTime) -> float:
@@ -192,8 +196,5 @@ def _target_error(solutions: Solutions, asked: SlowTime) -> float:
         return math.inf
     at, by_interpolation = course.reach(until)
     both, error = _compare(solutions, np.array([0.0, at]), follows=asked.follow is not None)
-    depth = both.fine["wear_depth"][1]
-    weights = np.arange(depth.size) == depth.argmax() if until.quantity == "wear_depth" else course.area
-    rate = min(float(rates @ weights) for rates in (both.fine["depth_rate"][1], course.nodes[-1].rate))
     ahead = other.course.reach_ahead(until)
-    return error_of_target(until, at, ahead, depth, error, rate, course.area) + by_interpolation
+    return error_of_target(until, at, ahead, both.fine, course.nodes[-1].rate, error, course.area) + by_interpolation

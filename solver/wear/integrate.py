@@ -1,9 +1,9 @@
-"""The integration of a wear history over the slow time, and of its reference solution, step by step.
+"""A wear history and its reference solution as problems over the slow time.
 
 The reference solution is a second computation whose difference, pair by pair, is taken for the error. It starts from
-another sweep, with a third of the nodes (`solver.loading_history`), and is coarser in all: its steps have twice the
-tolerance, and it has the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch
-ends, errors grow. The difference to the reference solution grows as well, a sum of local errors does not.
+another sweep, with a third of the nodes (`solver.loading_history`), and is coarser in all: twice the tolerance of the
+steps, the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch ends, errors grow,
+and this difference with them; a sum of local errors does not.
 
 A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
 with the same steps errs as they do: where a pair only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit
@@ -13,43 +13,28 @@ steps, 1.89 mm3, with steps of 250 cycles 1.90; the truth is 2.03.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import astuple, dataclass, field, replace
-from functools import partial
-from typing import TypeVar
+from dataclasses import astuple, dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from solver.accuracy.harmonic_levels import fewer, shifted
-from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
-from solver.newton.run import OutOfTimeError
-from solver.outcome import Outcome, describe_error
-from solver.packing import Packed, in_rows, pack, packable
+from solver.newton.run import Budget
+from solver.outcome import Outcome
+from solver.packing import in_rows
 from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, FollowedFrequency, Resolution, SolverSettings, ToTheEnd, WearTarget
 from solver.structure.joint import Case
-from solver.wear.check import AS_ASKED, Checked, full_check, report_only, unstable_at_end, why_ended
-from solver.wear.course import Course
+from solver.wear.check import full_check, report_only, unstable_at_end, why_endless
+from solver.wear.course import Course, Node
+from solver.wear.slow_time import AS_ASKED, RTOL_RATIO, Ended, Guide, Integrator
 from solver.wear.step import Adaptive, Steps, WearLine
 from solver.wear.wearing_joint import WearingJoint, WearState
-
-T = TypeVar("T")
-
-Check = Callable[[WearingJoint, WearState], Checked | Failure]
-"""Gives a state with its report, or the reason of its rejection."""
-
-ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
-"""Ends of an integration that end the whole history, and after which no other solution is integrated."""
-
-RTOL_RATIO = 2.0
-"""Ratio of the step tolerances of reference solution and adaptive history: BDF2 steps are then a quarter longer. With 4
-the steps of a reference solution are too long for pairs that stick again: dovetail, 16 pairs, 13 harmonics, 212.75 Hz:
-1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true."""
 
 HISTORY_ITERATIONS = 3000
 """Most Newton iterations of a history or a reference solution, in addition to `NEAR_ITERATIONS` for each step. A
@@ -65,12 +50,9 @@ class SlowTime:
     """What a wear history is asked for, Eqs. (20) to (26).
 
     wear_coefficient: k_w, 1/Pa. law: part of the slip work that wears.
-    steps: `Given`, `LargestDepth` or `Adaptive`.
     cycles (n_output,): ascending counts to report, the first 0; the last Euler step ends at the last one. Or
-        `ToTheEnd`: until nothing wears any more, at counts chosen from the result; not with explicit steps, which
-        cannot grow.
-    until: target of the wear; the history ends with the step that reaches the target. None for no target.
-    loops: pairs with reported fretting loops.
+        `ToTheEnd`: until nothing wears any more; not with explicit steps, which cannot grow.
+    until: target of the wear, with whose step the history ends. loops: pairs with reported fretting loops.
     ends_at_last: whether the last adaptive step ends at the last count, for a joint that vibrates otherwise from there.
     follow: what the frequency of the excitation follows; None for that of the start state.
     """
@@ -100,167 +82,124 @@ class SlowTime:
         target = None if self.until is None else astuple(self.until)
         return f"{self.steps!r} {self.end!r} {target!r}"
 
-    def adaptive_to(self, reached: float, rtol: float) -> SlowTime:
-        """The adaptive history with which one with given steps is compared, that has come to the count `reached`.
 
-        Equal for all given steps to one last count; to another end it is no longer than needed.
-        """
-        known = self.end < math.inf and self.until is None
-        never = None if self.until is None else replace(self.until, value=math.inf)
-        cycles = self.cycles if known else np.array([0.0, reached])
-        return replace(self, steps=Adaptive(rtol), cycles=cycles, until=never)
+@dataclass(frozen=True)
+class WearProblem:
+    """The problem over the slow time of a history, or of the reference solution of an adaptive one.
+
+    end: last cycle count, inf for a history to the end of wear. guide: of a reference solution; None for a history.
+    stable_end: whether the stability of the last state is tested.
+    """
+
+    setup: WearingJoint
+    asked: SlowTime
+    end: float
+    guide: Guide | None = None
+    stable_end: bool = False
+
+    @cached_property
+    def line(self) -> WearLine:
+        """The steps; adaptive ones go beyond the last count, where nothing else begins there."""
+        asked, setup = self.asked, self.setup
+        end = math.inf if asked.adaptive and not asked.ends_at_last else self.end
+        if self.guide is None:
+            return WearLine(setup, asked.steps, end)
+        # a short history may consist of its first steps, which do not depend on rtol
+        first = self.guide.first_length * (2.0 if asked.ends_at_last else 1.0)
+        return WearLine(setup, Adaptive(RTOL_RATIO * setup.case.settings.rtol, first), end, bounded=False)
 
     @property
-    def shifts(self) -> bool:
-        """Whether the history ends at a shift of the resonance of the vibration."""
-        return self.until is not None and self.until.quantity == "frequency_shift"
+    def budget(self) -> Budget:
+        """As in SlowProblem."""
+        return self.setup.run.budget
 
+    @property
+    def iterations_per_save(self) -> int:
+        """As in SlowProblem."""
+        return ITERATIONS_PER_SAVE
 
-@packable
-@dataclass(frozen=True)
-class Guide:
-    """What a reference solution takes from its history.
+    def saved(self, state: WearState) -> WearState:
+        """As in SlowProblem: without the factorisation."""
+        self.setup.drop_factor()
+        return in_rows(state)
 
-    resolutions: cycle count from which on a resolution holds, and this resolution; of a passage the frequency, Hz.
-    step_limit: largest stable explicit step, cycles.
-    """
+    def _ended(self, state: WearState, course: Course) -> Failure | None:
+        """Why the history ends at a state; None to go on."""
+        found, cycles, most = None, self.asked.cycles, HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
+        still = not state.wears and self.end == math.inf
+        if still or not math.isnan(course.reached) or course.ends[-1] >= self.end * (1.0 - 1e-12):
+            found = AS_ASKED
+        elif isinstance(cycles, ToTheEnd) and self.end == math.inf:
+            found = why_endless(self.setup, state, course, cycles.final_share)
+        if found is None and state.wears and self.budget.iterations > most:
+            found = Failure(Outcome.MARCH_FAILED)
+        if found is AS_ASKED and self.stable_end:
+            found = unstable_at_end(self.setup, state) or found
+        return found
 
-    resolutions: tuple[tuple[float, Resolution], ...]
-    step_limit: float
-
-
-@packable
-@dataclass(frozen=True)
-class Ended:
-    """A finished integration.
-
-    state: the last one; None where there is no first state. failure: reason of the end; CONVERGED for a regular end.
-    course: all steps. iterations, seconds: Newton iterations and CPU time.
-    """
-
-    state: WearState | None
-    failure: Failure
-    course: Course
-    iterations: int
-    seconds: float
-
-
-@packable
-@dataclass(frozen=True)
-class Progress:
-    """How far the integrations from one start state are.
-
-    done: those that are complete, by name. name: of the present one; state, course, iterations, seconds: its progress.
-    """
-
-    done: dict[str, Ended] = field(default_factory=dict)
-    name: str = ""
-    state: WearState | None = None
-    course: Course | None = None
-    iterations: int = 0
-    seconds: float = 0.0
+    def advance(self, state: WearState | None, course: Course) -> tuple[WearState, Course] | Failure:
+        """As in SlowProblem: the next state is checked and stored."""
+        setup, asked, error = self.setup, self.asked, 0.0
+        if state is None:
+            found = setup.at_followed(setup.begin() if self.guide is None else begin_reference(setup))
+        elif (ended := self._ended(state, course)) is not None:
+            return ended
+        elif not state.wears:
+            # the state holds for all later counts
+            return state, course.after(replace(course.nodes[-1], count=self.end))
+        else:
+            step = self.line.step(state)
+            if isinstance(step, Failure):
+                return step
+            found, error = setup.out_of_range(step.state) or step.state, step.error
+        if isinstance(found, Failure):
+            return found
+        shifts = asked.until is not None and asked.until.quantity == "frequency_shift"
+        if self.guide is None:
+            checked = full_check(setup, found, loops=asked.loops, with_resonance=shifts)
+        else:
+            checked = report_only(setup, found, self.guide.resolutions, with_resonance=shifts)
+        if isinstance(checked, Failure):
+            return checked
+        after, report = checked
+        if state is None:
+            after = self.line.begin(after)
+        else:
+            error += course.nodes[-1].values["local"]
+        if not after.resolutions or after.resolutions[-1][1] != after.resolution:
+            after = replace(after, resolutions=(*after.resolutions, (after.cycle, after.resolution)))
+        # local: sum of the local errors of the steps so far, m3
+        return after, course.after(Node(after.cycle, after.depth, setup.rate(after.at), report | {"local": error}))
 
 
 class Integrations:
-    """Histories from one start state, which exists, and their reference solutions, each integrated once.
+    """Histories from one start state, which exists, and their reference solutions, each integrated once."""
 
-    keep: called from time to time with the packed progress. progress: to go on from.
-    """
-
-    def __init__(
-        self,
-        case: Case,
-        start: StartState,
-        keep: Callable[[Packed], None] | None = None,
-        progress: Progress | None = None,
-    ) -> None:
-        self._case, self._start, self._keep, self._resumed = case, start, keep, progress or Progress()
-        self._done = dict(self._resumed.done)
+    def __init__(self, case: Case, start: StartState, integrator: Integrator | None = None) -> None:
+        self._case, self._start = case, start
+        self._integrator = integrator or Integrator(case.settings.time_limit)
 
     def history(self, asked: SlowTime, spent: float = 0.0, *, stable_end: bool = True) -> Ended:
-        """Integrate a history.
-
-        spent: CPU seconds of its time limit that are gone. stable_end: whether the stability of its last state is
-        tested.
-        """
-        work, counts, share = self._joint(asked), np.zeros(0), 0.0
-        if isinstance(asked.cycles, ToTheEnd):
-            share = asked.cycles.final_share
-        else:
-            counts = asked.cycles
-        # adaptive steps go beyond the last count, where nothing else begins there
-        line = WearLine(work, asked.steps, math.inf if asked.adaptive and not asked.ends_at_last else asked.end)
-        check = partial(full_check, loops=asked.loops, with_resonance=asked.shifts)
-        course = Course(work.area, asked.adaptive, counts, asked.until, share)
-        return self._integrated(asked.name, line, check, work.begin, course, spent, stable_end=stable_end)
+        """Integrate a history. spent: CPU seconds of its time limit so far. stable_end: as in WearProblem."""
+        outputs = np.zeros(0) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
+        problem = WearProblem(self._joint(asked), asked, asked.end, stable_end=stable_end)
+        course = Course(problem.setup.area, outputs, asked.until)
+        return self._integrator.integrate(asked.name, problem, course, spent)
 
     def reference(self, asked: SlowTime, guide: Guide, compared: FloatArray, spent: float = 0.0) -> Ended:
         """Integrate the reference solution of an adaptive history of which the start state may be another one.
 
         compared (n,): ascending counts at which it is read, the first 0. spent: as for `history`.
         """
-        work, end = self._joint(asked), float(compared[-1])
-        work.run = work.run.to(self._case.settings.rough_tolerance)
+        setup = self._joint(asked)
+        setup.run = setup.run.to(self._case.settings.rough_tolerance)
         resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in guide.resolutions)
-        # a short history may consist of its first steps, which do not depend on rtol
-        steps = Adaptive(RTOL_RATIO * self._case.settings.rtol, 2.0 if asked.ends_at_last else 1.0)
-        line = WearLine(work, steps, end if asked.ends_at_last else math.inf, bounded=False)
-        check = partial(report_only, resolutions=resolutions, with_resonance=asked.shifts)
-        first = partial(begin_reference, work, guide.step_limit)
-        course = Course(work.area, smooth=True, counts=compared)
-        return self._integrated(f"{asked.name} reference", line, check, first, course, spent)
+        problem = WearProblem(setup, asked, float(compared[-1]), replace(guide, resolutions=resolutions))
+        course = Course(setup.area, compared)
+        return self._integrator.integrate(f"{asked.name} reference", problem, course, spent)
 
     def _joint(self, asked: SlowTime) -> WearingJoint:
         return WearingJoint(self._case, self._start, asked.wear_coefficient, asked.law, asked.follow)
-
-    def _integrated(
-        self,
-        name: str,
-        line: WearLine,
-        check: Check,
-        first: Callable[[], WearState],
-        course: Course,
-        spent: float,
-        *,
-        stable_end: bool = False,
-    ) -> Ended:
-        """Integrate from the first or the saved state to the end. course: without steps."""
-        if name in self._done:
-            return self._done[name]
-        work, budget, saved, state = line.work, line.work.run.budget, self._resumed, None
-        began = computing_time()
-        if saved.name == name and saved.course is not None:
-            state, course, budget.iterations = saved.state, saved.course, saved.iterations
-            began -= saved.seconds
-        budget.deadline, saved_at = began + self._case.settings.time_limit - spent, budget.iterations
-        while True:
-            if state is not None:
-                ended = why_ended(work, state, course)
-                if ended is None and budget.iterations > HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends):
-                    ended = Failure(Outcome.MARCH_FAILED)
-                if ended is not None:
-                    break
-            after = guarded(partial(_next, line, check, first, state, course))
-            if isinstance(after, Failure):
-                ended = after
-                break
-            state, course = after
-            if budget.iterations >= saved_at + ITERATIONS_PER_SAVE:
-                # done in every history, so that an interrupted one gives equal numbers
-                state, saved_at = in_rows(state), budget.iterations
-                work.drop_factor()
-                if self._keep is not None:
-                    # what its time limit has ended is not complete
-                    done = {key: each for key, each in self._done.items() if each.failure.outcome not in ENDS_ALL}
-                    self._keep(pack(Progress(done, name, state, course, saved_at, computing_time() - began)))
-        if state is not None and ended is AS_ASKED:
-            if state.cycle < course.end < math.inf and not state.wears:
-                # nothing wears any more: the state holds for all later counts
-                course = course.after(course.end, course.nodes[-1].report, course.nodes[-1].rate, 0.0)
-            if stable_end:
-                ended = guarded(partial(unstable_at_end, work, state)) or ended
-        self._done[name] = Ended(state, ended, course, budget.iterations, computing_time() - began)
-        return self._done[name]
 
 
 def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
@@ -276,50 +215,17 @@ def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
     return fewer(resolution, SolverSettings())
 
 
-def begin_reference(work: WearingJoint, step_limit: float) -> WearState:
+def begin_reference(setup: WearingJoint) -> WearState:
     """The unworn state of the reference solution.
 
     The state of the reference sweep has another tangential history, which may decide whether a pair goes on slipping
     while the joint wears. So the state is solved with twice the difference (dovetail, 212.5 Hz: 0.082 or 0.106 mm3;
     both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep is taken.
     """
-    begun, fine, reference = work.begin(step_limit, of_reference=True), work.start.state, work.start.reference
+    begun, fine, reference = setup.begin(of_reference=True), setup.start.state, setup.start.reference
     if fine is None or reference is None:
         return begun
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
-    balance, first = Balance(work.joint_of(begun), history, begun.depth), begun.point.evaluation.predicted_h
-    point = work.run.state(balance, first, most=NEAR_ITERATIONS)
-    return begun if point is None else work.with_rates(replace(begun, point=point))
-
-
-def guarded(compute: Callable[[], T]) -> T | Failure:
-    """Result of a computation, or its error as a failure."""
-    try:
-        return compute()
-    except np.linalg.LinAlgError:
-        return Failure(Outcome.SINGULAR)
-    except OutOfTimeError:
-        return Failure(Outcome.TIME_LIMIT)
-    except Exception as error:
-        # an error spoils one point only: the study goes on
-        return Failure(Outcome.EXCEPTION, describe_error(error))
-
-
-def _next(
-    line: WearLine, check: Check, first: Callable[[], WearState], before: WearState | None, course: Course
-) -> tuple[WearState, Course] | Failure:
-    """The first state, or that at the end of the next step, checked and stored; or why there is none."""
-    work, error = line.work, 0.0
-    if before is None:
-        found = work.at_followed(first())
-    else:
-        step = line.step(before)
-        if isinstance(step, Failure):
-            return step
-        found, error = work.out_of_range(step.state) or step.state, step.error
-    checked = found if isinstance(found, Failure) else check(work, found)
-    if isinstance(checked, Failure):
-        return checked
-    state, report = checked
-    course = course.after(state.cycle, report, work.rate(state.point.evaluation), error)
-    return state if before is not None else line.begin(state), course
+    balance = Balance(setup.joint_of(begun), history, begun.depth)
+    point = setup.run.state(balance, begun.at.predicted_h, most=NEAR_ITERATIONS)
+    return begun if point is None else setup.with_rates(replace(begun, point=point))

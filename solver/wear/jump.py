@@ -5,9 +5,8 @@ its mean position gets a soft hold in the direction without stiffness:
 
 Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
 the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the
-slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Strictly, the root creeps by about g / F of its slip
-path in a period, and motion and wear change by g / F at most. So a soft spring holds the mean position from there on.
-Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
+slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Motion and wear change by g / F at most where a soft
+spring holds the mean position. Where g / F is no longer negligible there is no periodic state: ADRIFT.
 """
 
 from __future__ import annotations
@@ -31,64 +30,58 @@ from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 
-def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
-    """A stable state behind the last state of a branch: with a hold, or of another branch.
-
-    worn (n_contact,): depth of the new state, m. cycle: its count.
-    """
-    work.run.budget.limit = work.run.budget.iterations + SEARCH_ITERATIONS
-    reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
+def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
+    """A stable state of depths (n_contact,), m, behind the end of a branch: with a hold, or of another branch."""
+    setup.run.budget.limit = setup.run.budget.iterations + SEARCH_ITERATIONS
+    reached = _held(setup, state, worn) or _on_another_branch(setup, state, worn)
     if isinstance(reached, Failure) and reached.outcome is Outcome.ADRIFT:
         # the last pairs that stick come loose together
-        reached = _held(work, state, worn, drifts=True) or reached
-    work.run.budget.limit = float("inf")
-    return reached if isinstance(reached, Failure) else work.with_rates(replace(reached, cycle=cycle, previous=None))
+        reached = _held(setup, state, worn, drifts=True) or reached
+    setup.run.budget.limit = float("inf")
+    return reached if isinstance(reached, Failure) else setup.with_rates(replace(reached, cycle=cycle, previous=None))
 
 
-def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
+def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
     """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends.
 
     drifts: whether the joint is known to slide as a whole, although some pairs still stick.
     """
-    at, before = state.point.evaluation, state.depth
-    hold = None if state.hold is not None else free_slide(work.joint_of(state), at, drifts=drifts)
+    case, joint = setup.of(state)
+    hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    joint = work.case.held(hold).joint(state.omega, work.excitation_amplitude)
+    joint = case.held(hold).joint(state.omega, setup.excitation_amplitude)
 
     def balance_at(fraction: float, _: FloatArray) -> Balance:
-        return Balance(joint, state.point.history, before + fraction * (worn - before))
+        return Balance(joint, state.point.history, state.depth + fraction * (worn - state.depth))
 
-    found, arrived = follow_naturally(balance_at, replace(state.point, parameter=0.0), 1.0, work.run)
+    found, arrived = follow_naturally(balance_at, replace(state.point, parameter=0.0), 1.0, setup.run)
     there = found.evaluation
-    if not arrived or not work.is_stable(joint, there) or creeps(joint, hold, there):
-        return None
-    if vibration_change(at, there) > OTHER_BRANCH:
+    stable = arrived and setup.run.is_stable(Balance(joint, there.history, there.wear_depth), there)
+    if not stable or creeps(joint, hold, there) or vibration_change(state.at, there) > OTHER_BRANCH:
         return None
     return replace(state, point=State(there, found.history), hold=hold, held_from=state.cycle)
 
 
-def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
+def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
     """The state of another branch to which the structure relaxes in time at depths `worn` (n_contact,), m.
 
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    joint, last = work.joint_of(state), state.point
-    found = relax_to_periodic(work.case, joint, worn, last, joint, work.run)
+    case, joint = setup.of(state)
+    found = relax_to_periodic(case, joint, worn, state.point, joint, setup.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners
-    if vibration_change(last.evaluation, found.evaluation) > OTHER_BRANCH:
+    if vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
         state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))
     return replace(state, point=found)
 
 
 def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | None:
-    """Hold of the mean position of a state.
-
-    None unless every pair slips at some time, or it `drifts`, and the structure is free to slide in one direction;
-    masses on rigid ground have a hold of their own (`Penalty.mean`).
+    """Hold of the mean position of a state; None unless every pair slips at some time, or it `drifts`, and the
+    structure is free to slide in one direction. Masses on rigid ground have a hold of their own (`Penalty.mean`).
     """
     if ((at.status_t == STICK).all(axis=1).any() and not drifts) or joint.law.rate_dependent:
         return None

@@ -12,64 +12,56 @@ from dataclasses import replace
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, STICK
-from solver.contact.wear_law import WearingWork
-from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
+from solver.harmonic_balance.dlft import Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
-from solver.newton.run import Run
 from solver.outcome import in_digits
 from solver.structure.joint import Joint
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 LARGEST_MOVED_LOAD = 10.0
 """Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of the
 worn volume is a sufficient warning (27 % with 0.6)."""
 
 
-def rate_changes(
-    joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, depths: FloatArray, run: Run
-) -> FloatArray:
+def rate_slope(setup: WearingJoint, state: WearState, pairs: BoolArray) -> FloatArray:
+    """Derivative dg/dW (n_contact, n_contact), 1 per cycle, with one column a pair; those not in `pairs` are 0."""
+    slope = np.zeros((pairs.size, pairs.size))
+    slope[:, pairs] = _rate_changes(setup, state, np.eye(pairs.size)[pairs], fixed_factors=False).T
+    return slope
+
+
+def _rate_changes(setup: WearingJoint, state: WearState, depths: FloatArray, *, fixed_factors: bool) -> FloatArray:
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m.
 
-    joint, at: the joint and its converged state. gain (n_contact,): growth of the depth over wearing work in one cycle,
-    m/J. wearing: part of the slip work that wears. depths (k, n_contact): the changes.
-    run: solves with the Jacobian of the state, to the relative residual of a Newton direction.
+    To the relative residual of a Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
-    balance = Balance(joint, at.history, at.wear_depth)
-    growth = replace(balance, wear_gain=gain, wearing=replace(wearing, depth_held=True)).linearise(at).growth_tangent
-    found = depths * (gain * wearing.slopes(*worn_by(at))[2])
+    at, joint, balance, gain = state.at, setup.joint_of(state), setup.balance_of(state), setup.gain(1.0)
+    fixed = replace(setup.wearing, depth_held=True)
+    growth = replace(balance, wear_gain=gain, wearing=fixed).linearise(at).growth_tangent
+    found = depths * (gain * (fixed if fixed_factors else setup.wearing).slopes(*worn_by(at))[2])
     closing = np.where(joint.component_index % 3 == 0, depths[:, joint.component_index // 3], 0.0)
     # nothing acts back on a constant normal force
     acting = closing.any(axis=1)
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = run.steps(balance, at, rights)
+        steps = setup.run.steps(balance, at, rights)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
         found[acting] += (growth * moved).sum(axis=2)
     return found
 
 
-def rate_slope(
-    joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, pairs: BoolArray, run: Run
-) -> FloatArray:
-    """Derivative dg/dW (n_contact, n_contact), 1 per cycle, with one column a pair; those not in `pairs` are 0."""
-    slope = np.zeros((pairs.size, pairs.size))
-    slope[:, pairs] = rate_changes(joint, at, gain, wearing, np.eye(pairs.size)[pairs], run).T
-    return slope
-
-
-def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, run: Run) -> float:
+def explicit_step_limit(setup: WearingJoint, state: WearState) -> float:
     """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
 
-    The wear rate falls where wear takes load off a pair. A step multiplies a disturbance of W by 1 + h dg/dW, which
-    grows where h exceeds 2 / mu, with mu the largest positive eigenvalue of -dg/dW, by Arnoldi's method. A complex one
-    counts where its real part is larger than its imaginary part. That the wearing work depends on the depth itself is
-    neglected.
+    A step multiplies a disturbance of W by 1 + h dg/dW: 2 over the largest positive eigenvalue of -dg/dW, by Arnoldi's
+    method. A complex one counts where its real part is larger than its imaginary part.
     """
-    wears, held = gain * wearing.work(*worn_by(at)) > 0.0, replace(wearing, depth_held=True)
+    wears = setup.rate(state.at) > 0.0
 
     def product(depths: FloatArray) -> FloatArray:
-        return np.asarray(-rate_changes(joint, at, gain, held, depths[None], run)[0])
+        return np.asarray(-_rate_changes(setup, state, depths[None], fixed_factors=True)[0])
 
     # depths of pairs whose rates follow no depth do not matter
     start = product(np.where(wears, np.random.default_rng(0).normal(size=wears.size), 0.0))
@@ -85,8 +77,8 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing:
 def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, free_tangents: bool = True) -> float:
     """Change of the mean normal forces by wear to depths (n_contact,), m, relative to these forces, both as norms.
 
-    Of the linear static structure; pairs that are open throughout the period carry no force. before: state at the start
-    of the step. free_tangents: whether the tangents of pairs that slip are free; if not, a bound, which is cheaper.
+    Of the linear static structure, from the state before the step. free_tangents: whether the tangents of pairs that
+    slip are free; if not, a bound, which is cheaper.
     """
     pair, component = joint.component_index // 3, joint.component_index % 3
     stuck = (before.status_t == STICK).all(axis=1)
@@ -103,20 +95,16 @@ def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, 
     return moved / preload if preload > 0.0 else 0.0
 
 
-def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: float, length: float) -> str | None:
-    """Why a step or a jump is rejected because of its wear, and which length would be accepted; None if it is not.
-
-    joint, before: at the start. wear_depth (n_contact,): at the end, m. cycle, length: count at the start, and cycles.
-    """
-    if moved_fraction(joint, before, wear_depth, free_tangents=False) <= LARGEST_MOVED_LOAD:
-        return None
-    fraction = moved_fraction(joint, before, wear_depth)
-    if fraction <= LARGEST_MOVED_LOAD:
-        return None
+def too_long(setup: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> str | None:
+    """Why a step or a jump of some cycles to depths (n_contact,), m, is rejected, and how long it may be; else None."""
+    for free_tangents in (False, True):
+        fraction = moved_fraction(setup.joint_of(state), state.at, wear_depth, free_tangents=free_tangents)
+        if fraction <= LARGEST_MOVED_LOAD:
+            return None
     # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
     advised = length * LARGEST_MOVED_LOAD / 100.0 / fraction
     on, times, most = in_digits(length, 3), in_digits(fraction, 2), in_digits(advised, 2)
     return (
-        f"wearing on for {on} cycles at once from cycle {in_digits(cycle)} on moves {times} times the normal forces"
-        f" of the joint: at most {most} cycles at once would do"
+        f"wearing on for {on} cycles at once from cycle {in_digits(state.cycle)} on moves {times} times the normal"
+        f" forces of the joint: at most {most} cycles at once would do"
     )

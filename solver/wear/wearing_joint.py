@@ -25,24 +25,9 @@ from solver.packing import packable
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution
 from solver.structure.joint import Case, Hold, Joint
-from solver.wear.rate_slope import explicit_step_limit
 
 NO_WEAR = 1e-12
 """Fraction of `WearState.most_rate`: a joint that wears less sticks, and its rate is round-off."""
-
-
-@packable
-@dataclass(frozen=True)
-class Choice:
-    """The last choice of harmonics and samples.
-
-    left_out: fraction of the contact force in harmonics that are left out, of the state for which they were chosen.
-    estimate: errors of response and wear rate. accurate: whether they are below rtol; True for given harmonics.
-    """
-
-    left_out: float
-    estimate: Estimate
-    accurate: bool
 
 
 @packable
@@ -66,30 +51,31 @@ class WearState:
     """A wearing joint at one cycle count; the next step depends on this state only.
 
     cycle: count. omega: of the excitation, rad/s. point: periodic state with its depth and tangential history.
-    resolution, choice: harmonics and samples of the state, and their last choice.
+    resolution: harmonics and samples; resolutions: those from a cycle count on.
+    left_out, estimate, accurate: of the state for which they were chosen: fraction of the contact force in harmonics
+        that are left out, errors, and whether these are below rtol (True for given harmonics).
     rates, largest_rates (n_contact + 1,): wear rates of the pairs and, last, of all together, and their largest values
-        so far, m3 per cycle; NaN and zero before the first state.
-    most_rate: wear rate if every pair slipped as far as it moves, m3 per cycle.
-    step_limit: largest stable explicit step at the first state that wears, cycles; NaN as long as nothing wears.
+        so far, m3 per cycle. most_rate: if every pair slipped as far as it moves.
+    step_limit: largest stable explicit step at the first state, cycles; NaN where nothing wears.
     previous: the last step; None at the first state and after a jump.
     length, first_length: largest length of the next step, and length of the first adaptive step, cycles.
     judged_h (n_rel, 2H+1): predicted force at the last stability check, N; None before.
-    lag, half_width: of a followed frequency: phase lag of the vibration, rad, and change of the frequency over that of
-        the lag, rad/s; 0 for a given frequency.
-    hold, held_from: soft hold of the mean position of a joint that slides as a whole, and the count from which on it is
-        held; None and NaN for none.
+    lag, half_width: of a followed frequency: phase lag, rad, and change of the frequency over that of the lag, rad/s.
+    hold, held_from: soft hold of the mean position, and the count from which on it is held; None and NaN for none.
     jump_cycle: count of the first jump to another branch, NaN if none.
-    inaccurate_from, worst: count from which on harmonics and samples no longer bring the errors below rtol, inf if
-        never, and the largest errors from there on.
+    inaccurate_from, worst: count from which on the errors are above rtol, inf if never; the largest ones from there on.
     """
 
     cycle: float
     omega: float
     point: State
     resolution: Resolution
-    choice: Choice
+    left_out: float
+    estimate: Estimate
+    accurate: bool
     rates: FloatArray
     largest_rates: FloatArray
+    resolutions: tuple[tuple[float, Resolution], ...] = ()
     most_rate: float = 0.0
     step_limit: float = math.nan
     previous: LastStep | None = None
@@ -105,9 +91,14 @@ class WearState:
     worst: Estimate = NOTHING
 
     @property
+    def at(self) -> Evaluation:
+        """Evaluation of the periodic state."""
+        return self.point.evaluation
+
+    @property
     def depth(self) -> FloatArray:
         """Worn depth (n_contact,), m."""
-        return self.point.evaluation.wear_depth
+        return self.at.wear_depth
 
     @property
     def wears(self) -> bool:
@@ -119,8 +110,7 @@ class WearState:
 class WearingJoint:
     """The joint of one wear history.
 
-    case: model, friction and settings, with the resolution and the hold of the last state that was used.
-    start: unworn state, which exists; its load is that of the history.
+    case: model, friction and settings. start: unworn state, which exists; its load is that of the history.
     wear_coefficient: 1/Pa. law: part of the slip work that wears.
     follow: what the frequency of the excitation follows, None for the frequency of the unworn state.
     run: counts the iterations, limits the time, and keeps a factorisation from one solve to the next.
@@ -134,7 +124,7 @@ class WearingJoint:
     excitation_amplitude: float = field(init=False)
     wearing: WearingWork = field(init=False)
     run: Run = field(init=False)
-    _joint: Joint | None = field(default=None, init=False, repr=False)
+    _joint: tuple[Case, Joint] | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         assert self.start.state is not None
@@ -147,28 +137,35 @@ class WearingJoint:
         """Area of the pairs (n_contact,), m2."""
         return self.case.model.contact.area
 
-    def joint(self, resolution: Resolution, hold: Hold | None, omega: float) -> Joint:
-        """The joint with these harmonics and samples, whose change drops the factorisation, at a frequency, rad/s."""
-        if self._joint is None or resolution != self.case.resolution or hold is not self.case.hold:
-            case = self.case if hold is self.case.hold else self.case.held(hold)
-            self.case = case.at(resolution)
-            self._joint = self.case.joint(omega, self.excitation_amplitude)
+    def of(self, state: WearState) -> tuple[Case, Joint]:
+        """Case and joint of a state. The last ones are stored; others drop the factorisation."""
+        last = self._joint
+        if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
+            case = self.case if state.hold is None else self.case.held(state.hold)
+            case = case.at(state.resolution)
             self.drop_factor()
-        elif omega != self._joint.omega:
-            self._joint = self.case.joint(omega, self.excitation_amplitude)
+        elif state.omega != last[1].omega:
+            case = last[0]
+        else:
+            return last
+        self._joint = case, case.joint(state.omega, self.excitation_amplitude)
         return self._joint
 
     def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
-        return self.joint(state.resolution, state.hold, state.omega)
+        return self.of(state)[1]
+
+    def balance_of(self, state: WearState) -> Balance:
+        """The balance that a state solves at constant wear depth."""
+        return Balance(self.joint_of(state), state.at.history, state.depth)
 
     def drop_factor(self) -> None:
         """Drop the kept factorisation, so that the next solve depends on the state alone."""
         self.run = self.run.fresh()
 
-    def is_stable(self, joint: Joint, at: Evaluation) -> bool:
+    def is_stable(self, state: WearState) -> bool:
         """Whether a state is stable at constant wear depth."""
-        return self.run.is_stable(Balance(joint, at.history, at.wear_depth), at)
+        return self.run.is_stable(self.balance_of(state), state.at)
 
     def rate(self, at: Evaluation) -> FloatArray:
         """Wear rate (n_contact,), m per cycle, Eqs. (7), (21), (25)."""
@@ -178,66 +175,58 @@ class WearingJoint:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
         return cycles * self.wear_coefficient / self.area
 
-    def begin(self, step_limit: float = math.nan, *, of_reference: bool = False) -> WearState:
+    def begin(self, *, of_reference: bool = False) -> WearState:
         """The unworn state, or that of the reference sweep where there is one, evaluated and not solved again."""
         start = self.start
         state = start.reference if of_reference and start.reference is not None else start.state
         assert state is not None
-        balance = Balance(self.joint(start.resolution, None, state.omega), state.start_history, state.wear_depth)
+        joint = self.case.at(start.resolution).joint(state.omega, self.excitation_amplitude)
+        balance = Balance(joint, state.start_history, state.wear_depth)
         at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
-        estimate = Estimate(start.response_error, start.wear_rate_error)
-        unknown = np.full(self.area.size + 1, np.nan)
+        nothing = np.zeros(self.area.size + 1)
         begun = WearState(
             0.0,
             state.omega,
             State(at, final_history(balance, at)),
             start.resolution,
-            Choice(left_out(start.resolution.orders, at), estimate, start.outcome is Outcome.CONVERGED),
-            rates=unknown,
-            largest_rates=np.zeros_like(unknown),
-            step_limit=step_limit,
+            left_out(start.resolution.orders, at),
+            Estimate(start.response_error, start.wear_rate_error),
+            accurate=start.outcome is Outcome.CONVERGED,
+            rates=nothing,
+            largest_rates=nothing,
             # the stability of a start state has been checked
             judged_h=at.predicted_h,
         )
         return self.with_rates(begun)
 
     def with_rates(self, state: WearState) -> WearState:
-        """The state with its wear rates, and with the limit of the explicit step from the first state that wears on."""
-        at = state.point.evaluation
-        volumes = self.rate(at) * self.area
+        """The state with its wear rates."""
+        volumes = self.rate(state.at) * self.area
         # the static slip included: where all pairs stick, the vibration alone is round-off
-        pressed = np.abs(at.force_t[:, 0]).max(axis=1)
-        moved = float(pressed @ np.linalg.norm(at.displacement_h[:, 1:], axis=(1, 2)))
-        most = self.wear_coefficient * (self.wearing.largest_factor * moved)
+        pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
+        moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
+        most = max(state.most_rate, self.wear_coefficient * (self.wearing.largest_factor * moved))
         rates = np.append(volumes, volumes.sum())
-        largest = np.maximum(state.largest_rates, np.abs(rates))
-        state = replace(state, rates=rates, largest_rates=largest, most_rate=max(state.most_rate, most))
-        if np.isnan(state.step_limit) and state.wears:
-            limit = explicit_step_limit(self.joint_of(state), at, self.gain(1.0), self.wearing, self.run)
-            state = replace(state, step_limit=limit)
-        return state
+        return replace(state, rates=rates, largest_rates=np.maximum(state.largest_rates, np.abs(rates)), most_rate=most)
 
     def solve(
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS
     ) -> WearState | None:
-        """The state before with the solution of a balance, or None. A followed frequency starts at that of the balance.
-
-        start (n_rel, 2H+1): first predicted force, N. most: Newton iterations.
-        """
+        """The state before with the solution of a balance from a first predicted force (n_rel, 2H+1), N, or None."""
         if self.follow is None:
             point = self.run.state(balance, start, most=most)
             return None if point is None else replace(state, point=point)
-        lag = state.lag
+        case, lag = self.of(state)[0], state.lag
         if self.follow.of == "peak":
-            peak = solve_at_peak(self.case, balance, start, lag, self.run, most)
+            peak = solve_at_peak(case, balance, start, lag, self.run, most)
             found, lag = (None, lag) if peak is None else peak
         else:
-            found = solve_at_lag(self.case, balance, start, lag, self.run, most)
+            found = solve_at_lag(case, balance, start, lag, self.run, most)
         if found is None:
             return None
         turn = math.nan if found.reduced is None else abs(float(found.reduced[0, 0]))
         if math.isnan(turn) and state.half_width == 0.0:
-            turn = abs(rise_of_response(found, self.run, accepted_rise(self.case.settings.rtol))[1])
+            turn = abs(rise_of_response(found, self.run, accepted_rise(case.settings.rtol))[1])
         half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
         point = State(found.at, final_history(found.balance, found.at))
         return replace(state, point=point, omega=float(found.values[0]), lag=lag, half_width=half_width)
@@ -246,9 +235,7 @@ class WearingJoint:
         """The state at the frequency that is followed, with its depths and its tangential history."""
         if self.follow is None:
             return state
-        at = state.point.evaluation
-        balance = Balance(self.joint_of(state), at.history, at.wear_depth)
-        found = self.solve(balance, at.predicted_h, state, MOST_ITERATIONS)
+        found = self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS)
         return found or self.lost(state, Failure(Outcome.RESONANCE_LOST))
 
     def lost(self, state: WearState, failure: Failure) -> Failure:
@@ -268,14 +255,12 @@ class WearingJoint:
         return Failure(Outcome.RESONANCE_LOST, f"{said}, out of the range from {wanted.low:g} to {wanted.high:g} Hz")
 
     def frequency_error(self, state: WearState) -> float:
-        """Error of a followed frequency, Hz, by the relative error of the response; 0 for a given one.
-
-        The phase lag is wrong by as much as the amplitude. Every amplitude that is less than the largest one by its
-        error may be the largest one.
+        """Error of a followed frequency, Hz; 0 for a given one. The phase lag is wrong by as much as the amplitude, and
+        every amplitude that is less than the largest one by its error may be the largest one.
         """
         if self.follow is None:
             return 0.0
-        lag = state.choice.estimate.response
+        lag = state.estimate.response
         if self.follow.of == "peak":
             lag = math.sqrt(2.0 * lag) + accepted_rise(self.case.settings.rtol)
         return state.half_width * lag / (2.0 * math.pi)

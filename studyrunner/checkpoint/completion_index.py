@@ -16,37 +16,18 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
-from studyrunner.kinds.kind import kind_of
 from studyrunner.kinds.task import Identity, PointResult, Result, StartResult, Task, TaskPlan, digest, unpack_start
-from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene import SceneFacts, record_fields
 from studyrunner.study.study import Study
-from studyrunner.variables import COUNTS, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 MOST_CRASHES = 3
 """A task is given up after so many runs in a row that were killed or crashed before the task had given anything. Such
 tasks are tried one after the other, so that another task is seldom to blame."""
 
 
-def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
-    """Lengths of the dimensions after the axes."""
-    return {
-        **study.sizes,
-        "contact": len(facts.area),
-        "response": len(facts.response_names),
-        **({"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}),
-    }
-
-
 def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
     """Data type of the record of a point: all values of a result."""
-    sizes = variable_sizes(study, facts)
-    fields: list[tuple[str, str, tuple[int, ...]]] = [(name, entry.dtype, ()) for name, entry in study.kept.items()]
-    for name in kind_of(study).variables(study):
-        # of all pairs, only those asked for have a loop
-        lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
-        entry = {**study.variables, **LOOPS, **COUNTS}[name]
-        fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
-    return np.dtype(fields)
+    return np.dtype(record_fields(study, facts))
 
 
 @functools.lru_cache(maxsize=1)
@@ -91,14 +72,14 @@ class CompletionIndex:
         """Hashes of the results of a task, by place."""
         return self._names[task.key]
 
-    def _is_there(self, task: Task) -> list[bool]:
-        """Whether each result of a task is there, by place."""
+    def _missing(self, task: Task) -> list[int]:
+        """Places of a task whose result is not there."""
         there = self.store.keys(STARTS if task.gives_starts else RESULTS)
-        return [name in there for name in self._names[task.key]]
+        return [place for place, name in enumerate(self._names[task.key]) if name not in there]
 
     def is_finished(self, task: Task) -> bool:
         """Whether all results of a task are there."""
-        return all(self._is_there(task))
+        return not self._missing(task)
 
     def read_results(self, names: Sequence[str]) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
         """Records (n,) of the results with these hashes, and whether each exists; else the record is empty.
@@ -119,23 +100,15 @@ class CompletionIndex:
     @property
     def n_points_finished(self) -> int:
         """Number of points whose result is there."""
-        return sum(
-            len(task.points(place))
-            for task in self.plan.results
-            for place, is_there in enumerate(self._is_there(task))
-            if is_there
-        )
+        left = sum(len(task.points(place)) for task in self.plan.results for place in self._missing(task))
+        return self.plan.n_points - left
 
     def left(self, task: Task, needed: Collection[int] | None = None) -> Task | None:
         """What is left of a task, with its progress; None for nothing. needed: places; None for all."""
-        known = task.known | frozenset(
-            place
-            for place, is_there in enumerate(self._is_there(task))
-            if is_there or (needed is not None and place not in needed)
-        )
-        if len(known) == len(task.order):
+        left = {place for place in self._missing(task) if needed is None or place in needed} - task.known
+        if not left:
             return None
-        return replace(task, known=known, resume=self.store.read(PROGRESS, task.key))
+        return replace(task, known=frozenset(task.order) - left, resume=self.store.read(PROGRESS, task.key))
 
     def sweeps_left(self) -> list[Task]:
         """Sweeps with start states that are needed and not known."""
@@ -184,7 +157,7 @@ class CompletionIndex:
         for sweep in self.plan.sweeps:
             for place, name in enumerate(self._names[sweep.key]):
                 start = self.store.read(STARTS, name)
-                if start is not None and unpack_start(place, start).failed:
+                if start is not None and unpack_start(place, start).n_unknowns == 0:
                     without_state.add((sweep.number, place))
                     self.store.forget(STARTS, name)
                     self.store.forget(PROGRESS, sweep.key)
@@ -205,20 +178,14 @@ class CompletionIndex:
         A sweep ends before the first of its start states that is not there.
         """
         message = f"{MOST_CRASHES} runs in a row have crashed or were killed while they were at it"
-        given_up = {key for key, number in self.store.crashes.items() if number >= MOST_CRASHES}
-        lost = {
-            (sweep.number, place)
-            for sweep in self.plan.sweeps
-            if sweep.key in given_up
-            for place, is_there in enumerate(self._is_there(sweep))
-            if not is_there
-        }
+        given_up = {key for key, number in self.store.crashes.items() if number >= MOST_CRASHES} & self._names.keys()
+        swept = [sweep for sweep in self.plan.sweeps if sweep.key in given_up]
+        lost = {(sweep.number, place) for sweep in swept for place in self._missing(sweep)}
         for task in self.plan.results:
             if task.key in given_up or task.waits_for in lost:
-                for place, is_there in enumerate(self._is_there(task)):
-                    if not is_there:
-                        self.add(task, task.failed(place, Outcome.CRASHED, message))
-        for key in given_up & self._names.keys():
+                for place in self._missing(task):
+                    self.add(task, task.failed(place, Outcome.CRASHED, message))
+        for key in given_up:
             self.store.note_life(key)
 
     def forget_all(self) -> None:
@@ -233,8 +200,7 @@ class CompletionIndex:
 
     def _needed(self, sweep: Task) -> frozenset[int]:
         """Places of a sweep from which a task is still to begin."""
+        waiting = self.plan.waiting
         return frozenset(
-            place
-            for place in sweep.order
-            if not all(self.is_finished(task) for task in self.plan.waiting.get((sweep.number, place), ()))
+            place for place in sweep.order if not all(map(self.is_finished, waiting.get((sweep.number, place), ())))
         )

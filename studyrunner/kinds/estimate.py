@@ -20,10 +20,8 @@ _AN_ADAPTIVE_STEP = 7  # with refused steps and the reference solution (36 and 4
 _OF_BLOCK = 20  # of a mission behind its start state (slider: 10 to 35)
 _OF_PASSAGE = 900  # (dovetail with 16 pairs, rtol 0.1: 970, 2500 with 40 frequencies, 330 where nothing slips)
 _AN_OCTAVE = 350  # of a wide passage (slider from 1 to 10 000 Hz: 5600, and 2700 of its reference solution)
-
-_ADAPTIVE_STEPS = 40
-_STEPS_TO_THE_END = 100
-"""Of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)."""
+_ADAPTIVE_STEPS = 40  # of a history
+_STEPS_TO_THE_END = 100  # of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)
 
 _MISSIONS_A_DOUBLING = 2.0
 """Missions that are computed for each doubling of their number, by the history and again by its reference solution: 6
@@ -45,13 +43,13 @@ _BASE_MEMORY = 250e6
 _NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run
 
 
-def seconds_an_iteration(n_unknowns: int) -> float:
-    """Time of one Newton iteration, s, on average: few of them factorise the Jacobian anew.
+def seconds_of(n_unknowns: int, iterations: float) -> float:
+    """Time of Newton iterations, s: few of them factorise the Jacobian anew.
 
     Fits 1.5, 4, 6.5, 8, 35, 45 and 140 ms measured at 20, 660, 1144, 1584, 3360, 5280 and 7056 unknowns within a factor
     of 1.8.
     """
-    return 1.5e-3 + 5e-6 * n_unknowns + 1.0e-9 * float(n_unknowns) ** 2
+    return iterations * (1.5e-3 + 5e-6 * n_unknowns + 1.0e-9 * float(n_unknowns) ** 2)
 
 
 def iterations_of_sweep(sweep: str, n_frequencies: int) -> int:
@@ -85,8 +83,7 @@ def missions_computed(missions: float) -> int:
 def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float, *, one_pair: bool) -> float:
     """Newton iterations of a mission history.
 
-    blocks: how each block begins, and the octaves of a passage, 0 for steady vibration. one_pair: whether the joint has
-    one contact pair only.
+    blocks: how each begins, and the octaves of a passage, 0 for steady vibration. one_pair: whether the joint has one.
     """
     each = 0.0
     for begin, octaves in blocks:
@@ -104,14 +101,12 @@ def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_wi
 
     Measured 0.37, 1.10 and 2.72 GB at 48, 160 and 336 pairs with automatic harmonics: within a factor of 1.2.
 
-    n_unknowns: number of unknowns of the largest state. result_values: numbers in the result. automatic: whether the
-    largest state has `AUTOMATIC_HARMONICS`. built_with: memory that building the scene takes beside the libraries,
-    bytes.
+    n_unknowns: of the largest state. result_values: numbers in the result. automatic: whether the state has
+    `AUTOMATIC_HARMONICS`. built_with: memory that building the scene takes beside the libraries, bytes.
     """
     grown = (2.0 * _AUTOMATIC_HARMONICS_AT_MOST + 1.0) / (2.0 * AUTOMATIC_HARMONICS + 1.0) if automatic else 1.0
-    solved = 8.0 * (grown * n_unknowns) ** 2
     built = _NOTICED_MEMORY * math.floor(built_with / _NOTICED_MEMORY)
-    return _BASE_MEMORY + max(solved, built) + 8.0 * result_values
+    return _BASE_MEMORY + max(8.0 * (grown * n_unknowns) ** 2, built) + 8.0 * result_values
 
 
 def largest_memory() -> float:

@@ -1,37 +1,19 @@
-"""Study -> its kind and its tasks: the only place of the runner that asks which kind it is."""
+"""Study -> its tasks, whatever its kind."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from studyrunner.kinds import missions, modes, wear_plan
+from studyrunner.kinds.missions import Mission
+from studyrunner.kinds.modes import Mode
 from studyrunner.kinds.task import Task, TaskPlan
+from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.study import MISSIONS, MODES, Study
-
-
-class Kind(Protocol):
-    """What a kind of study has of its own. TIME: how well the time of a run is known before, for `--plan`."""
-
-    TIME: str
-
-    def variables(self, study: Study) -> tuple[str, ...]:
-        """Variables of a result: those asked for and those that the last lines of a run are made of."""
-
-    def build_tasks(self, study: Study, n_displacements: Sequence[int], contacts: Any, scenes: SceneSet) -> TaskPlan:
-        """Tasks of a study."""
-
-    def describe_tasks(self, tasks: Sequence[Task]) -> str:
-        """Tasks in words."""
-
-    def slow_time(self, study: Study) -> list[tuple[str, str]]:
-        """Labels and texts of the lines of `--plan` on cycles or missions."""
-
-
-def kind_of(study: Study) -> Kind:
-    """The kind of a study."""
-    return missions if study.kind is MISSIONS else modes if study.kind is MODES else wear_plan
+from studyrunner.system.progress import count
 
 
 def build_tasks(
@@ -49,4 +31,26 @@ def build_tasks(
     scenes = find_scenes(study) if scenes is None else scenes
     drawn: Sequence[Any] = (((),) * len(study.mission),) * len(scenes.parts) if contacts is None else contacts
     sizes = [n_displacements] * len(scenes.studies) if isinstance(n_displacements, int) else n_displacements
-    return kind_of(study).build_tasks(study, sizes, drawn, scenes)
+    if study.kind is MISSIONS:
+        return missions.build_tasks(study, sizes, drawn, scenes)
+    if study.kind is MODES:
+        return modes.build_tasks(study, sizes, drawn, scenes)
+    return wear_plan.build_tasks(study, sizes, drawn, scenes)
+
+
+def describe_tasks(tasks: Sequence[Task]) -> str:
+    """Tasks in words."""
+    sweeps = Counter(task.direction == "ramp" for task in tasks if isinstance(task, Sweep))
+    n_results = Counter[type]()
+    for task in tasks:
+        # of a history those that are integrated
+        n_results[type(task)] += len(task.integrated) if isinstance(task, History) else task.n_results
+    ways = " and ".join(count(sweeps[ramp], word) for ramp, word in ((False, "sweep"), (True, "ramp")) if sweeps[ramp])
+    n_modes = sum(isinstance(task, Mode) for task in tasks)
+    parts = {
+        Sweep: f"{count(n_results[Sweep], 'start state')} by {ways}",
+        History: count(n_results[History], "wear history", "wear histories"),
+        Mode: f"{count(n_modes, 'nonlinear mode')} over the amplitude, {count(n_results[Mode], 'point')}",
+        Mission: f"{count(n_results[Mission], 'mission history', 'mission histories')}, each computed by one rank",
+    }
+    return ", and ".join(text for kind, text in parts.items() if n_results[kind])

@@ -13,7 +13,7 @@ import numpy as np
 from solver.contact.wear_law import WearLaw
 from solver.packing import Packed
 from solver.settings import WearTarget
-from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_an_iteration
+from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
 from studyrunner.kinds.task import (
     Identity,
     Index,
@@ -25,27 +25,23 @@ from studyrunner.kinds.task import (
     TaskPlan,
     described,
     digest,
+    grid,
     joint_of,
     n_unknowns_of,
     number_points,
     raise_fault,
     settings_at,
 )
-from studyrunner.mpi.cost_model import CostKeys
+from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.mission import MissionBlock
 from studyrunner.study.realisation import Realisation
-from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.system.progress import count
 from studyrunner.units import show_count
 
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
-    from solver.model import FloatArray, ReducedModel
-
-TIME = "to a factor of three, if every block wears"
+    from solver.model import ReducedModel
 
 _OF_ONE_PAIR = 3
 """Relative displacements of one contact pair, at most."""
@@ -53,8 +49,6 @@ _OF_ONE_PAIR = 3
 _MOST = 0.95
 """Largest share of a history that is said to be done before all of it is: the number of steps is an estimate."""
 
-_POINT = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
-_FOR_THE_TABLE = ("worn_volume", "block_worn_volume")
 _NO_JOINT = Joint(0, None)
 
 
@@ -154,11 +148,6 @@ class Mission(Task):
         return f"mission history {self.number + 1}"
 
 
-def variables(study: Study) -> tuple[str, ...]:
-    """Variables of a mission history: those asked for and those that the last lines of a run are made of."""
-    return tuple(name for name in study.kind.asked if name in (*study.outputs.variables, *_FOR_THE_TABLE))
-
-
 def build_tasks(
     study: Study, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet
 ) -> TaskPlan:
@@ -167,23 +156,20 @@ def build_tasks(
     contacts: what is drawn for the pairs of each part, by block.
     """
     points: dict[Mission, list[Index]] = {}
+    axes = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
     for part, numbers, of_blocks in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
-        sizes = {name: len(getattr(part.study.axes, name)) for name in _POINT}
-        sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
-        for places in itertools.product(*map(range, sizes.values())):
-            at = dict(zip(sizes, places, strict=True))
-            task = _task(study, part, at, tuple(_blocks(part, at, numbers, of_blocks)), n_displacements)
+        for at in grid(part.study, *axes):
+            blocks = tuple(_blocks(part.study, at, numbers, of_blocks))
+            task = _task(study, part, at, blocks, [n_displacements[block.joint.scene] for block in blocks])
             points.setdefault(task, []).append((*(at[name] for name in study.own_axes), *part.place))
     return number_points({task: [tuple(indices)] for task, indices in points.items()}, study)
 
 
 def _blocks(
-    part: Realisation, at: Mapping[str, int], scenes: Sequence[int], contacts: Sequence[ContactChange]
+    part: Study, at: Mapping[str, int], scenes: Sequence[int], contacts: Sequence[ContactChange]
 ) -> Iterator[PlannedBlock]:
     """The blocks of a point. at: indices of the point along the axes."""
-    sweep = part.study.axes.sweep[at["sweep"]]
-    of_blocks = zip(part.study.mission, part.study.block_studies, scenes, contacts, strict=True)
-    for given, study, scene, contact in of_blocks:
+    for given, study, scene, contact in zip(part.mission, part.block_studies, scenes, contacts, strict=True):
         amplitude, frequency = (
             getattr(study.axes, name)[0 if given.gives(name) else at[name]]
             for name in ("excitation_amplitude", "frequency")
@@ -193,7 +179,7 @@ def _blocks(
             frequency, stop = given.frequency["start"], given.frequency["stop"]
             passage, begin = (stop, given.frequency["rate"]), "up" if stop > frequency else "down"
         elif begin == "sweep":
-            begin = sweep
+            begin = part.axes.sweep[at["sweep"]]
         joint = joint_of(study, scene, contact)
         yield PlannedBlock(given.name, joint, frequency, passage, amplitude, given.cycles_at(frequency), begin)
 
@@ -205,53 +191,27 @@ def _task(
     blocks: tuple[PlannedBlock, ...],
     n_displacements: Sequence[int],
 ) -> Mission:
-    """The task of a point, without its number and its points."""
+    """The task of a point, without its number and its points. n_displacements: of each block."""
     settings = settings_at(study, at)
-    n_unknowns = max(n_unknowns_of(n_displacements[block.joint.scene], settings.harmonics) for block in blocks)
-    one_pair = n_displacements[blocks[0].joint.scene] <= _OF_ONE_PAIR
+    n_unknowns = max(n_unknowns_of(number, settings.harmonics) for number in n_displacements)
     ways = [
         (block.begin, abs(math.log2(block.passage[0] / block.frequency)) if block.passage else 0.0) for block in blocks
     ]
-    iterations = iterations_of_missions(ways, study.cycles_kept[-1], one_pair=one_pair)
+    one_pair = n_displacements[0] <= _OF_ONE_PAIR
     return Mission(
         number=0,
         settings=settings,
-        cost=seconds_an_iteration(n_unknowns) * iterations,
+        cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.cycles_kept[-1], one_pair=one_pair)),
         blocks=blocks,
         law=part.study.wear_law,
         wear_coefficient=part.study.axes.wear_coefficient[at["wear_coefficient"]],
         # only a first block that continues begins by it
         begin=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",
         missions=study.cycles_kept,
-        variables=variables(study),
+        variables=tuple(study.recorded),
         until=study.until,
         n_unknowns=n_unknowns,
     )
-
-
-def describe_tasks(tasks: Sequence[Task]) -> str:
-    """Tasks in words."""
-    return f"{count(len(tasks), 'mission history', 'mission histories')}, each computed by one rank"
-
-
-def slow_time(study: Study) -> list[tuple[str, str]]:
-    """Number of missions, and the blocks."""
-    kept = count(len(study.cycles_kept), "number is", "numbers are")
-    blocks = zip(study.mission, study.block_studies, strict=True)
-    return [
-        ("missions", f"{study.slow_time.missions}, of which {kept} kept"),
-        *(("block", f"{block.name}: {_describe(block, max(own.axes.frequency))}") for block, own in blocks),
-    ]
-
-
-def _describe(block: MissionBlock, frequency: float) -> str:
-    """A block in words. frequency: of steady vibration, Hz; the largest of an axis."""
-    how = {"ramp": "begins with a ramp", "sweep": "begins with a sweep", "continue": "continues the block before"}
-    cycles = f"{block.cycles_at(frequency):.4g} cycles a mission"
-    if isinstance(block.frequency, dict):
-        passed = "{start:g} to {stop:g} Hz at {rate:g} Hz/s".format(**block.frequency)
-        return f"passage from {passed}, {cycles}"
-    return f"{frequency:g} Hz, {cycles}, {how[block.begin]}"
 
 
 def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
@@ -265,6 +225,7 @@ def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
     deepest = np.nan_to_num(depth).argmax(axis=1)[:, None]
     reached = np.flatnonzero(np.isfinite(worn))
     last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
+    is_state = np.isfinite(history.worn_volume).any() and np.isfinite(history.response_begin).any()
     of_task: Mapping[str, object] = {
         "worn_volume": worn,
         "wear_rate": np.where(np.isfinite(worn), rate, np.nan),
@@ -297,21 +258,13 @@ def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
         "run_time": history.run_time,
         # a mission is computed for the vibration at 0
         "error_estimate": history.error_estimate if counts[-1] > 0.0 else 0.0,
-        "last_mission": _last(history, counts),
+        "last_mission": min(history.last_mission, float(counts[-1])) if is_state else math.nan,
         "largest_wear_depth": float(last.max(initial=0.0)) if reached.size else math.nan,
         "message": "; ".join(filter(None, (history.message, _of_target(task, history)))),
     }
 
 
-def _last(history: MissionHistory, counts: FloatArray) -> float:
-    """Number of missions up to which the point was computed; NaN where there is no state at all."""
-    if not np.isfinite(history.worn_volume).any() or not np.isfinite(history.response_begin).any():
-        return math.nan
-    return min(history.last_mission, float(counts[-1]))
-
-
 def _of_target(task: Mission, history: MissionHistory) -> str:
-    """What there is to say of the target."""
     if task.until is None or not history.outcome.complete:
         return ""
     if math.isnan(history.missions_to_target):

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
-from studyrunner.kinds.estimate import iterations_of_mode, seconds_an_iteration
+from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
 from studyrunner.kinds.task import (
     Identity,
     JointTask,
     Keep,
     PointResult,
-    Task,
     TaskPlan,
     described,
     digest,
+    grid,
     joint_of,
     n_unknowns_of,
     number_points,
@@ -26,19 +25,13 @@ from studyrunner.kinds.task import (
     settings_at,
     up_or_down,
 )
-from studyrunner.mpi.cost_model import CostKeys
+from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.system.progress import count
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-
-TIME = "to a factor of three; a mode that is lost at a large amplitude takes longer"
-
-_FOR_THE_TABLE = ("natural_frequency", "damping_ratio")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,11 +55,6 @@ class Mode(JointTask):
         """All modes, this one."""
         return (("mode", ("mode", self.number)),)
 
-    def cost_of(self, *, first: bool) -> float:
-        """The first point with the way to it, or one of the others."""
-        one, two = iterations_of_mode(1), iterations_of_mode(2)
-        return self.cost * (one if first else two - one) / iterations_of_mode(self.n_results)
-
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
         own = (identity.joint(self.joint), self.mode, self.direction, described(self.settings), identity.record)
@@ -83,63 +71,46 @@ class Mode(JointTask):
         friction = self.joint.friction_coefficient
         for place, found in follow_mode(model, friction, amplitudes, self.mode, direction, self.settings):
             raise_fault(found.outcome, found.message)
-            values: Mapping[str, object] = {
+            of_point = {
                 "natural_frequency": found.frequency,
                 "natural_frequency_error": found.frequency_error,
-                "damping_ratio": found.damping_ratio,
                 "damping_ratio_error": found.damping_error,
                 "response_amplitude": np.abs(found.response),
                 "response_phase": np.angle(found.response),
-                "slip_fraction": found.slip_fraction,
-                "open_fraction": found.open_fraction,
-                "harmonics_used": found.harmonics_used,
-                "samples_used": found.samples_used,
             }
-            kept = {
-                "outcome": int(found.outcome),
-                "newton_iterations": found.newton_iterations,
-                "run_time": found.run_time,
-                "message": found.message,
-            }
-            asked = {name: values[name] for name in self.variables}
-            yield PointResult(self.points(wanted[place]), {**asked, **kept}, wanted[place])
+            values = {name: of_point[name] if name in of_point else getattr(found, name) for name in self.variables}
+            kept = {name: getattr(found, name) for name in ("newton_iterations", "run_time", "message")}
+            kept["outcome"] = int(found.outcome)
+            yield PointResult(self.points(wanted[place]), values | kept, wanted[place])
 
     def describe(self, place: int) -> str:
         """Where along the amplitude."""
         return f"mode {self.mode} {self.direction} to {self.amplitudes[place]:.3g} m sqrt(kg)"
 
 
-def variables(study: Study) -> tuple[str, ...]:
-    """Variables of a point of a mode: those asked for and those that the last lines of a run are made of."""
-    return tuple(name for name in study.kind.asked if name in (*study.outputs.variables, *_FOR_THE_TABLE))
-
-
 def build_tasks(
     study: Study, n_displacements: Sequence[int], contacts: Sequence[ContactChange], scenes: SceneSet
 ) -> TaskPlan:
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
-    amplitudes, asked = study.axes.modal_amplitude or (), variables(study)
+    amplitudes = study.axes.modal_amplitude or ()
     ascending = sorted(range(len(amplitudes)), key=lambda place: amplitudes[place])
-    sizes = {"mode": len(study.axes.mode), "sweep": len(study.axes.sweep)}
-    sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
     modes: dict[Mode, list[dict[str, int]]] = {}
     for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
         joint = joint_of(part.study, scene, contact)
         of_part = dict(zip(study.axes_of_parts, part.place, strict=True))
-        for places in itertools.product(*map(range, sizes.values())):
-            at = dict(zip(sizes, places, strict=True))
+        for at in grid(study, "mode", "sweep"):
             settings = settings_at(study, at)
             n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
             mode = Mode(
                 number=0,
                 settings=settings,
-                cost=seconds_an_iteration(n_unknowns) * iterations_of_mode(len(amplitudes)),
+                cost=seconds_of(n_unknowns, iterations_of_mode(len(amplitudes))),
                 n_unknowns=n_unknowns,
                 joint=joint,
                 mode=study.axes.mode[at["mode"]],
                 direction=study.axes.sweep[at["sweep"]],
                 amplitudes=tuple(amplitudes[place] for place in ascending),
-                variables=asked,
+                variables=tuple(study.recorded),
             )
             modes.setdefault(mode, []).append({**at, **of_part})
     indices = {
@@ -151,15 +122,3 @@ def build_tasks(
         for mode, lines in modes.items()
     }
     return number_points(indices, study)
-
-
-def describe_tasks(tasks: Sequence[Task]) -> str:
-    """Tasks in words."""
-    points = count(sum(task.n_results for task in tasks), "point")
-    return f"{count(len(tasks), 'nonlinear mode')} over the amplitude, {points}"
-
-
-def slow_time(study: Study) -> list[tuple[str, str]]:
-    """Nothing wears."""
-    del study
-    return []

@@ -1,8 +1,8 @@
 """Which choices of wear coefficient, step and scheme share one wear history, and why.
 
 The rates of all wear laws are proportional to the wear coefficient: dW/dt = k_w f(W), Eq. (7). With s k_w in place of
-k_w and h / s in place of the step h the same states follow each other, each at the cycle count t / s. A task integrates
-the history of the largest k_w; the other histories are read from this one at the counts s t.
+k_w the same states follow each other, each at the cycle count t / s. Where the scheme chooses its steps, a task
+integrates the history of the largest k_w; the others are read from this one at the counts s t.
 """
 
 from __future__ import annotations
@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from studyrunner.kinds.task import EQUAL_POINTS, Index
 from studyrunner.study.study import Study
 
-_SAME = 1e-12  # relative: numbers of steps that differ by round-off
 _OWN_STEPS = ("adaptive", "final")
 
-IDLE_RTOL, EQUAL = "rtol", "equal points"
-"""Reasons that are no choice of wear coefficient, step and scheme."""
+EQUAL = "equal points"
+"""Reason that is no choice of wear coefficient, step and scheme."""
 
 _REASONS = {
     "cycles": "only the unworn states are asked for, the same for every step and scheme",
@@ -27,8 +26,6 @@ _REASONS = {
     "largest_depth": "slow_time.largest_depth sets the steps of the explicit scheme, whatever the step axis says",
     "adaptive": "the adaptive scheme chooses its steps, for another wear_coefficient the same ones at other counts",
     "final": 'the scheme "final" takes no step of a given length: the same state for every wear_coefficient',
-    "steps": "wear_coefficient times step is that of another point: the same history at other cycle counts",
-    IDLE_RTOL: "rtol is used by nothing: harmonics and samples are given, and the scheme is not adaptive",
     EQUAL: EQUAL_POINTS,
 }
 
@@ -51,10 +48,8 @@ class ScaledHistory:
 class Integrated:
     """A history that is integrated, and the histories of other points that are read from it.
 
-    scheme, largest_depth: as in `SlowTime`.
-    histories: one result each. The first is integrated; it needs the most cycles.
-    unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles. Step and scheme are then those of
-        the first point.
+    scheme, largest_depth: as in `SlowTime`. histories: one result each. The first is integrated; it needs the most
+    cycles. unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles.
     """
 
     scheme: str
@@ -73,23 +68,9 @@ class Integrated:
         return self.histories[0].step
 
     def counts(self, cycles: Sequence[float], scaled: ScaledHistory) -> tuple[float, ...]:
-        """Cycle counts of the integrated history, ascending, at which a history is read, one for each of `cycles`.
-
-        A count at the end of a step is moved slightly before the end, so that round-off does not move the count to the
-        next step.
-        """
-        if self.unworn:
-            return (0.0,) * len(cycles)
-        if scaled == self.histories[0]:
-            return tuple(cycles)
-        if self.scheme in _OWN_STEPS:
-            ratio = scaled.wear_coefficient / self.wear_coefficient
-            return tuple(ratio * cycle for cycle in cycles)
-        steps = [cycle / scaled.step for cycle in cycles]
-        wholes = map(_whole_number, steps)
-        return tuple(
-            self.step * (n if whole is None else (1.0 - _SAME) * whole) for n, whole in zip(steps, wholes, strict=True)
-        )
+        """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
+        ratio = 0.0 if self.unworn else scaled.wear_coefficient / self.wear_coefficient
+        return tuple(ratio * cycle for cycle in cycles)
 
     def wear(self, scaled: ScaledHistory) -> tuple[float, float | None]:
         """Wear coefficient of a history, and its step where the step matters."""
@@ -108,55 +89,36 @@ def share_histories(study: Study) -> tuple[tuple[Integrated, ...], Counter[str]]
     """
     axes = study.axes
     groups: dict[tuple[str, Hashable], list[Index]] = {}
-    sizes = len(axes.wear_coefficient), len(axes.step), len(axes.scheme)
-    for places in itertools.product(*map(range, sizes)):
+    for places in itertools.product(*map(range, (len(axes.wear_coefficient), len(axes.step), len(axes.scheme)))):
         groups.setdefault(_group(study, places), []).append(places)
     found, causes = list[Integrated](), Counter[str]()
     for (cause, _), choices in groups.items():
         by_wear: dict[int, list[Index]] = {}
         for choice in sorted(choices, key=lambda choice: -axes.wear_coefficient[choice[0]]):
             by_wear.setdefault(choice[0], []).append(choice)
-        farthest, *others = (
+        histories = tuple(
             ScaledHistory(axes.wear_coefficient[wear], axes.step[same[0][1]], tuple(same))
             for wear, same in by_wear.items()
         )
-        alone = [each for each in others if cause == "steps" and not _ends_with_a_step(study, each)]
-        scheme, unworn = axes.scheme[farthest.points[0][2]], cause in ("cycles", "unworn")
+        scheme, unworn = axes.scheme[histories[0].points[0][2]], cause in ("cycles", "unworn")
         depth = study.slow_time.largest_depth if scheme == "explicit" else None
-        shared = (farthest, *(each for each in others if each not in alone))
-        found += [Integrated(scheme, depth, each, unworn) for each in (shared, *((one,) for one in alone))]
-        causes[cause] += len(choices) - 1 - len(alone)
+        found.append(Integrated(scheme, depth, histories, unworn))
+        causes[cause] += len(choices) - 1
     return tuple(sorted(found, key=lambda each: min(point for one in each.histories for point in one.points))), causes
 
 
 def _group(study: Study, choice: Index) -> tuple[str, Hashable]:
     """Reason for which a choice may share a history, and what choices that do have in common."""
-    wear, step, scheme = choice
+    wear, _, scheme = choice
     value, word = study.axes.wear_coefficient[wear], study.axes.scheme[scheme]
-    if not study.solver.shortcuts:
-        return "alone", choice
-    if study.cycles_kept[-1] == 0.0:
-        return "cycles", wear
-    if value == 0.0:
-        return "unworn", wear
-    if word in _OWN_STEPS:
-        return word, None
-    if word == "explicit" and study.slow_time.largest_depth is not None:
-        # the last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories
-        return "largest_depth", wear
-    # to a few digits: the same products may differ by round-off
-    return "steps", (scheme, f"{value * study.axes.step[step]:.11e}")
-
-
-def _ends_with_a_step(study: Study, history: ScaledHistory) -> bool:
-    """Whether the last step of a history ends at the last count; else it is shortened, and is no step of another one.
-
-    Integration to the steady state has no shortened last step.
-    """
-    return study.to_the_end or _whole_number(study.cycles_kept[-1] / history.step) is not None
-
-
-def _whole_number(value: float) -> int | None:
-    """The whole number, at least 1, that a value equals up to round-off; None where there is none."""
-    near = round(value)
-    return near if near >= 1 and abs(value - near) <= _SAME * near else None
+    if study.solver.shortcuts:
+        if study.cycles_kept[-1] == 0.0:
+            return "cycles", wear
+        if value == 0.0:
+            return "unworn", wear
+        if word in _OWN_STEPS:
+            return word, None
+        if word == "explicit" and study.slow_time.largest_depth is not None:
+            # the last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories
+            return "largest_depth", wear
+    return "alone", choice

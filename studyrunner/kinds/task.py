@@ -8,6 +8,7 @@ alone.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
 from abc import ABC, abstractmethod
@@ -22,9 +23,9 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
-from studyrunner.mpi.cost_model import CostKeys
+from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
-from studyrunner.study.sections import AUTO
+from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MachineFaultError, package_digest, tells_of_machine
 
@@ -72,19 +73,12 @@ class StartResult:
     """Start state at one frequency of a sweep.
 
     moves: whether any pair slips or lifts; otherwise nothing wears. n_unknowns: of the state; 0 where there is none.
-    fault: of the machine, which ended the computation; then this is no result. Empty without a fault.
     """
 
     place: int
     start: Packed
     moves: bool
     n_unknowns: int
-    fault: str = ""
-
-    @property
-    def failed(self) -> bool:
-        """Whether there is no state."""
-        return self.n_unknowns == 0
 
     def pack(self) -> Packed:
         """Everything except the place, for a file."""
@@ -115,11 +109,6 @@ class PointResult:
     def outcome(self) -> int:
         """Outcome of the computation, as a number of the result file."""
         return int(self.values["outcome"])
-
-    @property
-    def fault(self) -> str:
-        """As in `StartResult`."""
-        return str(self.values["message"]) if self.outcome == Outcome.NOT_COMPUTED else ""
 
 
 Result = StartResult | PointResult
@@ -152,8 +141,7 @@ class Task(ABC):
 
     number: among the sweeps, or the other tasks, of the study. cost: estimated time, s.
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
-    known: places whose results are not needed, or are there from an earlier run.
-    resume: progress of an earlier run; None for none.
+    known: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
     key: hash of the task in the file of the run. models: of `scenes`, for a rank that does not have them.
     variables: names of the variables in a result. indices: for each place the points of the study that have its result;
         none for start states.
@@ -212,11 +200,6 @@ class Task(ABC):
         """Most general of the groups."""
         return str(self.cost_keys[0][0])
 
-    def cost_of(self, *, first: bool) -> float:
-        """Estimated time, s, of the first result, or of one of the others; by default all are alike."""
-        del first
-        return self.cost / self.n_results
-
     def points(self, place: int) -> tuple[Index, ...]:
         """Points that have the result at a place."""
         return self.indices[place] if self.indices else ()
@@ -261,15 +244,18 @@ def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:
     return tuple(reversed(range(n_places)) if direction == "down" else range(n_places))
 
 
+def grid(study: Study, *names: str) -> Iterator[dict[str, int]]:
+    """Indices along these axes and those of `SOLVER_AXES`, in all combinations, the last one fastest."""
+    sizes = {name: len(getattr(study.axes, name)) for name in names}
+    sizes |= {name: len(getattr(study.solver, name)) for name in SOLVER_AXES}
+    for places in itertools.product(*map(range, sizes.values())):
+        yield dict(zip(sizes, places, strict=True))
+
+
 def settings_at(study: Study, at: Mapping[str, int]) -> SolverSettings:
     """Settings of the solver. at: indices along the axes, those of `SOLVER_AXES` among them."""
-    return SolverSettings(
-        harmonics=study.harmonics[at["harmonics"]],
-        samples=study.samples[at["samples"]],
-        tolerance=study.tolerance[at["tolerance"]],
-        rtol=study.rtol[at["rtol"]],
-        time_limit=math.inf if study.solver.time_limit is None else study.solver.time_limit,
-    )
+    limit = math.inf if study.solver.time_limit is None else study.solver.time_limit
+    return SolverSettings(**{key: getattr(study.solver, key)[at[key]] for key in SOLVER_AXES}, time_limit=limit)
 
 
 def described(settings: SolverSettings) -> list[tuple[str, object]]:
@@ -328,20 +314,9 @@ class TaskPlan:
         return {start: tuple(tasks) for start, tasks in found.items()}
 
     @property
-    def n_unknowns(self) -> int:
-        """Of the largest task."""
-        return max(task.n_unknowns for task in self.results)
-
-    @property
     def cost(self) -> float:
         """Estimated time on one rank, s, where every point wears."""
         return sum(task.cost for task in (*self.sweeps, *self.results))
-
-    @property
-    def longest(self) -> float:
-        """Estimated time, s, of the longest task, with the sweep that it waits for."""
-        before = [0.0 if task.waits_for is None else self.sweeps[task.waits_for[0]].cost for task in self.results]
-        return max(task.cost + cost for task, cost in zip(self.results, before, strict=True))
 
 
 def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study) -> TaskPlan:

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
-from solver.settings import FollowedFrequency, Resolution, SolverSettings, ToTheEnd, WearTarget
-from studyrunner.kinds.estimate import iterations_of_sweep
+from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.sharing import Integrated
 from studyrunner.kinds.task import (
     Identity,
@@ -31,7 +30,7 @@ from studyrunner.kinds.task import (
     raise_fault,
     up_or_down,
 )
-from studyrunner.mpi.cost_model import CostKeys
+from studyrunner.mpi.dispatch import CostKeys
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -47,21 +46,37 @@ COST_AT_REST = 0.01
 _NEIGHBOURS = 4  # frequencies whose histories take about as long
 _ROUND_OFF = 1e-10
 
+_digest_once = lru_cache(maxsize=16)(digest)
+
 
 @dataclass(frozen=True, kw_only=True)
-class Sweep(JointTask):
+class _FromRest(JointTask):
+    """A task that needs start states.
+
+    excitation_amplitude: N. direction: "up", "down" or "ramp". follow: what the frequency follows; None where given.
+    """
+
+    excitation_amplitude: float
+    direction: str
+    follow: FollowedFrequency | None = None
+
+    def name_of_start(self, identity: Identity, frequency: float) -> str:
+        """Hash of a start state, whatever the other frequencies: the steps of a sweep follow from the joint."""
+        followed = None if self.follow is None else astuple(self.follow)
+        loading = (self.excitation_amplitude, self.direction, tuple(described(self.settings)), followed)
+        return digest("start", _digest_once("line", identity.joint(self.joint), *loading), frequency)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep(_FromRest):
     """Start states along the frequency, or that of a ramp at a single frequency; a result at each frequency.
 
-    excitation_amplitude: N. direction: "up", "down" or "ramp". frequencies: Hz, ascending.
-    follow: what the frequency follows in place of `frequencies`, whose only value is then the middle of the range.
+    frequencies: Hz, ascending; where the frequency follows a resonance its only value is the middle of the range.
     """
 
     gives_starts = True
 
-    excitation_amplitude: float
-    direction: str
     frequencies: tuple[float, ...]
-    follow: FollowedFrequency | None = None
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -73,14 +88,9 @@ class Sweep(JointTask):
         """All sweeps, this sweep."""
         return (("sweep", ("sweep", self.number)),)
 
-    def cost_of(self, *, first: bool) -> float:
-        """The first state with the sweep to it, or one of the others."""
-        one, two = (iterations_of_sweep(self.direction, number) for number in (1, 2))
-        return self.cost * (one if first else two - one) / iterations_of_sweep(self.direction, self.n_results)
-
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the start states."""
-        return tuple(_name_of_start(self, identity, frequency) for frequency in self.frequencies)
+        return tuple(self.name_of_start(identity, frequency) for frequency in self.frequencies)
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[StartResult]:
         """Start states as the sweep reaches them."""
@@ -113,14 +123,13 @@ class Sweep(JointTask):
             n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
             yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 
-    def failed(self, place: int, outcome: int, message: str) -> StartResult:
+    def failed(self, place: int, outcome: int, message: str) -> StartResult:  # noqa: ARG002
         """A start without a state."""
         from solver.results.history import StartState
 
         nan = math.nan
         broken = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
-        fault = message if outcome == Outcome.NOT_COMPUTED else ""
-        return StartResult(place, pack(broken), moves=False, n_unknowns=0, fault=fault)
+        return StartResult(place, pack(broken), moves=False, n_unknowns=0)
 
     def describe(self, place: int) -> str:
         """Where the sweep goes."""
@@ -129,11 +138,10 @@ class Sweep(JointTask):
 
 
 @dataclass(frozen=True, kw_only=True)
-class History(JointTask):
+class History(_FromRest):
     """Wear histories from a start state that share an adaptive history, each with those that are read from it.
 
-    sweep, position: number of the sweep and place of the start state. frequency, Hz, excitation_amplitude, N,
-    direction, follow: of the start state.
+    sweep, position: number of the sweep and place of the start state. frequency: Hz, of the start state.
     integrated: histories with one wear coefficient.
     cycles: cycle counts of the output of every history. to_the_end: integration until nothing wears any more; then
         `cycles` numbers the outputs. until: wear at which the history ends before the last count.
@@ -146,13 +154,10 @@ class History(JointTask):
     sweep: int
     position: int
     frequency: float
-    excitation_amplitude: float
-    direction: str
     integrated: tuple[Integrated, ...]
     cycles: tuple[float, ...]
     loops: tuple[int, ...]
     moves: bool = True
-    follow: FollowedFrequency | None = None
     until: WearTarget | None = None
     to_the_end: ToTheEnd | None = None
     start: Packed | None = field(default=None, compare=False, repr=False)
@@ -187,7 +192,8 @@ class History(JointTask):
         """By motion, unknowns and start state, and by wear coefficient, steps and schemes."""
         kind = "history" if self.moves else AT_REST
         near, here = (kind, self.sweep, "near", self.position // _NEIGHBOURS), (kind, self.sweep, self.position)
-        wear = (kind, self.wear_coefficient, tuple((each.step, each.scheme) for each in self.integrated))
+        steps = tuple((each.step, each.scheme) for each in self.integrated)
+        wear = (kind, self.wear_coefficient, steps)
         return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
 
     def from_start(self, result: StartResult) -> History:
@@ -200,9 +206,9 @@ class History(JointTask):
 
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the histories: of their start state, and of all that is done with it."""
-        start = _name_of_start(self, identity, self.frequency)
+        start = self.name_of_start(identity, self.frequency)
         ends = tuple(None if each is None else astuple(each) for each in (self.until, self.to_the_end))
-        kept = _name_of_kept(identity.record, self.cycles, self.loops, ends)
+        kept = _digest_once(identity.record, self.cycles, self.loops, ends)
         found = []
         for each, number in self.results:
             scheme = "" if each.unworn else each.scheme
@@ -234,7 +240,6 @@ class History(JointTask):
                 yield replace(result, place=place, progress=progress)
 
     def _asked(self, integrated: Integrated) -> SlowTime:
-        """What the solver integrates."""
         from solver.wear.integrate import SlowTime
         from solver.wear.step import steps_of
 
@@ -260,33 +265,7 @@ class History(JointTask):
         return f"{self.frequency:.6g} Hz {self.results[place][0].scheme}"
 
 
-def _name_of_start(task: Sweep | History, identity: Identity, frequency: float) -> str:
-    """Hash of a start state, whatever the other frequencies: the steps of a sweep follow from the joint."""
-    joint = identity.joint(task.joint)
-    line = _name_of_line(joint, task.excitation_amplitude, task.direction, task.settings, task.follow)
-    return digest("start", line, frequency)
-
-
-@lru_cache(maxsize=16)
-def _name_of_line(
-    joint: tuple[object, ...],
-    amplitude: float,
-    direction: str,
-    settings: SolverSettings,
-    follow: FollowedFrequency | None,
-) -> str:
-    followed = None if follow is None else astuple(follow)
-    return digest("line", joint, amplitude, direction, described(settings), followed)
-
-
-@lru_cache(maxsize=16)
-def _name_of_kept(*kept: object) -> str:
-    return digest(*kept)
-
-
 def _moves(start: StartState) -> bool:
     """Whether the relative motion in the joint is more than the round-off of its mean; no where there is no state."""
-    if start.state is None:
-        return False
-    motion_h = start.state.displacement_h
+    motion_h = np.zeros((1, 1, 1)) if start.state is None else start.state.displacement_h
     return bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))

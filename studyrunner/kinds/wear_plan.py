@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -10,25 +9,20 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from solver.settings import SolverSettings, ToTheEnd
-from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_an_iteration
-from studyrunner.kinds.sharing import EQUAL, IDLE_RTOL, Integrated, describe_left_out, share_histories
-from studyrunner.kinds.task import Index, Joint, Task, TaskPlan, joint_of, n_unknowns_of, settings_at
+from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
+from studyrunner.kinds.sharing import EQUAL, Integrated, describe_left_out, share_histories
+from studyrunner.kinds.task import Index, Joint, TaskPlan, grid, joint_of, n_unknowns_of, settings_at
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import Realisation
-from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.system.progress import count
-from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
 
 _OF_HISTORY = ("wear_coefficient", "step", "scheme")
 
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
-
-TIME = "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long"
 
 
 class _Case(NamedTuple):
@@ -45,12 +39,6 @@ class _Start(NamedTuple):
 
     part: Realisation
     at: Mapping[str, int]
-
-
-def variables(study: Study) -> tuple[str, ...]:
-    """Variables of a history: those asked for and those that the table at the end is made of."""
-    asked = (name for name in ASKED if name in study.outputs.variables or name in CERTIFICATE)
-    return (*asked, *(LOOPS if study.outputs.loops else ()), *(COUNTS if study.to_the_end else ()))
 
 
 def build_tasks(
@@ -73,13 +61,10 @@ def build_tasks(
 def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) -> dict[_Case, dict[float, list[_Start]]]:
     """Points that one sweep reaches, by frequency, in the order of the study."""
     cases: dict[_Case, dict[float, list[_Start]]] = {}
-    sizes = {name: len(getattr(study.axes, name)) for name in ("excitation_amplitude", "sweep")}
-    sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
-    lines = [dict(zip(sizes, places, strict=True)) for places in itertools.product(*map(range, sizes.values()))]
-    settings_of = [_settings(study, at) for at in lines]
+    lines = [(at, settings_at(study, at)) for at in grid(study, "excitation_amplitude", "sweep")]
     for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
         axes, joint = part.study.axes, joint_of(part.study, scene, contact)
-        for at, settings in zip(lines, settings_of, strict=True):
+        for at, settings in lines:
             amplitude = axes.excitation_amplitude[at["excitation_amplitude"]]
             case = _Case(joint, amplitude, axes.sweep[at["sweep"]], settings)
             for place, frequency in enumerate(axes.frequency):
@@ -88,20 +73,12 @@ def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) ->
     return cases
 
 
-def _settings(study: Study, at: Mapping[str, int]) -> SolverSettings:
-    """Settings of a line of points; with the first `rtol` where nothing uses it, so that all of its values share."""
-    settings = settings_at(study, at)
-    automatic = {"adaptive", "final"} & set(study.axes.scheme) or AUTO in (settings.harmonics, settings.samples)
-    return settings if automatic or not study.solver.shortcuts else replace(settings, rtol=study.rtol[0])
-
-
 class _Planner:
     """Builds the tasks of a study one after the other. causes: numbers of points that share a history, by reason."""
 
     def __init__(self, study: Study, n_displacements: Sequence[int]) -> None:
         self._study = study
         self._n_displacements = n_displacements
-        self._variables = variables(study)
         self._shared: dict[object, tuple[tuple[Integrated, ...], Counter[str]]] = {}
         self.causes: Counter[str] = Counter()
         self.sweeps: list[Sweep] = []
@@ -113,7 +90,7 @@ class _Planner:
         sweep = Sweep(
             number=len(self.sweeps),
             frequencies=tuple(at),
-            cost=seconds_an_iteration(n_unknowns) * iterations_of_sweep(case.direction, len(at)),
+            cost=seconds_of(n_unknowns, iterations_of_sweep(case.direction, len(at))),
             n_unknowns=n_unknowns,
             follow=self._study.follow,
             **case._asdict(),
@@ -127,7 +104,6 @@ class _Planner:
                 self._add_histories(sweep, position, same)
 
     def _add_histories(self, sweep: Sweep, position: int, starts: Sequence[_Start]) -> None:
-        """Tasks of all points that start from one state and wear by one law."""
         owners: dict[float, list[tuple[_Start, int]]] = {}
         for start in starts:
             for place, value in enumerate(start.part.study.axes.wear_coefficient):
@@ -141,11 +117,9 @@ class _Planner:
             self._shared[key] = share_histories(study)
         found, causes = self._shared[key]
         of_value = list(owners.values())
-        n_others, n_points = len(study.axes.step) * len(study.axes.scheme), sum(map(len, of_value))
-        n_parts = sum(len({id(start.part) for start, _ in each}) for each in of_value)
         self.causes += causes
-        self.causes[IDLE_RTOL] += n_others * (n_points - n_parts)
-        self.causes[EQUAL] += n_others * (n_parts - len(of_value))
+        n_equal = sum(len(each) - 1 for each in of_value)
+        self.causes[EQUAL] += n_equal * len(study.axes.step) * len(study.axes.scheme)
         together: dict[object, list[Integrated]] = {}
         for each in found:
             alone = each.unworn or not study.solver.shortcuts
@@ -156,17 +130,16 @@ class _Planner:
 
     def _placed(self, integrated: Integrated, of_value: Sequence[Sequence[tuple[_Start, int]]]) -> Integrated:
         """With the points of the study in place of choices. of_value: starts and places by wear coefficient."""
+
+        def point(start: _Start, *choice: int) -> Index:
+            places = {**start.at, **dict(zip(_OF_HISTORY, choice, strict=True))}
+            return (*(places[name] for name in self._study.own_axes), *start.part.place)
+
         histories = []
         for each in integrated.histories:
             owners = ((start, (wear, *rest)) for first, *rest in each.points for start, wear in of_value[first])
-            points = tuple(self._point(start, dict(zip(_OF_HISTORY, choice, strict=True))) for start, choice in owners)
-            histories.append(replace(each, points=points))
+            histories.append(replace(each, points=tuple(point(start, *choice) for start, choice in owners)))
         return replace(integrated, histories=tuple(histories))
-
-    def _point(self, start: _Start, choice: Mapping[str, int]) -> Index:
-        """Index of a point along the dimensions of the study."""
-        places = {**start.at, **choice}
-        return (*(places[name] for name in self._study.own_axes), *start.part.place)
 
     def _add_history(self, study: Study, sweep: Sweep, position: int, integrated: tuple[Integrated, ...]) -> None:
         cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.cycles_kept[-1]
@@ -185,34 +158,12 @@ class _Planner:
                 settings=sweep.settings,
                 integrated=integrated,
                 cycles=study.cycles_kept,
-                variables=self._variables,
+                variables=tuple(self._study.recorded),
                 loops=study.outputs.loops,
-                cost=seconds_an_iteration(sweep.n_unknowns) * iterations_of_histories(steps, cycles),
+                cost=seconds_of(sweep.n_unknowns, iterations_of_histories(steps, cycles)),
                 n_unknowns=sweep.n_unknowns,
                 until=study.until,
                 follow=study.follow,
                 to_the_end=end,
             )
         )
-
-
-def describe_tasks(tasks: Sequence[Task]) -> str:
-    """Tasks in words."""
-    sweeps = [task for task in tasks if isinstance(task, Sweep)]
-    n_histories = sum(len(task.integrated) for task in tasks if isinstance(task, History))
-    histories = count(n_histories, "wear history", "wear histories")
-    if not sweeps:
-        return histories
-    n_ramps = sum(sweep.direction == "ramp" for sweep in sweeps)
-    ways = [(len(sweeps) - n_ramps, "sweep"), (n_ramps, "ramp")]
-    named = " and ".join(count(number, way) for number, way in ways if number)
-    return f"{count(sum(sweep.n_results for sweep in sweeps), 'start state')} by {named}, and {histories}"
-
-
-def slow_time(study: Study) -> list[tuple[str, str]]:
-    """Cycles."""
-    n_kept = len(study.cycles_kept)
-    if study.to_the_end:
-        until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"
-        return [("cycles", f"{until}; {n_kept} states are kept, spaced evenly in worn volume and cycles")]
-    return [("cycles", f"{study.cycles_kept[-1]:g}, of which {count(n_kept, 'count is', 'counts are')} kept")]

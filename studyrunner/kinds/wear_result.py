@@ -105,11 +105,12 @@ def _of_target(
     if not math.isnan(target):
         at = f"at its target at cycle {show_count(round(target))} +- {error:.2g}"
         return "" if whole else f"{at}: later counts are not computed"
-    if task.until.quantity == "frequency_shift":
-        return f"frequency_shift stays below {task.until.value:g}"
+    quantity, below = task.until.quantity, f"{task.until.quantity} stays below {task.until.value:g}"
+    if quantity == "frequency_shift":
+        return below
     deepest, volume = history.wear_depth[known[-1]].max(initial=0.0), history.worn_volume[known[-1]]
-    value, unit = (deepest, "m") if task.until.quantity == "wear_depth" else (volume, "m3")
-    return f"{task.until.quantity} stays below {task.until.value:g} {unit}: it is {value:.3g} {unit} at the last count"
+    value, unit = (deepest, "m") if quantity == "wear_depth" else (volume, "m3")
+    return f"{below} {unit}: it is {value:.3g} {unit} at the last count"
 
 
 def _variable(

@@ -1,5 +1,7 @@
-"""Decides which rank gets which task. This module sends no messages and is given its clock: the server on real ranks
-and a simulation with thousands of ranks make the same decisions.
+"""Decides which rank gets which task, by expected run times that finished tasks correct. This module sends no messages
+and is given its clock: the server on real ranks and a simulation with thousands of ranks make the same decisions.
+
+Expected times decide the order of the tasks and the time left that a user sees. They decide no number of a result.
 
 By hand: the pools of mpi4py and schwimmbad know no expected run times and leave rank 0 idle (speed-up 0.92 of 2 ranks,
 here 1.97).
@@ -8,23 +10,26 @@ here 1.97).
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable, Iterator
+import math
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
 
 Task = Any
 """What is done as a whole by one rank. It has
 
-- cost: estimated time, s, positive; cost_of(first=...): that of the first result, or of one of the others;
+- cost: estimated time, s, positive, of which each result takes an equal share;
 - cost_keys: groups of similar tasks, see `CostModel`;
 - n_results: that the task gives one after the other, at least 1;
 - gives_starts: whether other tasks wait for the results.
 """
 
-AHEAD_SECONDS = 0.2
-"""A rank gets a second task in advance behind a task that takes less than this time, s."""
+CostKeys = Sequence[tuple[Hashable, ...]]
+"""Groups of similar tasks that a task belongs to: sequences of keys, each from a general group to a special one."""
+
+Measurement = Sequence[tuple[Hashable, float, float]]
+"""What is learnt from one task: keys of groups, each with the measured and the expected time, s. The expected time of a
+key contains the corrections of all other sequences of keys."""
 
 WATCH_SECONDS = 1.0
 """Shortest time between two looks at the running tasks, s. Without these looks 256 ranks are 0.81 busy for 0.98
@@ -34,8 +39,60 @@ _WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
 _AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
 _WAITING = 1000
 _WAITING_A_RANK = 16
-_FEW_MEASURED = 16
-_MEASURED_SHARE = 8
+_LEAST = 1e-6
+
+
+class CostModel:
+    """Corrects estimated times by the measured times of similar tasks.
+
+    The correction is a product of factors, one for each sequence of keys. The factor of a key is the sum of the
+    measured times over the sum of the expected times. The factor of the key before counts as one more measurement, so
+    that a few unusual times do not decide. Before the first key the factor is 1.
+    """
+
+    def __init__(self) -> None:
+        self._sums: dict[Hashable, tuple[float, float, int]] = {}
+        # Factors asked for since the last measurement: most of thousands of waiting tasks share their keys.
+        self._factors: dict[tuple[Hashable, ...], float] = {}
+
+    def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:
+        """Adds the times of a task, s; the estimated time is positive."""
+        factors = [self._factor(keys) for keys in cost_keys]
+        expected = estimated * math.prod(factors)
+        found = [
+            (key, measured, expected / each) for keys, each in zip(cost_keys, factors, strict=True) for key in keys
+        ]
+        self._add(found, 1)
+        return found
+
+    def forget(self, measurement: Measurement) -> None:
+        """Takes back a measurement."""
+        self._add(measurement, -1)
+
+    def correction(self, cost_keys: CostKeys) -> float:
+        """Factor by which an estimated time is multiplied, positive."""
+        return math.prod(self._factor(keys) for keys in cost_keys)
+
+    def measured(self, key: Hashable) -> float:
+        """Sum of the measured times, s, of all tasks with a key."""
+        return self._sums.get(key, (0.0, 0.0, 0))[0]
+
+    def _factor(self, keys: tuple[Hashable, ...]) -> float:
+        if keys not in self._factors:
+            found = 1.0
+            for key in keys:
+                measured, expected, n = self._sums.get(key, (0.0, 0.0, 0))
+                if n > 0:
+                    mean = expected / n
+                    found = (measured + found * mean) / (expected + mean)
+            self._factors[keys] = max(found, _LEAST)
+        return self._factors[keys]
+
+    def _add(self, measurement: Measurement, sign: int) -> None:
+        self._factors.clear()
+        for key, measured, expected in measurement:
+            before = self._sums.get(key, (0.0, 0.0, 0))
+            self._sums[key] = (before[0] + sign * measured, before[1] + sign * expected, before[2] + sign)
 
 
 @dataclass(frozen=True)
@@ -48,14 +105,14 @@ class Assignment:
 
 @dataclass
 class _Running:
-    """A task that a rank has: results still to come, and when it was begun, None where it waits behind another one.
+    """A task that a rank has: results still to come, and when the last one came or the task was given.
 
     measurement: what the cost model has learnt from a task that takes longer than expected.
     """
 
     task: Task
     n_left: int
-    began: float | None
+    began: float
     measurement: Measurement = ()
 
 
@@ -76,7 +133,7 @@ class _Waiting:
         heapq.heappush(self._order, self._entry(number))
 
     def pop(self) -> tuple[int, Task]:
-        _, number = heapq.heappop(self._order)
+        number = heapq.heappop(self._order)[1]
         return number, self._tasks.pop(number)[0]
 
     def reorder(self) -> None:
@@ -102,17 +159,13 @@ class Dispatcher:
         self._costs = costs
         self._clock = clock
         self._n_known = 0
-        self._n_measured = 0
         self._began = clock()
         self._next_watch = self._began + WATCH_SECONDS
         self._first = _Waiting(costs)
         self._others = _Waiting(costs)
         self._given: dict[int, _Running] = {}
-        self._of_rank: list[list[int]] = [[] for _ in range(n_ranks)]
-        # Ranks without a task, and those that may get one more: the last is the next to get one.
+        # ranks without a task: the last is the next to get one
         self._free = dict.fromkeys(reversed(range(n_ranks)))
-        self._ahead: dict[int, None] = {}
-        self._shunned: set[int] = set()
 
     @property
     def done(self) -> bool:
@@ -132,49 +185,26 @@ class Dispatcher:
 
     def assign(self) -> Iterator[tuple[int, Assignment]]:
         """Ranks that get a task now, and the tasks."""
-        if self._n_measured >= max(_FEW_MEASURED, len(self._others) // _MEASURED_SHARE):
-            self._n_measured = 0
-            self._others.reorder()
         while self._free and self._n_waiting:
             rank, _ = self._free.popitem()
-            assignment = self._hand_out(rank)
-            self._see_ahead(rank)
-            yield rank, assignment
-        while self._ahead and self._n_waiting > self._n_ranks:
-            rank, _ = self._ahead.popitem()
-            yield rank, self._hand_out(rank)
+            is_first = self._first and (self.wants_more or not self._others)
+            number, task = (self._first if is_first else self._others).pop()
+            self._given[number] = _Running(task, task.n_results, self._clock())
+            yield rank, Assignment(number, task)
 
-    def deliver(self, rank: int, number: int, seconds: float, *, typical: bool = True) -> Task:
-        """Notes a result, which took so many seconds; returns its task.
-
-        typical: whether similar tasks may take as long; not where the task broke off.
-        """
+    def deliver(self, rank: int, number: int, seconds: float) -> Task:
+        """Notes a result, which took so many seconds; returns its task."""
         given = self._given[number]
         task = given.task
         self._costs.forget(given.measurement)
         given.measurement = ()
-        if typical:
-            self._costs.learn(task.cost_keys, task.cost_of(first=given.n_left == task.n_results), seconds)
-            self._n_measured += 1
+        self._costs.learn(task.cost_keys, task.cost / task.n_results, seconds)
         given.n_left -= 1
         given.began = self._clock()
         if given.n_left == 0:
             del self._given[number]
-            self._of_rank[rank].remove(number)
-            self._ahead.pop(rank, None)
-            if self._of_rank[rank]:
-                self._given[self._of_rank[rank][0]].began = self._clock()
-                self._see_ahead(rank)
-            elif rank not in self._shunned:
-                self._free[rank] = None
+            self._free[rank] = None
         return task
-
-    def shun(self, rank: int) -> None:
-        """Gives a faulty rank no more tasks, as long as there is another rank."""
-        if len(self._shunned) + 1 < self._n_ranks:
-            self._shunned.add(rank)
-            self._free.pop(rank, None)
-            self._ahead.pop(rank, None)
 
     def task(self, number: int) -> Task:
         """A running task."""
@@ -182,12 +212,12 @@ class Dispatcher:
 
     def running(self) -> list[tuple[Task, int, float]]:
         """Running tasks, longest first: the task, number of results to come, time since the last result, s."""
-        now, tasks = self._clock(), self._given.values()
-        busy = [(each.task, each.n_left, now - each.began) for each in tasks if each.began is not None]
+        now = self._clock()
+        busy = [(each.task, each.n_left, now - each.began) for each in self._given.values()]
         return sorted(busy, key=lambda entry: -entry[2])
 
     def watch(self) -> None:
-        """Called many times a second: now and then learns from tasks that take longer than expected.
+        """Called many times a second: now and then learns from tasks that take longer than expected, and orders anew.
 
         A history that takes a hundred times as long as most corrects the cost model long before its end, in time for
         the order of similar tasks.
@@ -198,28 +228,12 @@ class Dispatcher:
         self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
         for given in self._given.values():
             task = given.task
-            if given.began is None or task.gives_starts:
-                continue
             at_least = _AS_LONG_AGAIN * (now - given.began)
-            if at_least > task.cost * self._costs.correction(task.cost_keys):
+            if not task.gives_starts and at_least > task.cost * self._costs.correction(task.cost_keys):
                 self._costs.forget(given.measurement)
                 given.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
-        self._n_measured = 0
         self._others.reorder()
 
     @property
     def _n_waiting(self) -> int:
         return len(self._first) + len(self._others)
-
-    def _hand_out(self, rank: int) -> Assignment:
-        number, task = (self._first if self._first and (self.wants_more or not self._others) else self._others).pop()
-        self._given[number] = _Running(task, task.n_results, None if self._of_rank[rank] else self._clock())
-        self._of_rank[rank].append(number)
-        return Assignment(number, task)
-
-    def _see_ahead(self, rank: int) -> None:
-        """Notes whether a rank with one task may get a second task."""
-        task = self._given[self._of_rank[rank][0]].task
-        short = task.n_results == 1 and task.cost * self._costs.correction(task.cost_keys) < AHEAD_SECONDS
-        if short and rank not in self._shunned:
-            self._ahead[rank] = None

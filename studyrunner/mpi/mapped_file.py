@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from studyrunner.mpi.ranks import Ranks, ask_all
+from studyrunner.mpi.ranks import RankInterrupted, Ranks, wait_for_message
 from studyrunner.system.files import create
 
 _ALIGNED = 64  # bytes: no array shares a line of the cache with another one
@@ -81,15 +81,25 @@ class WhetherSeen:
 
 
 def ranks_that_see(ranks: Ranks, path: Path) -> frozenset[int]:
-    """Rank 0: the other ranks that see a file which it writes; none where the disk is full."""
-    question = WhetherSeen(path, secrets.token_bytes())
+    """Rank 0: the other ranks that see a file which it writes; none where the disk is full.
+
+    Raises KeyboardInterrupt where a rank was interrupted.
+    """
+    question, seeing = WhetherSeen(path, secrets.token_bytes()), set[int]()
     if ranks.size == 1:
         return frozenset()
     try:
         with create(path) as file:
             file.write(question.mark)
-        return frozenset(rank for rank, seen in ask_all(ranks, question).items() if seen)
+        for rank in range(1, ranks.size):
+            ranks.send(question, rank)
+        for _ in range(1, ranks.size):
+            rank, is_seen = wait_for_message(ranks)
+            if isinstance(is_seen, RankInterrupted):
+                raise KeyboardInterrupt
+            seeing |= {rank} if is_seen else set()
     except OSError:
         return frozenset()
     finally:
         path.unlink(missing_ok=True)
+    return frozenset(seeing)

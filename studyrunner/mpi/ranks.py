@@ -93,7 +93,12 @@ class Ranks:
 
 
 class MpiRanks(Ranks):
-    """All ranks of MPI's world. Raises ImportError or RuntimeError where mpi4py or an MPI library is missing."""
+    """All ranks of MPI's world. Raises ImportError or RuntimeError where mpi4py or an MPI library is missing.
+
+    software: of each rank, as `describe_software` gives it.
+    """
+
+    software: list[tuple[str, str]]
 
     def __init__(self) -> None:
         import mpi4py
@@ -115,18 +120,10 @@ class MpiRanks(Ranks):
         self._many = _MANY_SENT
         self.rank = self._world.Get_rank()
         self.size = self._world.Get_size()
-        self._software: list[tuple[str, str]] = self._world.allgather(describe_software())
+        self.software = self._world.allgather(describe_software())
         if library == "MPICH":
             # all ranks have mapped the memory: they have exchanged messages
             _unlink_shared_memory()
-
-    def check_software(self) -> None:
-        """Raises LauncherError where a rank runs other software than rank 0, with which numbers may differ."""
-        host, own = self._software[0]
-        for rank, (other_host, other) in enumerate(self._software):
-            if other != own:
-                said = f"rank {rank} on {other_host} runs other versions of this program, of Python or of numpy than"
-                raise LauncherError(f"{said} rank 0 on {host}: install the same software for all ranks")
 
     def send(self, message: object, rank: int) -> None:  # noqa: D102
         if len(self._sent) >= self._many:
@@ -191,18 +188,19 @@ def start_ranks() -> Ranks:
     if announced > ranks.size:
         ranks.close()
         raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
-    try:
-        ranks.check_software()
-    except LauncherError:
-        ranks.close()
-        raise
+    host, own = ranks.software[0]
+    for rank, (other_host, other) in enumerate(ranks.software):
+        if other != own:
+            ranks.close()
+            said = f"rank {rank} on {other_host} runs other versions of this program, of Python or of numpy than"
+            raise LauncherError(f"{said} rank 0 on {host}: install the same software for all ranks")
     return ranks
 
 
 def describe_software() -> tuple[str, str]:
     """Name of this machine, and a hash of what this process runs."""
-    packages = ("solver", "studies", "studyrunner")
-    return platform.node(), " ".join((platform.machine(), *map(package_digest, packages)))
+    packages = map(package_digest, ("solver", "studies", "studyrunner"))
+    return platform.node(), " ".join((platform.machine(), *packages))
 
 
 class RankInterrupted:
@@ -214,15 +212,3 @@ def wait_for_message(ranks: Ranks) -> tuple[int, object]:
     while (received := ranks.receive()) is None:
         time.sleep(POLL_SECONDS)
     return received
-
-
-def ask_all(ranks: Ranks, question: object) -> dict[int, object]:
-    """Rank 0: the answers of all other ranks, by rank. Raises KeyboardInterrupt where one was interrupted."""
-    answers: dict[int, object] = {}
-    for rank in range(1, ranks.size):
-        ranks.send(question, rank)
-    while len(answers) < ranks.size - 1:
-        rank, answers[rank] = wait_for_message(ranks)
-        if isinstance(answers[rank], RankInterrupted):
-            raise KeyboardInterrupt
-    return answers

@@ -18,10 +18,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from studyrunner.mpi.cost_model import CostModel
-from studyrunner.mpi.dispatch import Assignment, Dispatcher, Task
+from studyrunner.mpi.dispatch import Assignment, CostModel, Dispatcher, Task
 from studyrunner.mpi.mapped_file import WhetherSeen
 from studyrunner.mpi.ranks import POLL_SECONDS, RankInterrupted, Ranks, wait_for_message
+from studyrunner.system.machine import MachineFaultError
 from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 
 SECONDS_TO_PROGRESS = 3.0
@@ -76,10 +76,6 @@ class Office:
         """The task as a rank gets it; called once for each task that is sent, in the order of sending."""
         return task
 
-    def is_sick(self, rank: int, result: Result) -> bool:  # noqa: ARG002
-        """Whether a result shows that its rank should get no more tasks."""
-        return False
-
     def keep(self, task: Task, progress: object) -> None:
         """Takes the progress of a task; never after the last result of the task."""
 
@@ -91,7 +87,7 @@ def serve_tasks(ranks: Ranks, office: Office, run: Run, costs: CostModel | None 
     """Rank 0: has all tasks done and computes some of them. costs: learns the run times of tasks.
 
     An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here, and
-    KeyboardInterrupt where another rank was interrupted.
+    MachineFaultError or KeyboardInterrupt where another rank has said so.
     """
     server = _Server(ranks, office, run, costs or CostModel())
     try:
@@ -130,9 +126,7 @@ def _work(
     check: Callable[[], None],
 ) -> None:
     """Sends the results of a task, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
-    task = assignment.task
-    n_given = 0
-    began = time.perf_counter()
+    task, n_given, began = assignment.task, 0, time.perf_counter()
     sent = dict.fromkeys((True, False), began)
 
     def keep(progress: object) -> None:
@@ -157,14 +151,13 @@ class _LocalWorker:
     """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
 
     def __init__(self, run: Run, seconds_to_progress: float) -> None:
-        self._run = run
-        self._seconds_to_progress = seconds_to_progress
         self._tasks: queue.SimpleQueue[Assignment | None] = queue.SimpleQueue()
         self._sent: deque[object] = deque()
         self.given_up = False
         self.assign = self._tasks.put
         # A daemon: an exception in the main thread ends the process although a task still runs.
-        self._thread = threading.Thread(target=self._compute, name="tasks of rank 0", daemon=True)
+        arguments = (run, seconds_to_progress)
+        self._thread = threading.Thread(target=self._compute, args=arguments, name="tasks of rank 0", daemon=True)
         self._thread.start()
 
     def receive(self) -> object:
@@ -181,10 +174,10 @@ class _LocalWorker:
             self._thread.join()
         self.receive()
 
-    def _compute(self) -> None:
+    def _compute(self, run: Run, seconds_to_progress: float) -> None:
         try:
             while (assignment := self._tasks.get()) is not None:
-                _work(assignment, self._run, self._send, self._seconds_to_progress, self._check)
+                _work(assignment, run, self._send, seconds_to_progress, self._check)
         except BaseException as error:  # handed to the main thread, which raises it
             self._sent.append(error)
 
@@ -198,8 +191,6 @@ class _LocalWorker:
 
 
 class _Server:
-    """Rank 0: sends tasks, receives results."""
-
     def __init__(self, ranks: Ranks, office: Office, run: Run, costs: CostModel) -> None:
         self._ranks = ranks
         self._office = office
@@ -239,18 +230,17 @@ class _Server:
     def _accept(self, rank: int, message: object) -> None:
         if isinstance(message, _Progress):
             self._office.keep(self.dispatcher.task(message.number), message.progress)
-            return
-        if isinstance(message, RankInterrupted):
+        elif isinstance(message, RankInterrupted):
             begin_ending()
             raise KeyboardInterrupt
-        if not isinstance(message, _Delivery):
+        elif isinstance(message, MachineFaultError):
+            raise message
+        elif isinstance(message, _Delivery):
+            task = self.dispatcher.deliver(rank, message.number, message.seconds)
+            self.dispatcher.add(self._office.take(task, message.result))
+            self.hand_out()
+        else:
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
-        sick = self._office.is_sick(rank, message.result)
-        if sick:
-            self.dispatcher.shun(rank)
-        task = self.dispatcher.deliver(rank, message.number, message.seconds, typical=not sick)
-        self.dispatcher.add(self._office.take(task, message.result))
-        self.hand_out()
 
 
 def _seconds_to_progress(ranks: Ranks) -> float:

@@ -170,7 +170,7 @@ FIGURES = (
 def draw_report(result: Result) -> Iterator[Item]:
     """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted."""
     kind = MODES if result.has_modes else WEAR if result.blocks is None else MISSIONS
-    has_results = bool(result.held.any())
+    has_results = bool(result.has_values.any())
     for entry in FIGURES:
         if kind in entry.kinds and (has_results or entry.always):
             item = entry.make(result)

@@ -6,56 +6,31 @@ import csv
 import textwrap
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.style import context
 from matplotlib.ticker import AutoLocator, MaxNLocator
 
-from studyrunner.report.panels import ERROR, MAP
+from studyrunner.report.panels import ERROR
 
 WIDTH, COLUMN_WIDTH = 7.5, 3.55
 """Inches of a figure across a printed page, 190 mm, and in one column of a journal or on a phone, 90 mm."""
 
-DPI, PRINT_DPI = 200, 300
-"""Of what is drawn as pixels in the SVG files; of the PNG files, as journals ask for."""
+_PRINT_DPI = 300
+"""Of the PNG files, as journals ask for."""
 
 _MANY = 600  # points of a line from which on it is pixels in the SVG files, as maps are
 _COLUMN_LABEL, _COLUMN_TITLE = 28, 48  # characters of a vertical label, and of a title, that fit into a column
 
-_STYLE: Any = {
-    "font.size": 9.5,
-    **dict.fromkeys(("axes.titlesize", "axes.labelsize"), 9.5),
-    **dict.fromkeys(("legend.fontsize", "xtick.labelsize", "ytick.labelsize"), 8.5),
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 5),
-    # formulas as tick labels take most of the time of a figure
-    "axes.formatter.use_mathtext": False,
-    # names of a file are text, whatever signs they have
-    "text.parse_math": False,
-    "grid.color": "#d9d9d9",
-    "grid.linewidth": 0.6,
-    "lines.linewidth": 1.6,
-    "lines.markersize": 4.0,
-    "legend.frameon": False,
-    "legend.borderpad": 0.0,
-    "legend.columnspacing": 1.4,
-    "image.cmap": MAP,
-    **dict.fromkeys(("figure.dpi", "savefig.dpi"), DPI),
-    "svg.fonttype": "none",
-    "svg.hashsalt": "fretwear",
-}
+_STYLE = Path(__file__).with_name("report.mplstyle")
 
 
 @dataclass(frozen=True)
@@ -116,13 +91,9 @@ def as_sentences(*parts: str) -> str:
     return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
 
 
-@contextmanager
-def style(width: float = WIDTH) -> Iterator[None]:
+def style(width: float = WIDTH) -> AbstractContextManager[None]:
     """Inside, figures are built, this wide, and saved in the style of the report, whatever matplotlibrc says."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update({**_STYLE, "figure.figsize": (width, 1.0)})
-        yield
+    return context([_STYLE, {"figure.figsize": (width, 1.0)}], after_reset=True)
 
 
 def plotted_values(figure: Figure) -> list[tuple[object, ...]]:
@@ -180,5 +151,5 @@ def _save(figure: Figure, path: Path) -> Path:
     figure.savefig(svg, format="svg", metadata={"Date": None})
     # what stands where is the same for both: it is found once
     figure.set_layout_engine("none")
-    figure.savefig(png, format="png", dpi=PRINT_DPI)
+    figure.savefig(png, format="png", dpi=_PRINT_DPI)
     return svg

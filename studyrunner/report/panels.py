@@ -48,27 +48,22 @@ def new_panels(
 ) -> tuple[Figure, NDArray[Any]]:
     """A figure, inches high, that lays itself out, and its axes (n_rows, n_columns). Nothing has to close it.
 
-    In a narrow figure the columns stand below each other; panels share their axes alike. sharex, sharey, ratios: as for
-    `subplots`.
+    In a narrow figure the columns stand below each other. sharex, sharey, ratios: as for `subplots`.
     """
-    width = mpl.rcParams["figure.figsize"][0]
-    if not is_narrow():
-        figure = Figure(figsize=(width, height), layout="constrained")
-        panels: NDArray[Any] = figure.subplots(n_rows, n_columns, sharex=sharex, sharey=sharey, squeeze=False, **ratios)
-        return figure, panels
-    usual = np.array(ratios.get("height_ratios", np.ones(n_rows)), dtype=float)
-    usual *= height / np.sum(usual)
-    own = np.minimum(np.maximum(0.45 * n_columns * usual, np.minimum(usual, _LOW)), np.maximum(usual, _HIGH))
-    heights = np.tile(np.maximum(own, _LEAST), n_columns)
-    figure = Figure(figsize=(width, heights.sum()), layout="constrained")
-    panels = figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights.tolist())
-    panels = panels.reshape(n_columns, n_rows).T
-    for (row, column), panel in np.ndenumerate(panels):
-        for shared, share, first in ((sharex, panel.sharex, (0, column)), (sharey, panel.sharey, (row, 0))):
-            other = panels[0, 0] if shared is True else panels[first]
-            if shared and other is not panel:
-                share(other)
-        panel.tick_params(labelbottom=not sharex or row == n_rows - 1)
+    width, shape, narrow = mpl.rcParams["figure.figsize"][0], (n_rows, n_columns), is_narrow()
+    if narrow:
+        usual = np.array(ratios.get("height_ratios", np.ones(n_rows)), dtype=float)
+        usual *= height / np.sum(usual)
+        own = np.minimum(np.maximum(0.45 * n_columns * usual, np.minimum(usual, _LOW)), np.maximum(usual, _HIGH))
+        heights = np.tile(np.maximum(own, _LEAST), n_columns)
+        height, shape, ratios = float(heights.sum()), (len(heights), 1), {"height_ratios": heights.tolist()}
+        sharex, sharey = sharex is True, sharey is True
+    figure = Figure(figsize=(width, height), layout="constrained")
+    panels: NDArray[Any] = figure.subplots(*shape, sharex=sharex, sharey=sharey, squeeze=False, **ratios)
+    if narrow:
+        panels = panels.reshape(n_columns, n_rows).T
+        for panel in panels[-1]:
+            panel.tick_params(labelbottom=True)
     return figure, panels
 
 

@@ -118,7 +118,7 @@ def show_error(result: Result, point: Point) -> str:
 def describe_ends(result: Result) -> str:
     """Numbers of points that were computed to the end, ended early, or have no state."""
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
-    n_early = int(np.count_nonzero(result.held & ~result.computed))
+    n_early = int(np.count_nonzero(result.has_values & ~result.computed))
     text = f"{count(n_points, 'point')}, {n_computed} computed to the end"
     text += f", {n_early} ended early with values up to there" if n_early else ""
     n_without = n_points - n_computed - n_early
@@ -132,7 +132,7 @@ def list_ended(result: Result, number: int) -> dict[str, list[dict[str, int]]]:
     for index in np.argwhere(result.dataset["outcome"].values == number):
         place, point = tuple(index.tolist()), result.point_at(index)
         said = "" if messages is None else str(messages[place])
-        if result.held[place] and result.counted[:-1] not in said:
+        if result.has_values[place] and result.counted[:-1] not in said:
             last = show_cycles(float(result.last_cycle[place]), result.counted)
             end = "" if result.computed[place] else f"computed up to {last}"
             is_known = 0.0 < result.errors[place] <= WELL_ENOUGH

@@ -21,7 +21,7 @@ import xarray as xr
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.study_of_result import check_result_file
-from studyrunner.study.toml_text import NoTomlError, read_toml
+from studyrunner.study.toml_text import read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import (
     ASKED,
@@ -186,13 +186,11 @@ def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
 
 
 def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
-    """The effective study of a file, by table; empty where it is no TOML. Raises UserError: it is nested too deeply."""
+    """The effective study of a file, by table; empty where it cannot be read."""
     try:
         tables = read_toml(str(attributes.get("study", "")).encode("utf-8", "replace"), source)
-    except NoTomlError:
+    except UserError:
         return {}
-    except UserError as error:
-        raise UserError(source, "the attribute study", None, error.remedy) from None
     return {name: table for name, table in tables.items() if isinstance(table, dict)}
 
 

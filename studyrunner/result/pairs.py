@@ -141,14 +141,14 @@ def depths(result: Result, point: Point) -> NDArray[np.float64]:
     if result.has("wear_depth"):
         return np.asarray(result.at("wear_depth", point).values, dtype=float)
     found = np.full((len(result.cycles), result.dataset.sizes["contact"]), np.nan)
-    found[result.last_kept(point)] = last_depth(result, point)
+    found[result.last_reached(point)] = last_depth(result, point)
     return found
 
 
 def last_depth(result: Result, point: Point) -> NDArray[np.float64]:
     """Wear depth (n_contact,), m, of one point at the last count that it has reached."""
     if result.has("wear_depth"):
-        return np.asarray(result.at("wear_depth", point, result.last_kept(point)).values, dtype=float)
+        return np.asarray(result.at("wear_depth", point, result.last_reached(point)).values, dtype=float)
     return np.asarray(result.at("wear_depth_last", point).values, dtype=float)
 
 

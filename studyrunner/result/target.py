@@ -40,11 +40,6 @@ class Target:
         """File of what is computed so far."""
         return self.path.with_name(f"{self.path.name}.progress")
 
-    @property
-    def older_folder(self) -> Path:
-        """Folder of what version 0.4.0 or before has computed."""
-        return self.path.with_name(f"{self.path.name}.parts")
-
 
 def identity_of(study: Study) -> str:
     """Identity of a study in words: the same study with other values, such as a finer axis, has the same."""
@@ -73,10 +68,10 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
                     sync(file)
                 finally:
                     trial.unlink()
-    except (OSError, ValueError) as error:
-        # a name that the system cannot encode is a ValueError
-        reason = error.strerror if isinstance(error, OSError) else "it has a name that no file has"
-        remedy = f"give a file that can be written: {reason}"
+    except OSError as error:
+        remedy = f"give a file that can be written: {error.strerror}"
+    except ValueError:
+        remedy = f"give a name in {sys.getfilesystemencoding().upper()}, as those of its folders"
     if remedy:
         raise UserError("command line", option, str(path), remedy)
     return target

@@ -190,7 +190,7 @@ class Result:
         return np.where(self.computed & np.isnan(last), self.dataset["cycle"].values[-1], last)
 
     @cached_property
-    def held(self) -> Mask:
+    def has_values(self) -> Mask:
         """Points with values, if only of the first cycles."""
         if self.has_modes:
             return self.computed
@@ -262,7 +262,7 @@ class Result:
         ascend = own.size > 1 and not np.isinf(own).any() and (np.diff(own[~np.isnan(own)]) > 0.0).all()
         return own if ascend else numbers
 
-    def last_kept(self, point: Point) -> int:
+    def last_reached(self, point: Point) -> int:
         """Index of the last cycle count at which a point holds values: one at its target has none behind it."""
         counts = self.counts(point)
         last = self.last_cycle[tuple(point[name] for name in self.axes)]
@@ -298,7 +298,7 @@ class Result:
         for name in set(self.chosen) & set(self.varying):
             wanted = wanted & (self.dataset[name] == self.chosen[name])
         allowed, best = np.asarray(wanted.transpose(*self.axes).values), self.best_known
-        sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.held, all_points)
+        sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, all_points)
         points = next(each & allowed for each in sets if (each & allowed).any())
         for measure in measures:
             known = np.where(points & np.isfinite(measure), measure, 0.0)

@@ -21,17 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.checkpoint.completion_index import CompletionIndex, variable_sizes
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import RESULTS
 from studyrunner.result.arrays import SmallArray, attributes
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.result.target import Target
-from studyrunner.scene.scene import KeptScene, SceneFacts
+from studyrunner.scene.scene import KeptScene, SceneFacts, variable_sizes
 from studyrunner.study.study import Study
 from studyrunner.study.study_of_result import SCENE_GROUP
 from studyrunner.system.files import find_fault, replacing
 from studyrunner.user_error import StorageError
-from studyrunner.variables import COUNTS, LOOPS, Variable
+from studyrunner.variables import LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
 _BYTES_OF_CACHE = 2**16
@@ -143,8 +143,7 @@ def _create_all(
 ) -> dict[str, Variable]:
     """Dimensions and variables of the histories."""
     sizes = {name: len(values) for name, values in study.dimensions.items()} | variable_sizes(study, facts)
-    variables = {name: entry for name, entry in study.variables.items() if name in study.outputs.variables}
-    variables |= (LOOPS if study.outputs.loops else {}) | {**study.kept} | (COUNTS if study.to_the_end else {})
+    variables = {**study.recorded, **study.kind.kept}
     for name, size in sizes.items():
         file.createDimension(name, size)
     of_pairs = sorted(each.name for each in arrays if each.name.startswith("contact_"))

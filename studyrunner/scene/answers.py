@@ -9,18 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
 from studies.scene_answers import ExactAnswer, WearQuestion, stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import changed_keys, scene_answer
+from studies.scenes import changed_keys, scene_answer, scene_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.scene.computed import Computed, frequencies_once, harmonics_to_build
+from studyrunner.scene.computed import harmonics_to_build
 from studyrunner.scene.scene import build_mesh, has_frequencies
 from studyrunner.scene.scene_set import SceneSet, axes_of_difference
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.realisation import realise
-from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, show_text
 from studyrunner.variables import Variable
@@ -44,18 +42,14 @@ class SceneVariable:
     coordinate: bool = False
 
 
-def build_scene_variables(study: Study, model: ReducedModel, computed: Computed) -> tuple[SceneVariable, ...]:
+def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SceneVariable, ...]:
     """What the study asks of its scene, but exact answers. Natural frequencies of a bundled sector take some seconds.
 
-    computed: holds those of an earlier run. Raises UserError where the scene cannot give them.
+    Raises UserError where the scene cannot give them.
     """
-    found: list[SceneVariable] = []
     with scene_errors(study.source, None):
-        if "mesh" in study.scene_variables:
-            found += _mesh(study)
-        if "natural_frequency" in study.scene_variables:
-            found += _frequencies(computed, study, model)
-    return tuple(found)
+        of_mesh = tuple(_mesh(study)) if "mesh" in study.scene_variables else ()
+        return of_mesh + (tuple(_frequencies(study, model)) if "natural_frequency" in study.scene_variables else ())
 
 
 def _mesh(study: Study) -> Iterator[SceneVariable]:
@@ -71,8 +65,9 @@ def _mesh(study: Study) -> Iterator[SceneVariable]:
         yield SceneVariable(name, entry, values[name])
 
 
-def _frequencies(computed: Computed, study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
-    found = frequencies_once(study, computed) if has_frequencies(study) else stuck_frequencies(model)
+def _frequencies(study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
+    scene = study.scene
+    found = scene_frequencies(scene.model, scene.parameters) if has_frequencies(study) else stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()
     labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
     yield SceneVariable("natural_frequency", entry, found.frequencies)
@@ -122,30 +117,20 @@ def exact_answers(study: Study) -> tuple[SceneVariable, ...]:
     return tuple(variables)
 
 
-_HOW_TO_COMPUTE = {
-    "study": ("name", "title"),
-    "scene": ("model", "parameters"),
-    "axes": ("step", "scheme", "sweep", *SOLVER_AXES),
-    "slow_time": ("cycles", "final_share", "outputs", "until", "largest_depth"),
-    "solver": (*SOLVER_AXES, "shortcuts", "time_limit"),
-    "outputs": ("variables", "loops", "scene"),
-}
-_WITHOUT_INFLUENCE = frozenset(f"{table}.{key}" for table, keys in _HOW_TO_COMPUTE.items() for key in keys)
-"""Keys of a study that say how a point is computed and shown, and not which point. A key that is not among them may
-change the truth: only a closed form that knows the key still holds where it differs from its default."""
+_WITHOUT_INFLUENCE = ("step", "scheme", "sweep")
+"""Keys of [axes] that say how a point is computed, and not which point."""
 
 
 def _changed(study: Study) -> frozenset[str]:
     """Keys of a part of a study that differ from their defaults and may change the exact answer.
 
-    Without the parameters of the scene, which `scene_answer` looks at.
+    Without the parameters of the scene, which `scene_answer` looks at. [slow_time], [solver] and [outputs] say how a
+    point is computed and shown. What depends on another key has a closed form that knows the key, or none.
     """
-    found: set[str] = set()
-    for name, field in type(study).model_fields.items():
-        table = getattr(study, name)
-        if not field.exclude and table:
-            found |= changed_keys(table, name) if isinstance(table, BaseModel) else {name}
-    return frozenset(found - _WITHOUT_INFLUENCE)
+    tables = {"scene": ("model", "parameters"), "axes": _WITHOUT_INFLUENCE, "wear": ()}
+    changed = {key for name in tables for key in changed_keys(getattr(study, name), name)}
+    others = {name for name in ("scatter", "loading", "mission") if getattr(study, name)}
+    return frozenset(changed | others) - {f"{name}.{key}" for name, keys in tables.items() for key in keys}
 
 
 def _answers(study: Study) -> dict[str, np.ndarray]:

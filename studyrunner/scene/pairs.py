@@ -43,7 +43,6 @@ def contact_changes(
 
 
 def _of_parts(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> tuple[ContactChange, ...]:
-    """The same of a study, or of one block, by part."""
     changes: list[ContactChange] = []
     for variant, own, of_sample in drawn_pairs(study, scenes, facts):
         if variant.scene.worn is not None:
@@ -75,8 +74,7 @@ def drawn_pairs(
 
 def scatters_pairs(study: Study) -> bool:
     """Whether samples draw values of contact pairs."""
-    inputs = {} if study.scatter is None else study.scatter.inputs
-    return any(is_of_pairs(name, each) for name, each in inputs.items())
+    return study.scatter is not None and any(is_of_pairs(name, each) for name, each in study.scatter.inputs.items())
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
@@ -91,9 +89,8 @@ def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
 
 def _pair_values(study: Study, facts: SceneFacts) -> _Values:
     """Values (n_samples, n_contact) of the inputs that belong to pairs. study: with one scene. Raises UserError."""
-    friction = facts.friction_coefficient
+    friction, of_all = facts.friction_coefficient, study.friction_coefficient
     if friction is None:
-        of_all = study.friction_coefficient
         friction = np.full(len(facts.area), np.nan if of_all is None else of_all)
     own = {"gap": facts.gap, "area": facts.area, "friction_coefficient": friction}
     return draw_pairs(study, own, ScatteredPairs(facts.surface, facts.position))

@@ -142,11 +142,8 @@ def _check_outputs(study: Study, model: ReducedModel) -> None:
         if pair >= n_contact:
             remedy = f"give indices from 0 to {n_contact - 1}, the contact pairs of the scene"
             raise UserError(study.source, "outputs.loops", pair, remedy)
-    own = {"contact": n_contact, "response": len(model.response_names), "cycle": len(study.cycles_kept)}
-    sizes = {**own, **study.sizes}
-    # the variables of the certificate are there whether they are asked for or not
-    n_values = sum(math.prod(sizes[name] for name in each.dimensions) for each in study.kind.asked.values())
-    if (size := 8.0 * (loop_numbers(study) + n_values)) > _LARGEST_HISTORY:
+    facts = SceneFacts(0, model.contact.position, model.contact.area, model.contact.surface, model.response_names, "")
+    if (size := 8.0 * values_of_point(study, facts)) > _LARGEST_HISTORY:
         remedy = f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
         key = "outputs.loops" if loops else "slow_time.outputs"
         raise UserError(study.source, key, list(loops) if loops else len(study.cycles_kept), remedy)
@@ -155,9 +152,25 @@ def _check_outputs(study: Study, model: ReducedModel) -> None:
             stuck_frequencies(model)
 
 
-def loop_numbers(study: Study) -> int:
-    """Numbers in the loops of one point."""
-    return len(study.outputs.loops) * len(study.cycles_kept) * LOOP_PHASES * len(LOOP_COMPONENTS) * len(LOOPS)
+def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
+    """Lengths of the dimensions after the axes."""
+    loops = {"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}
+    return {**study.sizes, "contact": len(facts.area), "response": len(facts.response_names), **loops}
+
+
+def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple[int, ...]]]:
+    """Name, data type and shape of each value of a result."""
+    sizes, fields = variable_sizes(study, facts), []
+    for name, entry in {**study.kind.kept, **study.recorded}.items():
+        # of all pairs, only those asked for have a loop
+        lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
+        fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
+    return fields
+
+
+def values_of_point(study: Study, facts: SceneFacts) -> int:
+    """Number of values in a result."""
+    return sum(math.prod(shape) for _, _, shape in record_fields(study, facts))
 
 
 def has_frequencies(study: Study) -> bool:
@@ -221,7 +234,7 @@ def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
     """Contents of a scene file for the result; of a bundled scene only on request, as the parameters give it again."""
     if study.scene.is_bundled and not study.outputs.scene:
         return None
-    from studies.scene_layout import scene_attributes, scene_datasets
+    from studies.scene_file import scene_attributes, scene_datasets
 
     with scene_errors(study.source, study.scene.path):
         datasets = tuple(scene_datasets(model, build_mesh(study)))

@@ -48,20 +48,18 @@ def find_scenes(study: Study) -> SceneSet:
     Raises UserError where a result file is to keep the scene, and there are several.
     """
     studies: dict[str, Study] = {}
-    numbers: dict[str, int] = {}
-    of_blocks = []
-    parts = realise(study)
+    parts, of_blocks = realise(study), []
     for part in parts:
-        of_part = part.study.block_studies or (part.study,)
-        keys = [_key(each) for each in of_part]
-        for key, each in zip(keys, of_part, strict=True):
-            numbers.setdefault(key, len(numbers))
+        by_key = [(_key(each), each) for each in part.study.block_studies or (part.study,)]
+        for key, each in by_key:
             studies.setdefault(key, each)
-        of_blocks.append(tuple(numbers[key] for key in keys))
+        of_blocks.append([key for key, _ in by_key])
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
         raise UserError(study.source, "outputs.scene", True, remedy)
-    return SceneSet(tuple(studies.values()), parts, tuple(own[0] for own in of_blocks), tuple(of_blocks))
+    number_of = {key: number for number, key in enumerate(studies)}
+    numbers = tuple(tuple(number_of[key] for key in keys) for keys in of_blocks)
+    return SceneSet(tuple(studies.values()), parts, tuple(own[0] for own in numbers), numbers)
 
 
 def _key(study: Study) -> str:
@@ -152,10 +150,9 @@ def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
 class PairArrays:
     """Where the pairs are, for the coordinates of the result file.
 
-    dimensions: axes along which the pairs differ, then "contact"; "contact" alone where the pairs are the same in all
-        scenes. position (..., n_contact, 3): m. area (..., n_contact): m2. surface (..., n_contact): labels.
-    exists (..., n_contact): whether there is a pair; None where all scenes have the same pairs. Where there is none
-        position and area are NaN, and the label is empty.
+    dimensions: axes along which the pairs differ, then "contact". position (..., n_contact, 3): m. area
+    (..., n_contact): m2. surface (..., n_contact): labels. exists (..., n_contact): whether there is a pair; None where
+    all scenes have the same pairs. Where there is none position and area are NaN, and the label is empty.
     """
 
     dimensions: tuple[str, ...]

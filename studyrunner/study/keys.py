@@ -11,7 +11,7 @@ import numpy as np
 from studyrunner.study.mission import MissionBlock
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.scene_section import SceneSection
-from studyrunner.study.sections import SECTIONS, SOLVER_AXES, StudySection
+from studyrunner.study.sections import SECTIONS, StudySection
 from studyrunner.user_error import UserError, toml_value
 from studyrunner.values import Section
 
@@ -120,10 +120,9 @@ def key_list() -> str:
     kinds: dict[str, type[Section]] = {**SECTIONS, "scene": SceneSection, "mission": MissionBlock}
     for table in ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", "loading", "scatter", "mission"):
         for key, default, meaning in _keys(table, kinds[table]):
-            if not (table == "axes" and key in SOLVER_AXES):
-                shown = f"`{table}.{key} = {default}`" if default else f"`{table}.{key}`"
-                needed = " (required)" if kinds[table].model_fields[key].is_required() else ""
-                lines.append(f"- {shown}{needed}: {meaning}")
+            shown = f"`{table}.{key} = {default}`" if default else f"`{table}.{key}`"
+            needed = " (required)" if kinds[table].model_fields[key].is_required() else ""
+            lines.append(f"- {shown}{needed}: {meaning}")
     return "\n".join(lines)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, Field
 
 from studyrunner.study.mistakes import Mistakes, check_table
-from studyrunner.study.sections import AxesSection
+from studyrunner.study.sections import SOLVER_AXES, AxesSection
 from studyrunner.user_error import UserError
 from studyrunner.values import Positive, Section, Wrong, listed
 
@@ -79,6 +79,14 @@ class MissionBlock(Section):
             return abs(self.frequency["stop"] ** 2 - self.frequency["start"] ** 2) / (2.0 * self.frequency["rate"])
         return self.cycles if self.cycles is not None else (self.seconds or 0.0) * frequency
 
+    def describe(self, frequency: float) -> str:
+        """In words. frequency: of steady vibration, Hz."""
+        how = {"ramp": "begins with a ramp", "sweep": "begins with a sweep", "continue": "continues the block before"}
+        cycles = f"{self.cycles_at(frequency):.4g} cycles a mission"
+        if isinstance(self.frequency, dict):
+            return "passage from {start:g} to {stop:g} Hz at {rate:g} Hz/s, ".format(**self.frequency) + cycles
+        return f"{frequency:g} Hz, {cycles}, {how[self.begin]}"
+
     def as_table(self) -> dict[str, Any]:
         """The block as the study file has it."""
         own = {name: value for name, value in self.model_dump(mode="json").items() if value is not None}
@@ -127,7 +135,7 @@ def _read_block(table: Mapping[str, Any], place: str, scene: type[BaseModel], fo
             parameters[key] = value
         elif key == "sweep":
             found.add(f"{place}.{key}", value, 'give begin = "sweep": its direction is that of axes.sweep')
-        elif key in _NO_KEYS or (key in AxesSection.model_fields and key not in OWN_AXES):
+        elif key in _NO_KEYS or (key in (*AxesSection.model_fields, *SOLVER_AXES) and key not in OWN_AXES):
             found.add(f"{place}.{key}", value, "leave it out: it is the same in all blocks")
         else:
             own[key if key != "parameters" else "parameter"] = value
@@ -135,7 +143,6 @@ def _read_block(table: Mapping[str, Any], place: str, scene: type[BaseModel], fo
 
 
 def _wrong_beside(before: MissionBlock, block: MissionBlock, axes: Mapping[str, Any]) -> Iterator[Wrong]:
-    """What of a block does not fit to the block before and to [axes]."""
     if not block.gives("frequency") and "frequency" not in axes:
         yield Wrong("frequency", None, "missing: give it here, or as axes.frequency for all blocks without one")
     if block.begin == "continue":
@@ -146,13 +153,6 @@ def _wrong_beside(before: MissionBlock, block: MissionBlock, axes: Mapping[str, 
             yield Wrong("begin", block.begin, remedy)
     elif block.begin == "sweep" and not block.is_passage and "ramp" in listed(axes.get("sweep")):
         yield Wrong("begin", block.begin, 'give "ramp", or axes.sweep = "up" or "down": a sweep has a direction')
-
-
-def check_used_axes(axes: Sequence[str], blocks: Sequence[MissionBlock], found: Mistakes) -> None:
-    """Notes where all blocks give values of their own to an axis. axes: that the study file gives."""
-    for name in axes:
-        if blocks and all(block.gives(name) for block in blocks):
-            found.add(f"axes.{name}", None, f"leave it out: every block under [[mission]] gives its own {name}")
 
 
 def engine_frequency(block: MissionBlock, parameters: BaseModel, source: str) -> float:

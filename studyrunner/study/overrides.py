@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from studyrunner.study.scene_axes import is_table
-from studyrunner.study.sections import AxesSection
+from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.toml_text import read_toml
 from studyrunner.user_error import UserError
 
@@ -56,7 +56,7 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
     if key in _INSTEAD:
         place.pop(_INSTEAD[key], None)
     # the last place where a key is given counts, here or under [axes]
-    tables = ("solver",) if names[-1] in AxesSection.model_fields else ("scene", "wear")
+    tables = ("solver",) if names[-1] in SOLVER_AXES else ("scene", "wear")
     others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}
     if len(names) == 2 and not is_table(value):
         for other in others.get(names[0], ()):

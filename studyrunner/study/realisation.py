@@ -1,6 +1,4 @@
-"""A study in parts that have one scene and one sample each: along the axes that are keys of [scene] or [wear], and
-along the samples of [scatter]; and how wide the scene of a part has to be for what it wears.
-"""
+"""A study in parts that have one scene and one sample each, and how wide their scenes have to be for what they wear."""
 
 from __future__ import annotations
 

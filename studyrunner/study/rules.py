@@ -1,7 +1,4 @@
-"""Rules between the tables of a study. Each yields what breaks it; one that needs a table that is wrong is left out.
-
-They look at what the study file gives, and at complete studies.
-"""
+"""Rules between the tables of a study, which are right themselves. Each yields what breaks it."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from studyrunner.coordinates import SCENE
 from studyrunner.scatter import OF_PAIRS
 from studyrunner.study.mistakes import Mistakes, nearest_name
 from studyrunner.study.realisation import is_of_pairs
-from studyrunner.study.sections import AUTO, DEFAULT, SOLVER_AXES
+from studyrunner.study.sections import AUTO, DEFAULT
 from studyrunner.study.study import MISSIONS, MODES, NUMBERS, WEAR, Study
 from studyrunner.values import Wrong
 from studyrunner.variables import KEPT
@@ -21,15 +18,11 @@ from studyrunner.variables import KEPT
 _MOST_POINTS = 1_000_000
 
 
-def check_rules(study: Study, found: Mistakes, *, complete: bool) -> None:
-    """Notes what breaks a rule. complete: whether the study has all tables; it has none that are wrong themselves."""
+def check_rules(study: Study, found: Mistakes) -> None:
+    """Notes what breaks a rule."""
     for rule in (_kind, _frequency, _variables, size_of_result, _solver, _end, wrong_scatter):
-        try:
-            for wrong in rule(study):
-                found.add(*wrong)
-        except AttributeError:
-            if complete:
-                raise
+        for wrong in rule(study):
+            found.add(*wrong)
 
 
 def _kind(study: Study) -> Iterator[Wrong]:
@@ -100,7 +93,6 @@ def size_of_result(study: Study) -> Iterator[Wrong]:
 
 
 def _variables(study: Study) -> Iterator[Wrong]:
-    """Variables are of the kind of study and of the scene."""
     of_scene = (name for name in SCENE if name != "exact" or study.kind is WEAR)
     known = dict.fromkeys((*study.kind.asked, *of_scene))
     for name in study.outputs.variables:
@@ -115,26 +107,19 @@ def _variables(study: Study) -> Iterator[Wrong]:
 
 
 def _solver(study: Study) -> Iterator[Wrong]:
-    """Samples in a period resolve the harmonics, which are given once; a law that depends on depths knows them."""
-    for key in SOLVER_AXES:
-        if getattr(study.axes, key) is not None and key in study.solver.model_fields_set:
-            values = getattr(study.solver, key)
-            shown = values[0] if len(values) == 1 else list(values)
-            yield Wrong(f"solver.{key}", shown, f"give it once, here or as axes.{key}")
+    """Samples in a period resolve the harmonics; a law that depends on depths knows them."""
     # automatic harmonics begin with three
-    most = max((*study.given_harmonics, *((FIRST_HARMONICS,) if AUTO in study.harmonics else ())), default=0)
-    fewest = min((number for number in study.samples if number != AUTO), default=None)
+    automatic = [FIRST_HARMONICS] if AUTO in study.solver.harmonics else []
+    most = max((*study.given_harmonics, *automatic), default=0)
+    fewest = min((number for number in study.solver.samples if number != AUTO), default=None)
     if fewest is not None and fewest <= 2 * most:
-        table = "solver" if study.axes.samples is None else "axes"
-        remedy = f"give more than twice the {most} harmonics, at least {2 * most + 1}"
-        yield Wrong(f"{table}.samples", fewest, remedy)
+        yield Wrong("solver.samples", fewest, f"give more than twice the {most} harmonics, at least {2 * most + 1}")
     if study.wear.law == "table" and study.scene.worn is not None:
         remedy = 'give another law: the factors of a "table" depend on depths, which a worn scene counts from 0'
         yield Wrong("wear.law", study.wear.law, remedy)
 
 
 def _end(study: Study) -> Iterator[Wrong]:
-    """Schemes and the end of the histories fit together."""
     schemes, slow_time = study.axes.scheme, study.slow_time
     if study.to_the_end and "explicit" in schemes:
         remedy = 'give "adaptive" or "implicit": explicit steps cannot grow, as slow_time.cycles = inf asks for'

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from studies.scene_error import remedy_of
 from studyrunner.study.mistakes import Mistakes, flat_errors, tables_in
-from studyrunner.study.sections import AxesSection, WearSection
+from studyrunner.study.sections import SOLVER_AXES, AxesSection, WearSection
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import Wrong, read_axis
 
@@ -138,7 +138,7 @@ def scene_with_axes(scene: Mapping[str, Any], axes: Mapping[str, Any]) -> Table:
     """[scene] of a result that holds its scene, with the only value of each axis that is a key of [scene]."""
     found = dict(scene)
     for name, values in axes.items():
-        if name in (*AxesSection.model_fields, *WearSection.AXES):
+        if name in (*AxesSection.model_fields, *SOLVER_AXES, *WearSection.AXES):
             continue
         if not is_table(values):
             found[name] = only_table(values)
@@ -160,7 +160,6 @@ def as_checked(scene_axes: Sequence[SceneAxis], study: Any) -> tuple[SceneAxis, 
 
 
 def _with(given: Any, key: str, value: AxisValue) -> Any:
-    """A table, or a list of one table, with a value."""
     return [{**given[0], key: value}] if only_table(given) is not given else {**given, key: value}
 
 

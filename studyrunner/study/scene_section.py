@@ -131,14 +131,6 @@ class Origin:
     archived: Archived | None = None
     keeps_scene: bool = False
 
-    def parameters_before(self, model: str, kind: type[BaseModel]) -> BaseModel | None:
-        """Parameters of the scene that the result holds; None where it holds none of this model."""
-        held = self.archived
-        if held is None or not held.holds_scene or held.scene.get("model") != model:
-            return None
-        table = {key: value for key, value in held.scene.items() if key not in ("model", "worn")}
-        return check_table(kind, table, self.source, "scene")
-
 
 def parameters_of(model: object, source: str) -> type[BaseModel]:
     """What [scene] consists of beside `model` and `worn`. Raises UserError where there is no such scene."""
@@ -178,16 +170,18 @@ def check_scene(table: Mapping[str, Any], origin: Origin) -> SceneSection:
 
 def _find_scene(model: str, parameters: BaseModel, given: Mapping[str, Any], origin: Origin) -> dict[str, Any]:
     """Where the scene is and what it offers: in the result that is read, in files, or to be built."""
-    before, is_file = origin.parameters_before(model, type(parameters)), _names_file(model)
+    held, is_file = origin.archived, _names_file(model)
+    before = held.scene if held is not None and held.holds_scene and held.scene.get("model") == model else None
+    changed = [key for key in type(parameters).model_fields if before and given.get(key) != before.get(key)]
     if not (is_file or _names_model(model)):
         # only what was kept on request takes the place of what a bundled scene builds
-        held = _in_file(origin.path, SCENE_GROUP, origin) if origin.keeps_scene and before == parameters else {}
-        return {**held, "offers": tuple(name for name, function in _OFFERED.items() if scene_has(model, function))}
+        kept = _in_file(origin.path, SCENE_GROUP, origin) if origin.keeps_scene and before and not changed else {}
+        return {**kept, "offers": tuple(name for name, function in _OFFERED.items() if scene_has(model, function))}
     if before is not None:
         # one friction coefficient of all pairs is not part of the reduced scene
         free = is_file or isinstance(dict(parameters)["friction_coefficient"], float)
-        for key in type(parameters).model_fields:
-            if getattr(parameters, key) != getattr(before, key) and not (free and key == "friction_coefficient"):
+        for key in changed:
+            if not (free and key == "friction_coefficient"):
                 remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
                 raise UserError(origin.source, f"scene.{key}", given.get(key), remedy)
         return _in_file(origin.path, SCENE_GROUP, origin)

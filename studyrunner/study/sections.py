@@ -42,6 +42,7 @@ DEFAULT: Final = "default"
 """In a list of variables: those that cost little, which is what a study without such a list asks for."""
 
 SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
+"""Keys of [solver] that may stand under [axes]."""
 
 VARIABLES = tuple(dict.fromkeys((*ASKED, *SCENE, *OF_MODES, *OF_MISSIONS)))
 """All that `outputs.variables` may name, in the order of the result."""
@@ -109,12 +110,6 @@ class AxesSection(Section):
         None, description="m sqrt(kg), of nonlinear modes, in place of a frequency"
     )
     mode: Axis[Mode] = Field((1,), description="number of the nonlinear mode, by frequency, from 1 on")
-    harmonics: Axis[Harmonics] | None = Field(None, description="harmonics above the static one")
-    samples: Axis[Samples] | None = Field(None, description="time samples in a period")
-    tolerance: Axis[Fraction] | None = Field(None, description="of the scaled residual")
-    rtol: Axis[Fraction] | None = Field(
-        None, description="relative error that automatic settings and adaptive steps aim at"
-    )
 
 
 class WearSection(Section):

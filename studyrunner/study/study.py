@@ -11,7 +11,7 @@ from pathlib import Path
 from pydantic import Field
 
 from solver.contact.wear_law import WearLaw
-from solver.settings import TARGETS, Automatic, FollowedFrequency, WearTarget
+from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scatter import ScatterSection
 from studyrunner.study.mission import OWN_AXES, MissionBlock
@@ -32,7 +32,9 @@ from studyrunner.study.study_of_result import Archived
 from studyrunner.values import Section
 from studyrunner.variables import (
     ASKED,
+    COUNTS,
     KEPT,
+    LOOPS,
     OF_A_MISSION,
     OF_A_MODE_POINT,
     OF_MISSIONS,
@@ -55,6 +57,7 @@ class Kind:
     usual, of_samples: variables where the study names none, and where samples are drawn.
     counted: what the slow time counts; empty where nothing wears.
     unused: keys without a use, by table. why: the remedy where one is given.
+    time: how well the time of a run is known before, for `--plan`.
     """
 
     name: str
@@ -67,10 +70,11 @@ class Kind:
     counted: str
     unused: Mapping[str, tuple[str, ...]]
     why: str
+    time: str
 
 
 def _other_axes(*axes: str) -> tuple[str, ...]:
-    return tuple(name for name in AxesSection.model_fields if name not in (*axes, *SOLVER_AXES))
+    return tuple(name for name in AxesSection.model_fields if name not in axes)
 
 
 _AXES = _other_axes("frequency_ratio", "modal_amplitude", "mode")
@@ -92,6 +96,7 @@ WEAR = Kind(
     "cycle",
     {},
     "",
+    "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long",
 )
 MODES = Kind(
     "nonlinear modes",
@@ -109,6 +114,7 @@ MODES = Kind(
         "outputs": ("loops",),
     },
     "leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
+    "to a factor of three; a mode that is lost at a large amplitude takes longer",
 )
 MISSIONS = Kind(
     "missions",
@@ -126,6 +132,7 @@ MISSIONS = Kind(
         "outputs": ("loops",),
     },
     "leave it out: slow_time.missions counts in place of cycles, and missions choose their own steps",
+    "to a factor of three, if every block wears",
 )
 
 
@@ -137,6 +144,7 @@ class Study(Section):
     - follow: what the frequency of the excitation follows; None where it is given.
     - source, folder: file of the study as the user named it, and its folder.
     - archived: attributes of a result file; None for a study file.
+    - solver_axes: keys of [solver] that are given under [axes].
     - scene_axes: axes that are keys of [scene] or [wear]; variants: for each combination of their values, the last one
       fastest, the study with these values in [scene] and [wear]. This study has their first values.
     """
@@ -156,6 +164,7 @@ class Study(Section):
     source: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
     archived: Archived | None = Field(None, exclude=True)
+    solver_axes: tuple[str, ...] = Field((), exclude=True)
     scene_axes: tuple[SceneAxis, ...] = Field((), exclude=True)
     variants: tuple[Study, ...] = Field((), exclude=True)
 
@@ -165,14 +174,10 @@ class Study(Section):
         return MISSIONS if self.mission else MODES if self.axes.modal_amplitude is not None else WEAR
 
     @property
-    def variables(self) -> Mapping[str, Variable]:
-        """Variables that the points of such a study have, if they are asked for."""
-        return self.kind.asked
-
-    @property
-    def kept(self) -> Mapping[str, Variable]:
-        """Variables that the result of such a study always holds."""
-        return self.kind.kept
+    def recorded(self) -> Mapping[str, Variable]:
+        """Variables of its points, beside those that every result holds."""
+        asked = {name: entry for name, entry in self.kind.asked.items() if name in self.outputs.variables}
+        return asked | (LOOPS if self.outputs.loops else {}) | (COUNTS if self.to_the_end else {})
 
     @property
     def sizes(self) -> Mapping[str, int]:
@@ -183,7 +188,7 @@ class Study(Section):
     @property
     def scene_variables(self) -> tuple[str, ...]:
         """What `outputs.variables` asks of the scene, names of SCENE."""
-        return tuple(name for name in self.outputs.variables if name in SCENE and name not in self.variables)
+        return tuple(name for name in self.outputs.variables if name in SCENE and name not in self.kind.asked)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -239,35 +244,15 @@ class Study(Section):
         return tuple(sorted({*spaced, missions}))
 
     @property
-    def harmonics(self) -> tuple[int | Automatic, ...]:
-        """Values of `harmonics`, under [axes] or [solver]; so for the other solver keys."""
-        return self.axes.harmonics or self.solver.harmonics
-
-    @property
-    def samples(self) -> tuple[int | Automatic, ...]:
-        """Values of `samples`."""
-        return self.axes.samples or self.solver.samples
-
-    @property
-    def tolerance(self) -> tuple[float, ...]:
-        """Values of `tolerance`."""
-        return self.axes.tolerance or self.solver.tolerance
-
-    @property
-    def rtol(self) -> tuple[float, ...]:
-        """Values of `rtol`."""
-        return self.axes.rtol or self.solver.rtol
-
-    @property
     def given_harmonics(self) -> tuple[int, ...]:
         """Values of `harmonics` that are numbers."""
-        return tuple(number for number in self.harmonics if number != AUTO)
+        return tuple(number for number in self.solver.harmonics if number != AUTO)
 
     @property
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
         names = {} if self.axes.frequency_ratio is None else {"frequency": "frequency_ratio"}
-        own = {names.get(name, name): self if name in SOLVER_AXES else self.axes for name in self.own_axes}
+        own = {names.get(name, name): self.solver if name in SOLVER_AXES else self.axes for name in self.own_axes}
         found = {name: getattr(table, name) or () for name, table in own.items()} | self.axes_of_parts
         if self.axes.modal_amplitude is None:
             return found
@@ -290,13 +275,9 @@ class Study(Section):
         return {axis.name: axis.units for axis in self.scene_axes}.get(name) or COORDINATES[name].units
 
     @property
-    def idle_axes(self) -> tuple[str, ...]:
-        """Axes of which every block of a mission gives a value of its own; then they are none."""
-        return tuple(name for name in OWN_AXES if self.mission and all(block.gives(name) for block in self.mission))
-
-    @property
     def own_axes(self) -> tuple[str, ...]:
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
-        used = (name for name in self.kind.axes if name not in self.idle_axes)
-        several = [key for key in SOLVER_AXES if getattr(self.axes, key) or len(getattr(self.solver, key)) > 1]
-        return (*used, *several)
+        # those of which every block of a mission gives a value of its own are none
+        idle = [name for name in OWN_AXES if self.mission and all(block.gives(name) for block in self.mission)]
+        several = [key for key in SOLVER_AXES if key in self.solver_axes or len(getattr(self.solver, key)) > 1]
+        return (*(name for name in self.kind.axes if name not in idle), *several)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
@@ -13,7 +14,7 @@ from pydantic import BaseModel
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter import flat_table
-from studyrunner.study.mission import OWN_AXES, MissionBlock, check_used_axes, engine_frequency, read_blocks
+from studyrunner.study.mission import OWN_AXES, MissionBlock, engine_frequency, read_blocks
 from studyrunner.study.mistakes import Mistakes, check_table, close_name, nearest_name
 from studyrunner.study.overrides import override
 from studyrunner.study.realisation import with_room_for_wear
@@ -84,7 +85,7 @@ def bundled_studies() -> tuple[str, ...]:
 
 
 def _study_path(argument: str) -> Path:
-    path, names, remedy = Path(argument), bundled_studies(), ""
+    path, names = Path(argument), bundled_studies()
     try:
         if path.is_file():
             return path
@@ -93,8 +94,7 @@ def _study_path(argument: str) -> Path:
         remedy = f"give a file that can be read: {error.strerror}"
     if not remedy and argument in names:
         return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
-    is_file = path.suffix == ".toml" or "/" in argument or "\\" in argument
-    what = "no such file" if is_file else "none of this name"
+    what = "no such file" if path.suffix == ".toml" or "/" in argument or "\\" in argument else "none of this name"
     remedy = remedy or f"there is {what}: give a TOML file or one of the bundled studies {', '.join(names)}"
     raise UserError(argument, "the study", None, remedy)
 
@@ -105,59 +105,68 @@ def _dict(table: Mapping[str, object], name: str) -> dict[str, Any]:
 
 
 def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
-    """The study in a table as TOML has it, every default filled in. Raises UserError with all that is wrong."""
+    """The study in a table as TOML has it, every default filled in.
+
+    Raises UserError with all that is wrong in single tables; where nothing is, with all that does not fit together.
+    """
     found = Mistakes(origin.source)
     tables = _known_tables(table, found)
     _take_worn(tables, origin, found)
-    try:
+    scene: type[BaseModel] | None = None
+    with contextlib.suppress(UserError):  # a mistake where the scene is checked
         scene = parameters_of(tables["scene"].get("model"), origin.source)
-    except UserError:
-        scene = None  # a mistake where the scene is checked
     axes, blocks = _axes_and_blocks(tables, scene, found)
-    sections = _check_sections(tables, scene, found)
-    if blocks or "mission" not in tables:
-        sections["mission"] = blocks
-    parts, renamed = [], keys_below_axes(axes)
+    solver_axes = _take_solver_axes(tables, found)
+    renamed, parts = {**keys_below_axes(axes), **solver_axes}, []
+    sections = {**_check_sections(tables, scene, renamed, found), "mission": blocks, "archived": origin.archived}
+    sections |= {"source": origin.source, "folder": origin.path.parent}
+    sections["solver_axes"] = tuple(key for key in SOLVER_AXES if f"solver.{key}" in solver_axes)
     for part in combinations(tables, axes):
+        of_part: dict[str, Any] = {}
         with found.collecting(renamed):
-            checked = _check_part(part, sections, origin, found)
-            parts.append(checked if found else _complete(checked))
+            of_part["wear"] = check_table(WearSection, part["wear"], origin.source, "wear")
+        with found.collecting(renamed):
+            of_part["scene"] = check_scene(part["scene"], origin)
+        parts.append((part["scene"], of_part))
     found.raise_any(table)
-    study = parts[0]
+    studies = []
+    for given, of_part in parts:
+        with found.collecting(renamed):
+            study, wrong = Study.model_construct(**sections, **of_part), Mistakes(origin.source)
+            check_rules(study, wrong)
+            study = _with_block_studies(study, given, origin, wrong) if blocks else study
+            wrong.raise_any()
+            studies.append(_complete(study))
+    found.raise_any(table)
+    study = studies[0]
     if axes:
-        study = study.model_copy(update={"scene_axes": as_checked(axes, study), "variants": tuple(parts)})
-        for wrong in (*size_of_result(study), *wrong_scatter(study)):
-            found.add(*wrong)
+        study = study.model_copy(update={"scene_axes": as_checked(axes, study), "variants": tuple(studies)})
+        for each in (*size_of_result(study), *wrong_scatter(study)):
+            found.add(*each)
         found.raise_any()
     return study
 
 
 def _known_tables(table: Mapping[str, object], found: Mistakes) -> Tables:
     """The tables of a study file, those that may be missing as empty ones; copies, in which keys may be changed."""
-    tables: Tables = {name: {} for name in _TABLES if name not in _ON_REQUEST}
-    needed = ["study", "scene", "axes"] if "mission" not in table else ["study", "scene"]
+    given: Tables = {}
     for name, section in table.items():
-        if name not in _TABLES:
-            meant = nearest_name(name, _TABLES)
+        meant = nearest_name(name, _TABLES)
+        if meant != name:
             found.add(name, section, f"unknown table, give {meant}")
-            if meant in tables and meant not in table and isinstance(section, dict):
-                # what it holds may be wrong as well
-                tables[meant] = dict(section)
-                needed = [each for each in needed if each != meant]
-        elif name == "mission":
-            tables[name] = section
-        elif not isinstance(section, dict):
+        elif meant != "mission" and not isinstance(section, dict):
             found.add(name, section, f"give a table [{name}] with keys")
-        else:
-            tables[name] = flat_table(section) if name == "scatter" else dict(section)
-    for name in needed:
-        if name not in table:
+        # what a table of another name holds may be wrong as well
+        if meant in _TABLES and (meant == name or meant not in table):
+            own: Any = dict(section) if isinstance(section, dict) else section if meant == "mission" else {}
+            given[meant] = flat_table(own) if meant == "scatter" else own
+    for name in ("study", "scene", *(() if "mission" in table else ("axes",))):
+        if name not in given:
             found.add(name, None, f"missing: give a table [{name}]")
-    return tables
+    return {name: {} for name in _TABLES if name not in _ON_REQUEST} | given
 
 
 def _take_worn(tables: Tables, origin: Origin, found: Mistakes) -> None:
-    """Reads the depths of a worn joint into its table."""
     worn = tables["scene"].pop("worn", None)
     if worn is None:
         return
@@ -176,21 +185,36 @@ def _axes_and_blocks(
     scene: what [scene] consists of; None where its model is wrong.
     """
     if scene is None:
-        # of other names, which may be keys of the scene, nothing is known
-        for name in [name for name in tables["axes"] if not close_name(name, [*AxesSection.model_fields])]:
-            del tables["axes"][name]
+        # other names may be keys of the scene
+        own = [*AxesSection.model_fields]
+        tables["axes"] = {name: each for name, each in tables["axes"].items() if close_name(name, own)}
         return (), ()
     own = [name for name in tables["axes"] if name in OWN_AXES]
     axes = take_scene_axes(tables, scene, found)
     blocks: tuple[MissionBlock, ...] = ()
     if "mission" in tables:
         blocks = read_blocks(tables["mission"], tables["axes"], scene, found)
-        check_used_axes([*own, *(axis.name for axis in axes)], blocks, found)
+        for used in [*own, *(axis.name for axis in axes)]:
+            if blocks and all(block.gives(used) for block in blocks):
+                found.add(f"axes.{used}", None, f"leave it out: every block under [[mission]] gives its own {used}")
     name = "cycle" if "modal_amplitude" in tables["axes"] else WORN_AXIS
     return (*axes, *worn_axis(tables["scene"].get("worn", {}), name)), blocks
 
 
-def _check_sections(tables: Tables, scene: type[BaseModel] | None, found: Mistakes) -> dict[str, Any]:
+def _take_solver_axes(tables: Tables, found: Mistakes) -> dict[str, str]:
+    """Moves keys of [solver] from [axes]: their names there, and in the file."""
+    renamed: dict[str, str] = {}
+    for key in [key for key in SOLVER_AXES if key in tables["axes"]]:
+        if key in tables["solver"]:
+            found.add(f"solver.{key}", tables["solver"][key], f"give it once, here or as axes.{key}")
+        tables["solver"][key] = tables["axes"].pop(key)
+        renamed |= {f"solver.{key}{end}": f"axes.{key}{end}" for end in ("", ".start", ".stop", ".num", ".spacing")}
+    return renamed
+
+
+def _check_sections(
+    tables: Tables, scene: type[BaseModel] | None, renamed: Mapping[str, str], found: Mistakes
+) -> dict[str, Any]:
     """The tables but [scene] and [wear], which differ along axes: those that are right."""
     sections: dict[str, Any] = {}
     if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
@@ -198,33 +222,10 @@ def _check_sections(tables: Tables, scene: type[BaseModel] | None, found: Mistak
     for name, kind in SECTIONS.items():
         if name in tables and name not in found and name != "wear":
             of_parts = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
-            others = {**ELSEWHERE, **{key: key for key in of_parts}}
-            with found.collecting():
+            with found.collecting(renamed):
+                others = {**ELSEWHERE, **{key: key for key in of_parts}}
                 sections[name] = check_table(kind, tables[name], found.source, name, others)
     return sections
-
-
-def _check_part(tables: Tables, sections: Mapping[str, Any], origin: Origin, before: Mistakes) -> Study:
-    """A study without axes that are keys of [scene] or [wear]. Raises UserError.
-
-    sections: its other tables that are right. before: mistakes because of which tables are missing.
-    """
-    found, parts = Mistakes(origin.source), dict(sections)
-    if "scene" not in before:
-        with found.collecting():
-            parts["scene"] = check_scene(tables["scene"], origin)
-    with found.collecting():
-        parts["wear"] = check_table(WearSection, tables["wear"], origin.source, "wear")
-    study = Study.model_construct(**parts, source=origin.source, folder=origin.path.parent, archived=origin.archived)
-    # a rule that asks for a table that is wrong is left out
-    wrong = [name for name in (*tables, "mission") if name not in parts]
-    for name in wrong:
-        vars(study).pop(name, None)
-    check_rules(study, found, complete=not wrong)
-    if sections.get("mission") and "axes" in parts:
-        study = _with_block_studies(study, tables["scene"], origin, found)
-    found.raise_any()
-    return study
 
 
 def _with_block_studies(study: Study, scene: Mapping[str, Any], origin: Origin, found: Mistakes) -> Study:
@@ -291,7 +292,7 @@ def format_study(study: Study) -> str:
         place[axis.key[-1]] = list(axis.values)
     solver = {key: value[0] if key in SOLVER_AXES else value for key, value in tables["solver"].items()}
     tables["solver"] = {key: value for key, value in solver.items() if key not in study.own_axes}
-    axes |= {key: list(getattr(study, key)) for key in SOLVER_AXES if key in study.own_axes}
+    axes |= {key: list(getattr(study.solver, key)) for key in SOLVER_AXES if key in study.own_axes}
     for table in ("slow_time", "wear"):
         for key in study.kind.unused.get(table, ()):
             del tables[table][key]
@@ -300,7 +301,6 @@ def format_study(study: Study) -> str:
 
 
 def _worn_states(study: Study) -> dict[str, object] | None:
-    """The table `worn` with all states."""
     worn = study.scene.worn
     if worn is None:
         return None

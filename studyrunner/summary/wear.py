@@ -106,7 +106,7 @@ def most_wear(result: Result) -> MostWear | NothingWore | None:
     if worn.max() <= NO_VOLUME:
         return _nothing(result, best)
     point = result.largest(worn)
-    place, at = tuple(point.values()), result.last_kept(point)
+    place, at = tuple(point.values()), result.last_reached(point)
     volume = float(worn[place])
     # points that differ in more than steps
     known = xr.DataArray(best, dims=result.axes).any(result.numerical).values
@@ -170,7 +170,7 @@ def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibrati
     place = tuple(point[name] for name in result.axes)
     if result.blocks is not None or not result.has("response_amplitude") or not result.computed[place]:
         return None
-    ends = [0, result.last_kept(point)]
+    ends = [0, result.last_reached(point)]
     amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
     of = int(np.argmax(amplitude[0]))
     values = np.where(amplitude[:, of] > _NO_MOTION, amplitude[:, of], 0.0)
@@ -193,9 +193,9 @@ def _peak(result: Result, point: Point, of: int) -> tuple[float, float]:
         return math.nan, math.nan
     others = {name: index for name, index in point.items() if name != "frequency"}
     row = result.at("response_amplitude", others, 0).isel(response=of)
-    held = result.held[tuple(others.get(name, slice(None)) for name in result.axes)]
+    there = result.has_values[tuple(others.get(name, slice(None)) for name in result.axes)]
     order = np.argsort(row["frequency"].values)
-    values = np.where(held, row.values, np.nan)[order]
+    values = np.where(there, row.values, np.nan)[order]
     top = 0 if np.isnan(values).all() else int(np.nanargmax(values))
     if not 0 < top < len(values) - 1 or np.isnan(values[top - 1 : top + 2]).any():
         return math.nan, math.nan

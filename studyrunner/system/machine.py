@@ -12,24 +12,19 @@ from pathlib import Path
 
 _COMPUTING = ("fretwear", "numba", "numpy", "scipy")
 
-_FAULTS = (OSError, MemoryError, EOFError, ImportError)
-# the last two by name: what numba raises where its cache is cut off, and numpy where memory is not there
+_FAULTS = (OSError, EOFError, ImportError)
+# the last one by its name: what numba raises where its cache is cut off
 _NAMES = frozenset(
     kind.__name__ for kind in vars(builtins).values() if isinstance(kind, type) and issubclass(kind, _FAULTS)
-) | {"UnpicklingError", "_ArrayMemoryError"}
+) | {"UnpicklingError"}
 
 
 class MachineFaultError(Exception):
-    """A task broke off for a reason that is not in it: it is to be done once more, elsewhere if there is a choice."""
-
-
-def is_fault_of_machine(error: BaseException) -> bool:
-    """Whether an error says something of the machine: a disk, memory, the cache of the kernels."""
-    return isinstance(error, (MachineFaultError, *_FAULTS)) or type(error).__name__ in _NAMES
+    """A disk or the cache of the kernels is at fault, and not the task that broke off: the run ends with one line."""
 
 
 def tells_of_machine(message: str) -> bool:
-    """The same of what `describe_error` made of it."""
+    """Whether a line of `describe_error` tells of such a fault."""
     return message.partition(":")[0] in _NAMES
 
 

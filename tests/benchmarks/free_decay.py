@@ -56,17 +56,18 @@ def main():
     signal = free_decay(structure, begun, model.contact.gap, PERIODS) @ row
     height, frequency, damping = decay_of(signal, structure.step)
     modes = {way: backbone(model, AMPLITUDES, 0.5, sweep=way) for way in ("down", "up")}
-    table = Table("m sqrt(kg), tip, mm, of", "Hz", "error", "damping, %", "error")
+    table = Table("m sqrt(kg), tip, mm, of", "Hz", "error", "damping, %", "error", "outcome")
     for place, amplitude in enumerate(AMPLITUDES):
-        tip = abs(modes["down"].response[place, 0])
+        tip = np.nanmax([abs(mode.response[place, 0]) for mode in modes.values()])
         nearest = int(np.argmin(abs(height - tip)))
         window = slice(nearest - HALF_WINDOW, nearest + HALF_WINDOW + 1)
         name = f"{amplitude:.0e}, {1e3 * tip:.3f}"
-        table.row(f"{name}, decay", float(frequency[window].mean()), None, 100.0 * float(damping[window].mean()), None)
+        of_decay = float(frequency[window].mean()), None, 100.0 * float(damping[window].mean())
+        table.row(f"{name}, decay", *of_decay, None, None)
         for way, mode in modes.items():
             damped = 100.0 * mode.damping_ratio[place], 100.0 * mode.damping_error[place]
             numbers = mode.frequency[place], mode.frequency_error[place], *damped
-            table.row(f"{name}, mode {way}", *map(float, numbers))
+            table.row(f"{name}, mode {way}", *map(float, numbers), mode.outcome[place].meaning)
 
 
 if __name__ == "__main__":

@@ -21,9 +21,10 @@ from typing import NamedTuple
 from studyrunner import cli
 from studyrunner.report import cli as report
 from tests.benchmarks.frame import arguments
+from tests.mpi.launching import options
 from tests.studies.fe_models.decks import CUBES
 from tests.studies.fe_models.mutations import mutate
-from tests.studyrunner.small_studies import LAP_JOINT, SLIDER, words
+from tests.studyrunner.small_studies import LAP_JOINT, SLIDER
 
 PATIENCE = 60
 """Seconds until an input counts as one that hangs; those that are answered take at most 8."""
@@ -52,7 +53,7 @@ def write_whole_files() -> None:
     """A study, its scene and result, and a deck with its study, in the current folder."""
     assert cli.main(["sdof_slider", "--write-scene", "scene.h5"]) == 0
     Path("study").write_text(STUDY, encoding="utf-8")
-    assert cli.main(["study", "-o", "result", *words("solver.samples=64")]) == 0
+    assert cli.main(["study", "-o", "result", *options("solver.samples=64")]) == 0
     Path("result.progress").unlink()
     Path("deck.inp").write_text(CUBES, encoding="utf-8")
     Path("deck.toml").write_text(DECK_STUDY, encoding="utf-8")
@@ -119,7 +120,6 @@ def mutate_bytes(content: bytes, chance: random.Random) -> bytes:
 
 
 def main() -> None:
-    """Prints what is wrong, and the endings of all inputs."""
     given = arguments(__doc__, count=10_000, seed=1, first=0)
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         write_whole_files()

@@ -47,7 +47,7 @@ PENALTY = 2e8  # N/m, of other programs: what the bodies resist a displacement o
 HARMONICS, SAMPLES = 13, 256
 NEWTON = {"tolerance": 1e-6, "most": 25}  # of the residual, N, and iterations; a curve that converges takes ten
 PYHARM, JAX = ("pyharm-os==1.2.2",), ("jax[cpu]", "scipy")
-# One core, as the own curves. With the 32 bits that JAX takes unless told otherwise Newton's method does not converge.
+# One core, as the own curves. With the 32 bits that JAX takes by default Newton's method does not converge.
 _SURROUNDINGS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_ENABLE_X64": "1"}
 Curve = dict[str, Any]
 """Frequency, Hz, and amplitude, m, of the points that converged; iterations, CPU seconds, attempts that failed."""

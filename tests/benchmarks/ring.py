@@ -54,7 +54,7 @@ def ring_in_time(diameter: int, frequency: float, amplitude: float, steps: Seque
 
 
 def main() -> None:
-    table = Table("nodal diameter, Hz, N", "tip um", "sector", "volume mm3", "sector", "error told", "true")
+    table = Table("nodal diameter, Hz, N", "tip um", "sector", "volume mm3", "sector", "estimated", "true")
     for diameter, frequency, amplitude in CASES:
         tips, volumes = ring_in_time(diameter, frequency, amplitude, (360, 720), CYCLES)
         worn = march_wear(one_sector(diameter), frequency, amplitude, FRICTION, WEAR, CYCLES)

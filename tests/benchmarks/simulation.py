@@ -1,7 +1,7 @@
 """Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
 
 Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
-result makes possible is decided by `studyrunner.mpi.dispatch`, `cost_model` and `studyrunner.task_runs`.
+result makes possible is decided by `studyrunner.mpi.dispatch` and `studyrunner.task_runs`.
 """
 
 import heapq

@@ -12,15 +12,14 @@ from scipy.linalg import expm
 from solver import Block, Outcome, Passage, SolverSettings, integrate_mission, march_wear
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import Failure
-from solver.missions import integrate as integrating
+from solver.missions import history as integrating
 from solver.missions.block_run import BlockCase, BlockRun, run_block
-from solver.missions.history import integrate_missions
-from solver.missions.integrate import MissionCourse
+from solver.missions.history import integrate_missions, unworn_course
 from solver.missions.mission import Mission
 from solver.missions.step import Step, attempt_step
 from solver.packing import Packed
 from solver.settings import WearTarget
-from solver.wear.integrate import Guide
+from solver.wear.slow_time import Guide
 from studies.scenes.den_hartog import DenHartogSlider
 from studies.scenes.sdof_slider import Parameters as SliderParameters
 from tests.solver.models import assert_same, scene
@@ -226,7 +225,7 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
     """After exact missions 0, H and 2H: against missions one by one."""
     mission = known_blocks((0, 64))
     monkeypatch.setattr("solver.missions.step.allowed_error", lambda *_: 1e-16)
-    nodes = list(MissionCourse.unworn(mission).nodes)
+    nodes = list(unworn_course(mission).nodes)
 
     def run(depth, with_slope):
         runs = []
@@ -240,17 +239,18 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
         assert isinstance(taken, Step)
         return taken
 
-    while nodes[-1].mission < 48:
+    while nodes[-1].count < 48:
         nodes.append(step(nodes, 1).node)
     errors = []
     for length in (1, 2, 4, 8, 16):
         taken = step(nodes[: 2 * length + 1 : length], length)
-        apart = np.abs(taken.node.depth - nodes[3 * length].depth) @ mission.area
+        one, other = (node.depth.reshape(2, -1).sum(axis=0) for node in (taken.node, nodes[3 * length]))
+        apart = np.abs(one - other) @ mission.area
         if length > 1:
             assert apart == pytest.approx(1e-16 * taken.ratio, rel=0.15)
-            np.testing.assert_allclose(taken.node.growth, nodes[3 * length].growth, rtol=5e-3)
+            np.testing.assert_allclose(taken.node.depth, nodes[3 * length].depth, rtol=5e-3)
         errors.append(apart)
-    assert errors[0] < 1e-12 * float(nodes[-1].depth @ mission.area)
+    assert errors[0] < 1e-12 * float(nodes[-1].depth @ np.tile(mission.area, 2))
     assert 6.0 < errors[4] / errors[3] < 8.5
 
 

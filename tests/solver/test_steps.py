@@ -20,8 +20,8 @@ from solver.structure.joint import build_case
 from solver.wear import step as control
 from solver.wear.check import chosen_for_another
 from solver.wear.rate_slope import moved_fraction, rate_slope
-from solver.wear.step import Adaptive, Given, LargestDepth, Step, WearLine
-from solver.wear.wearing_joint import Choice, WearingJoint
+from solver.wear.step import Adaptive, Given, Step, WearLine
+from solver.wear.wearing_joint import WearingJoint
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import AREA, END, begun
 
@@ -59,7 +59,7 @@ def test_a_given_step_follows_its_own_equation(scheme):
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
     # Eq. (22): one pair, so each step wears just that depth
-    states, _ = steps_of(LargestDepth(2e-6), 4, END)
+    states, _ = steps_of(Given(np.inf, "explicit", 2e-6), 4, END)
     assert np.diff(read(states)[1]) == pytest.approx(np.full(4, 2e-6), rel=1e-9)
 
 
@@ -161,8 +161,8 @@ def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(harmonics, sha
     work.case = replace(work.case, settings=SolverSettings(harmonics, 64, rtol=1e-2))
     now = left_out(state.resolution.orders, state.point.evaluation)
     assert 1e-4 < now < 0.5
-    choice = Choice(share * now, Estimate(error, error), accurate=True)
-    assert chosen_for_another(work, replace(state, choice=choice)) is anew
+    state = replace(state, left_out=share * now, estimate=Estimate(error, error), accurate=True)
+    assert chosen_for_another(work, state) is anew
 
 
 # --- limits ---
@@ -206,9 +206,10 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
     case = build_case(model, 0.6, start.penalty_omega, COARSE_BLADE, start.resolution)
     work = WearingJoint(case, start, 1e-4)
     state = work.begin()
-    joint, at = work.joint_of(state), state.point.evaluation
+    work.run = Run(1e-13)
+    joint, at = work.joint_of(state), state.at
     gain, slips = work.gain(1.0), at.slip_work > 0.0
-    slopes = rate_slope(joint, at, gain, work.wearing, slips, Run(1e-13))
+    slopes = rate_slope(work, state, slips)
     step = 1e-5 * float((gain * at.slip_work).max() / np.abs(slopes).max())
     for pair in np.flatnonzero(slips):
         rates = []

@@ -7,15 +7,14 @@ import pytest
 
 from solver import frequency_response
 from solver import march_wear as march_model
-from solver.accuracy.certificate import Certificate
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.outcome import Outcome
 from solver.results.history import StartState
-from solver.results.state_report import LOOP_PHASES, StateReport
-from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
+from solver.results.state_report import LOOP_PHASES
+from solver.settings import Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import build_case
 from solver.wear import course as course_module
-from solver.wear.course import CERTIFIED, INTERPOLATED, Course
+from solver.wear.course import CERTIFIED, Course, Node
 from solver.wear.integrate import Integrations, SlowTime
 from solver.wear.step import Adaptive
 from tests.solver.models import branch_states, march_wear, random_model, scene
@@ -199,61 +198,56 @@ def test_the_error_of_a_history_covers_and_does_not_alarm(wear, cycles, outputs,
 # --- between the ends of steps ---
 
 AREAS = np.array([1.0, 3.0])
-RESOLUTIONS = (Resolution((1, 2, 3), 64), Resolution((1, 2, 3, 4, 5), 128))
+RESOLUTIONS = ((3, 64), (5, 128))
 
 
-def report(depth, value, resolution=RESOLUTIONS[0], **more):
+def node(count, depth, rate, value, resolution=RESOLUTIONS[0], **more):
     """All numbers of a state but its depths are `value`."""
     numbers = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), np.full(2, value))
     numbers |= dict.fromkeys(("excitation_frequency", "excitation_frequency_error"), value)
     numbers |= dict.fromkeys(("loop_displacement", "loop_force"), np.full((1, 128, 3), value))
     numbers |= dict.fromkeys(("response_mean", "response_peak"), np.full(1, value))
     numbers["response"] = np.full(1, value * 1j)
-    certificate = Certificate(*([value] * 8))
-    return StateReport(
-        wear_depth=np.array(depth, float), certificate=certificate, resolution=resolution, **numbers, **more
-    )
+    numbers |= dict.fromkeys(CERTIFIED, value) | dict(zip(("harmonics_used", "samples_used"), resolution, strict=True))
+    return Node(count, np.array(depth, float), np.array(rate, float), numbers | more)
 
 
-def taken(counts, smooth=False, n_steps=3, **more):
+def taken(counts, n_steps=3, **more):
     """Steps of 10 cycles; the first pair wears as t^2, the second one nothing."""
-    course = Course(AREAS, smooth, np.array(counts or (), float), **more)
+    course = Course(AREAS, np.array(counts or (), float), **more)
     for n in range(n_steps + 1):
         at = 10.0 * n
-        state = report([at**2, 0.0], float(n), RESOLUTIONS[n // 2 % 2])
-        course = course.after(at, state, np.array([2.0 * at, 0.0]), 0.5)
+        end = node(at, [at**2, 0.0], [2.0 * at, 0.0], float(n), RESOLUTIONS[n // 2 % 2], local=0.5 * (n + 1))
+        course = course.after(end)
     return course
 
 
-def test_between_the_ends_of_a_given_step_all_is_linear():
+def test_what_is_no_length_or_force_holds_through_a_step():
     found = taken([0.0, 4.0, 10.0, 25.0]).read(np.array([0.0, 4.0, 10.0, 25.0]))
-    assert found["wear_depth"][:, 0] == pytest.approx([0.0, 40.0, 100.0, 650.0])
-    assert found["wear_rate"] == pytest.approx([0.0, 8.0, 20.0, 50.0])
-    for name in INTERPOLATED:
-        values = np.abs(found[name].reshape(4, -1))
-        assert values == pytest.approx(np.repeat([[0.0], [0.4], [1.0], [2.5]], values.shape[1], axis=1)), name
     # what holds at both ends of a step holds between
     for name in CERTIFIED:
         assert found[name].tolist() == [0.0, 1.0, 1.0, 3.0], name
     # and what has no value between those of both ends is that of the later one
     assert found["harmonics_used"].tolist() == [3, 3, 3, 5]
     assert found["samples_used"].tolist() == [64, 64, 64, 128]
-    # local errors add up from step to step, and along a step
-    assert found["local"].tolist() == [0.5, 0.7, 1.0, 1.75]
+    # local errors add up from step to step, and with the wear of a step
+    assert found["local"] == pytest.approx([0.5, 0.58, 1.0, 1.725])
 
 
-def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume():
-    found = taken([5.0, 14.0], smooth=True).read(np.array([5.0, 14.0]))
+def test_within_a_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume():
+    found = taken([5.0, 14.0]).read(np.array([5.0, 14.0]))
     # t^2 is a cubic
     assert found["wear_depth"] == pytest.approx(np.array([[25.0, 0.0], [196.0, 0.0]]))
     shares = np.array([0.25, 1.0 + 96.0 / 300.0])
-    assert found["response_peak"][:, 0] == pytest.approx(shares)
     assert found["wear_rate"] == pytest.approx(20.0 * shares)
+    for name in ("mean_pressure", "response", "response_peak", "loop_force", "excitation_frequency"):
+        values = np.abs(found[name].reshape(2, -1))
+        assert values == pytest.approx(np.repeat(shares[:, None], values.shape[1], axis=1)), name
 
 
 def test_a_cubic_never_falls_however_steep_its_ends_are():
-    course = Course(AREAS, smooth=True).after(0.0, report([0.0, 0.0], 0.0), np.array([100.0, 0.0]), 0.0)
-    course = course.after(10.0, report([1.0, 1.0], 1.0), np.array([0.0, 100.0]), 0.0)
+    course = Course(AREAS).after(node(0.0, [0.0, 0.0], [100.0, 0.0], 0.0))
+    course = course.after(node(10.0, [1.0, 1.0], [0.0, 100.0], 1.0))
     depth = course.read(np.linspace(0.0, 10.0, 101))["wear_depth"]
     assert (np.diff(depth, axis=0) >= 0.0).all()
     assert depth[-1].tolist() == [1.0, 1.0]
@@ -265,7 +259,7 @@ def test_of_many_steps_those_that_go_far_and_those_that_are_read_are_kept(monkey
     monkeypatch.setattr(course_module, "KEPT_STEPS", 20)
     course = taken(asked, n_steps=200)
     assert len(course.nodes) <= 26
-    assert course.dense.counts[[0, -1]].tolist() == [0.0, 2000.0]
+    assert course.counts[[0, -1]].tolist() == [0.0, 2000.0]
     assert course.ends == tuple(np.arange(201) * 10.0)
     counts = np.linspace(0.0, 2000.0, 11)
     one, other = (each.read(counts)["wear_depth"] for each in (course, whole))

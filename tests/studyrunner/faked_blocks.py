@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from solver.harmonic_balance.state import Failure
-from solver.missions import integrate
+from solver.missions import history
 from solver.missions.block_run import BlockRun
 from solver.missions.mission import Passage
 from solver.outcome import Outcome
-from solver.wear.integrate import Guide
+from solver.wear.slow_time import Guide
 
 STUDY = """
 [study]
@@ -52,7 +52,7 @@ class FakedBlocks:
         self.fails: dict[str, Outcome] = {}
         self.disturb: Any = lambda _: None
         for name in ("run_block", "run_passage"):
-            monkeypatch.setattr(integrate, name, self.run)
+            monkeypatch.setattr(history, name, self.run)
 
     def run(self, case: Any) -> BlockRun | Failure:
         """Wear with the rate k_w P A (1 - W / _DEPTH); the reference solution wears by 0.1 % more."""

@@ -93,11 +93,6 @@ def started(plan: TaskPlan) -> list[History]:
     ]
 
 
-def fake_histories(plan: TaskPlan) -> Iterator[tuple[History, PointResult]]:
-    """The results of all histories of a study, with their tasks."""
-    return ((task, fake_history(task, place=place)) for task in started(plan) for place in task.order)
-
-
 def points_of(task: Task) -> list[Index]:
     """All points that get a result from a task."""
     return [point for place in task.order for point in task.points(place)]
@@ -119,22 +114,16 @@ def without_values(result: PointResult, outcome: int) -> PointResult:
     return changed(result, outcome=outcome, **values, **nothing)
 
 
-def open_completion(
-    study: Study, plan: TaskPlan, path: Path, facts: SceneFacts = FACTS, *, fresh: bool = False
-) -> CompletionIndex:
+def open_completion(study: Study, plan: TaskPlan, path: Path) -> CompletionIndex:
     """What is in the file of a study; its store is to be closed."""
-    kind = record_type(study, facts)
-    completion = CompletionIndex(plan, Identity((facts.digest,), digest(repr(kind.descr))), Store(path), kind)
-    if fresh:
-        completion.forget_all()
-    return completion
+    kind = record_type(study, FACTS)
+    return CompletionIndex(plan, Identity((FACTS.digest,), digest(repr(kind.descr))), Store(path), kind)
 
 
-def fake_completion(
-    study: Study, plan: TaskPlan, results: Iterable[PointResult], path: Path, facts: SceneFacts = FACTS
-) -> CompletionIndex:
+def fake_completion(study: Study, plan: TaskPlan, results: Iterable[PointResult], path: Path) -> CompletionIndex:
     """The file of a run that had these results and no others, some in a transaction."""
-    completion = open_completion(study, plan, path, facts, fresh=True)
+    completion = open_completion(study, plan, path)
+    completion.forget_all()
     tasks = {task.points(place): task for task in completion.plan.results for place in task.order}
     for number, result in enumerate(results):
         completion.add(tasks[result.points], result)

@@ -15,18 +15,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.checkpoint.completion_index import variable_sizes
 from studyrunner.coordinates import COORDINATES
 from studyrunner.kinds.task import Index, PointResult
-from studyrunner.result.arrays import attributes, coordinates, scene_arrays
+from studyrunner.result.arrays import attributes, coordinates
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
 from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn
-from studyrunner.scene.answers import SceneVariable
-from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, COUNTS, KEPT, LOOP_COMPONENTS, LOOPS, OF_SAMPLES, USUAL, Variable
+from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOPS, OF_SAMPLES, USUAL, Variable
 from tests.studyrunner.fakes import FACTS
 
 FAILED = int(Outcome.MARCH_FAILED)
@@ -303,14 +301,11 @@ def made_result(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Inde
     return dataset
 
 
-def build_dataset(
-    study: Study, facts: SceneFacts, results: Sequence[PointResult], of_scene: Sequence[SceneVariable] = ()
-) -> xr.Dataset:
+def build_dataset(study: Study, facts: SceneFacts, results: Sequence[PointResult]) -> xr.Dataset:
     """The result of a study: axes in the order of the study, then cycle, then contact or response."""
     axes, sizes = study.dimensions, variable_sizes(study, facts)
     sizes = {name: len(values) for name, values in axes.items()} | sizes
-    variables = {name: entry for name, entry in study.variables.items() if name in study.outputs.variables}
-    variables |= (LOOPS if study.outputs.loops else {}) | study.kept | (COUNTS if study.to_the_end else {})
+    variables = {**study.recorded, **study.kind.kept}
     dataset = _empty(axes, sizes, variables)
     dataset["outcome"].values[...] = Outcome.CONVERGED
     for result, point in [(each, point) for each in results for point in each.points]:
@@ -319,16 +314,11 @@ def build_dataset(
                 dataset[name].values[point][:, list(study.outputs.loops)] = values
             elif name in dataset:
                 dataset[name].values[point] = values
-    arrays = [*coordinates(study, facts, pair_arrays(study, [facts])), *scene_arrays(study, of_scene)]
-    named = {scene.name for scene in of_scene if not scene.coordinate}
-    found = {}
-    for array in arrays:
-        lengths = [sizes.get(each, size) for each, size in zip(array.dimensions, array.values.shape, strict=True)]
-        values = np.array(np.broadcast_to(array.values, lengths)) if array.over_axes else array.values
-        found[array.name] = xr.Variable(array.dimensions, values, attributes(array.name, array.entry))
-    coords = {name: variable for name, variable in found.items() if name not in named}
-    dataset = dataset.assign({name: found[name] for name in named}).assign_coords(coords)
-    return dataset.assign_attrs({**describe_run(study, facts), POINTS_LEFT: np.int32(0)})
+    coords = {
+        array.name: xr.Variable(array.dimensions, array.values, attributes(array.name, array.entry))
+        for array in coordinates(study, facts, pair_arrays(study, [facts]))
+    }
+    return dataset.assign_coords(coords).assign_attrs({**describe_run(study, facts), POINTS_LEFT: np.int32(0)})
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.cli import main
-from tests.mpi.launching import results
+from tests.mpi.launching import options, results
 from tests.studyrunner import faked_blocks
 
 SLIDER = """
@@ -86,14 +86,9 @@ CHEAP = (
 UNWORN = ("slow_time.cycles=0", "slow_time.outputs=1")
 
 
-def words(*overrides: str) -> list[str]:
-    """Options of the command that change keys of the study."""
-    return [word for text in overrides for word in ("--set", text)]
-
-
 def compute(study: str, output: str, *overrides: str) -> xr.Dataset:
     """A result in which no point has failed, without what depends on the machine."""
-    assert main([study, "-o", output, *words(*overrides)]) == 0
+    assert main([study, "-o", output, *options(*overrides)]) == 0
     return results(output)
 
 

@@ -7,8 +7,8 @@ from solver.outcome import COMPLETE
 from studyrunner.cli import main
 from studyrunner.study.study_file import bundled_studies
 from studyrunner.summary.answer import summary
-from tests.mpi.launching import results
-from tests.studyrunner.small_studies import compute, words
+from tests.mpi.launching import options, results
+from tests.studyrunner.small_studies import compute
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
 
@@ -110,7 +110,7 @@ def test_every_point_of_a_bundled_study_converges_and_shows_it(name):
 
 
 def test_every_point_of_the_extremes_is_whole_or_says_why_not():
-    assert main(["extremes", "-o", "extremes.nc", *words(*SMALL["extremes"].split())]) in (0, 3)
+    assert main(["extremes", "-o", "extremes.nc", *options(*SMALL["extremes"].split())]) in (0, 3)
     result = results("extremes.nc")
     whole = result.last_cycle == result.cycle[-1]
     # a point may fail in its last state as well, by its certificate

@@ -1,4 +1,4 @@
-"""Study, scene and result files that are damaged, or of another kind: status 2 and one line with the file."""
+"""Result files that are damaged, or of another kind, and names that are: status 2 and one line with the file."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ from studyrunner.report import cli as report
 from studyrunner.result.opening import check_dataset
 from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
-from tests.studies.scene_models import poke, put
+from tests.studies.scene_models import poke
 from tests.studyrunner.results import build_file, sample_file
 
 STUDY = '[study]\nname = "s"\n[scene]\nmodel = "scene.h5"\nfriction_coefficient = 0.5\n[axes]\nfrequency = [150.0]\n'
@@ -24,18 +24,15 @@ STUDY = '[study]\nname = "s"\n[scene]\nmodel = "scene.h5"\nfriction_coefficient 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """The slider's scene file, a study of it, and a result."""
-    folder = tmp_path_factory.mktemp("made")
-    with contextlib.chdir(folder):
-        assert main(["sdof_slider", "--write-scene", "scene.h5"]) == 0
-        Path("study").write_text(STUDY, encoding="utf-8")
-        build_file(loops=(0,)).to_netcdf("out.nc")
-    return folder
+    path = tmp_path_factory.mktemp("made") / "out.nc"
+    build_file(loops=(0,)).to_netcdf(path)
+    return path
 
 
 @pytest.fixture
 def folder(made, tmp_path, monkeypatch):
-    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    """The current folder, with a result file."""
+    shutil.copy(made, tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -185,38 +182,15 @@ def linked(file):
     ],
 )
 def test_a_result_that_is_run_again(change, words, folder, refused):
-    Path("scene.h5").unlink()
     with h5py.File("out.nc", "r+") as file:
         change(file)
     assert words in refused(["out.nc", "-o", "again.nc"])
-
-
-@pytest.mark.parametrize("share", [0.3, 0.9])
-def test_a_truncated_scene(share, folder, refused):
-    cut(share)(folder / "scene.h5")
-    assert "scene.h5: " in refused(["study", "--plan"])
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (poke("stiffness", (0, 0), np.nan), "stiffness"),
-        (put("response/names", ["\x1b[31mred", "\x1b[31mred"]), r"\x1b[31mred"),
-    ],
-)
-def test_a_scene_that_is_none(change, words, folder, refused):
-    with h5py.File("scene.h5", "r+") as file:
-        change(file)
-    line = refused(["study"])
-    assert line.startswith("run-study: scene.h5: ")
-    assert words in line
 
 
 def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
     name = "\x1b[2J\udcff.toml"
     Path(name).write_text("[study", encoding="utf-8")
     assert r"\x1b[2J\udcff.toml" in refused([name])
-    assert "[2J" in refused(["study", "--set", "axes.step=\x1b[2J"])
-    Path("study").write_text(STUDY.replace('"s"', '"s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
-    assert main(["study", "--plan"]) == 0
+    assert "[2J" in refused(["sdof_slider", "--set", "axes.step=\x1b[2J"])
+    assert main(["sdof_slider", "--plan", "--set", "study.title=a\x1b[2J"]) == 0
     assert "\x1b" not in capsys.readouterr().out

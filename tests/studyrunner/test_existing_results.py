@@ -100,24 +100,6 @@ def test_what_is_no_result_is_not_replaced_at_all(kind, solver, capsys):
     assert not solver.tasks
 
 
-def test_a_folder_of_an_older_version_is_named_and_left_alone(solver, capsys):
-    older = Path("out.nc.parts")
-    older.mkdir()
-    (older / "00000001.npy").write_bytes(b"of version 0.4.0")
-    assert main(SMALL) == 0
-    assert capsys.readouterr().err.count("out.nc.parts") == 1
-    assert (older / "00000001.npy").read_bytes() == b"of version 0.4.0"
-    assert solver.n_results == 6
-
-
-def test_progress_that_is_damaged_belongs_to_no_study(solver, capsys):
-    killed(solver)
-    solver.begin_again()
-    Path("out.nc.progress").write_bytes(b"x" * 5000)
-    assert main(OTHER) == 0
-    assert "out.nc.progress.old" in capsys.readouterr().err
-
-
 @pytest.mark.slow
 def test_in_python():
     assert main(SMALL) == 0

@@ -14,33 +14,14 @@ from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi import schedule
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
-from tests.mpi.launching import results
+from studyrunner.summary.answer import summary
+from tests.mpi.launching import options, results
 from tests.studyrunner.faked_blocks import FakedBlocks, load_of
 from tests.studyrunner.fakes import points_of
-from tests.studyrunner.small_studies import MISSIONS, compute, words
+from tests.studyrunner.small_studies import MISSIONS, compute
 
 LINE = ("axes.frequency=160", "axes.sweep=up")
 ONE = (*LINE, "axes.wear_coefficient=1e-11")
-STEADY = """
-[study]
-name = "gross_slip"
-[scene]
-model = "sdof_slider"
-normal_stiffness = 0.0
-[axes]
-frequency = 160
-[slow_time]
-missions = 1
-outputs = 2
-[solver]
-harmonics = 3
-samples = 64
-[[mission]]
-name = "all"
-excitation_amplitude = 14.0
-cycles = 1e5
-begin = "sweep"
-"""
 ENGINE = """
 [study]
 name = "engine"
@@ -66,7 +47,7 @@ seconds = 10
 
 @pytest.fixture(autouse=True)
 def studies(folder):
-    for name, text in (("missions", MISSIONS), ("steady", STEADY), ("engine", ENGINE)):
+    for name, text in (("missions", MISSIONS), ("engine", ENGINE)):
         Path(f"{name}.toml").write_text(text, encoding="utf-8")
 
 
@@ -115,7 +96,7 @@ def test_the_result_has_missions_and_blocks_and_the_values_of_the_solver(blocks)
         "outcome": 0,
     }.items():
         np.testing.assert_array_equal(at[name], values, err_msg=name)
-    shares = dict(result.fretwear.summary().wear.blocks)
+    shares = dict(summary(result).wear.blocks)
     assert list(shares) == result.block.values.tolist()
     assert sum(shares.values()) == pytest.approx(1.0)
     np.testing.assert_allclose(at.block_share.sum("block"), 1.0)
@@ -123,19 +104,6 @@ def test_the_result_has_missions_and_blocks_and_the_values_of_the_solver(blocks)
     every = run("slow_time.outputs=301", "axes.frequency=161.0").sel(wear_coefficient=2e-11, sweep="down").squeeze()
     np.testing.assert_allclose(np.cumsum(every.wear_rate[1:]), every.worn_volume[1:], rtol=1e-9)
     assert every.wear_rate[0] == every.wear_rate[1] > 0.0
-
-
-@pytest.mark.slow
-def test_a_study_without_missions_is_one_block():
-    found = compute("steady.toml", "one.nc").squeeze()
-    text = STEADY.partition("[[mission]]")[0].replace("missions = 1", "cycles = 1e5")
-    Path("steady.toml").write_text(text, encoding="utf-8")
-    whole = compute("steady.toml", "whole.nc", "axes.excitation_amplitude=14").squeeze()
-    bars = found.wear_depth_error.values + whole.wear_depth_error.values
-    assert (abs(found.wear_depth.values - whole.wear_depth.values) <= bars).all()
-    assert found.error_estimate < 0.02
-    np.testing.assert_allclose(found.response_amplitude.values[1], whole.response_amplitude.values[-1], rtol=0.02)
-    np.testing.assert_array_equal(found.response_amplitude_begin[0], whole.response_amplitude[0])
 
 
 @pytest.mark.slow
@@ -150,7 +118,7 @@ def test_an_interrupted_study_goes_on_to_the_last_bit(blocks, monkeypatch):
 
     blocks.computed.clear()
     blocks.disturb = interrupt
-    assert main(["missions.toml", "-o", "out.nc", *words(*ONE)]) == 130
+    assert main(["missions.toml", "-o", "out.nc", *options(*ONE)]) == 130
     blocks.disturb = lambda _: None
     found = run(*ONE)
     # the step of the interruption is computed again
@@ -161,7 +129,7 @@ def test_an_interrupted_study_goes_on_to_the_last_bit(blocks, monkeypatch):
 @pytest.mark.slow
 def test_a_block_that_fails_spoils_its_point_only(blocks):
     blocks.fails["cruise"] = Outcome.START_FAILED
-    assert main(["missions.toml", "-o", "out.nc", *words(*LINE, "slow_time.until.worn_volume=1e-9")]) == 3
+    assert main(["missions.toml", "-o", "out.nc", *options(*LINE, "slow_time.until.worn_volume=1e-9")]) == 3
     assert (results().outcome == Outcome.START_FAILED).all()
     assert np.isnan(results().worn_volume[..., 1:]).all()
     assert np.isnan(results().last_mission).all()
@@ -177,7 +145,7 @@ def test_a_target_ends_the_missions(blocks):
     assert fast == pytest.approx(0.5 * slow, rel=0.05)
     assert (result.missions_to_target_error > 0.0).all()
     assert all("later ones are not computed" in message for message in result.message.values.ravel())
-    assert result.fretwear.summary().life.count.value == fast
+    assert summary(result).life.count.value == fast
 
 
 @pytest.mark.slow
@@ -200,7 +168,7 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
     begins = [[block.begin for block in task.blocks] for task in plan.results[:2]]
     assert begins == [["up", "up", "ramp"], ["up", "down", "ramp"]]
     # all blocks have the same pairs
-    assert main(["missions.toml", *words("mission.heavy.area=2e-4")]) == 2
+    assert main(["missions.toml", *options("mission.heavy.area=2e-4")]) == 2
     assert "missions.toml: mission.heavy: " in capsys.readouterr().err
 
 

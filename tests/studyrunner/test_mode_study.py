@@ -15,9 +15,10 @@ from studyrunner.report.contents import draw_report
 from studyrunner.report.page.page import write_page
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
-from tests.mpi.launching import results
+from studyrunner.summary.answer import summary
+from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import points_of
-from tests.studyrunner.small_studies import compute, words
+from tests.studyrunner.small_studies import compute
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("folder")]
 
@@ -91,7 +92,7 @@ def test_a_mode_that_is_not_there_says_so(result):
     assert "followed down to the amplitude" in said.sel(mode=1, modal_amplitude=1e-6).item()
     assert "fewer linear modes" in said.sel(mode=3)[0].item()
     found = result.natural_frequency.sel(mode=1, modal_amplitude=[1e-4, 1e-3])
-    first, third = result.fretwear.summary().modes
+    first, third = summary(result).modes
     assert (first.number, first.frequency) == (1, (found.min(), found.max()))
     assert (third.number, third.n_found, third.n_points) == (3, 0, 12)
 
@@ -101,8 +102,8 @@ def test_points_are_the_same_in_another_list(study, result):
     one = ("scatter.samples=1", "axes.mode=1", "scene.worn={depth=0.0, cycle=0}")
     first = compute(study, "out.nc", *one, "axes.modal_amplitude=[1e-4]", "outputs.variables=['slip_fraction']")
     assert "natural_frequency" not in first
-    assert first.fretwear.summary().modes[0].n_found == 1
-    more = words(*one, "axes.modal_amplitude={start=1e-5, stop=1e-3, num=3, spacing='log'}")
+    assert summary(first).modes[0].n_found == 1
+    more = options(*one, "axes.modal_amplitude={start=1e-5, stop=1e-3, num=3, spacing='log'}")
     # the smallest amplitude has no mode
     assert main([study, "-o", "out.nc", *more]) == 3
     found = results()

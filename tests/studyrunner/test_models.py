@@ -142,16 +142,14 @@ def test_gmsh():
             scene_of("lap.toml", "scene.model=lap.msh", wrong)
 
 
-@pytest.mark.parametrize("triangles", ["lower", "both"])
-def test_abaqus(triangles, folder):
-    write_matrix_input(folder, *Plates().system(), triangles)
-    check_same(scene_of("lap.toml", "scene.matrices=job"), scene_of("lap.toml"))
-    check_same(scene_of("lap.toml", "scene.matrices=job_STIF1.mtx"), scene_of("lap.toml"))
-
-
-def test_nastran(folder):
-    write_punch(folder, *Plates().system())
-    check_same(scene_of("lap.toml", "scene.matrices=job"), scene_of("lap.toml"), 1e-5)  # of 10 digits, and thin plates
+@pytest.mark.parametrize(
+    ("write", "tolerance"),
+    # of 10 digits, and thin plates
+    [(write_matrix_input, 1e-8), (write_punch, 1e-5)],
+)
+def test_matrices_of_abaqus_and_nastran(write, tolerance, folder):
+    write(folder, *Plates().system())
+    check_same(scene_of("lap.toml", "scene.matrices=job"), scene_of("lap.toml"), tolerance)
 
 
 def write_table_of_nodes(plates):

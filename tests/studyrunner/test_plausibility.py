@@ -8,8 +8,8 @@ import pytest
 from studyrunner.cli import main
 from studyrunner.plan import doubts_of_study
 from studyrunner.study.study_file import bundled_studies, read_study
+from tests.mpi.launching import options
 from tests.studyrunner.fakes import FACTS
-from tests.studyrunner.small_studies import words
 
 
 @pytest.mark.parametrize("name", [name for name in bundled_studies() if name != "extremes"])
@@ -46,5 +46,5 @@ def test_other_units_are_asked_about_once(study, override, start, asked):
 @pytest.mark.slow
 def test_lines_come_once_on_stderr(tmp_path, capfd):
     wrong = ("axes.frequency=150", "axes.wear_coefficient=2.9e-8", "slow_time.cycles=100", "slow_time.outputs=2")
-    assert main(["sdof_slider", *words(*wrong), "-o", str(tmp_path / "out.nc")]) in (0, 3)
+    assert main(["sdof_slider", *options(*wrong), "-o", str(tmp_path / "out.nc")]) in (0, 3)
     assert capfd.readouterr().err.count("wear_coefficient 2.9e-08 1/Pa") == 1

@@ -12,8 +12,8 @@ from studyrunner.scene.scene import build_study_scene, describe_scene, write_stu
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.realisation import expected_wear, realise
 from studyrunner.study.study_file import format_study
-from tests.mpi.launching import results
-from tests.studyrunner.small_studies import compute, words
+from tests.mpi.launching import options, results
+from tests.studyrunner.small_studies import compute
 
 STUDY = """
 [study]
@@ -111,7 +111,7 @@ def test_each_sample_with_a_scene_of_its_own_has_room_for_its_wear(path):
 
 @pytest.mark.slow
 def test_a_scar_that_is_cut_off_is_a_failed_point_with_a_remedy(path, folder, capsys):
-    assert main([str(path), "-o", "out.nc", *words("scene.half_width=5e-5")]) == 3
+    assert main([str(path), "-o", "out.nc", *options("scene.half_width=5e-5")]) == 3
     assert "The contact goes on beyond the modelled pairs" in capsys.readouterr().out
     cut = results().squeeze()
     assert cut.outcome == Outcome.CONTACT_CUT_OFF

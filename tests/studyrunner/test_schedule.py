@@ -1,4 +1,4 @@
-"""The schedule on one rank, the ranks without MPI, and what a user sees while a study runs."""
+"""The schedule on one rank, the ranks without MPI, files that ranks map, and what a user sees while a study runs."""
 
 import io
 import itertools
@@ -8,16 +8,19 @@ import time
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from studies import build_scene
 from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
-from studyrunner.mpi import dispatch
-from studyrunner.mpi.cost_model import CostModel
-from studyrunner.mpi.dispatch import Dispatcher
+from studyrunner.mpi import dispatch, mapped_file
+from studyrunner.mpi.dispatch import CostModel, Dispatcher
+from studyrunner.mpi.mapped_file import open_mapped, ranks_that_see, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
+from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, Standing
 from studyrunner.task_runs import TaskProgress
@@ -31,10 +34,6 @@ class Job:
     cost: float
     n_results: int = 1
     gives_starts: bool = False
-
-    def cost_of(self, *, first):
-        del first
-        return self.cost / self.n_results
 
     @property
     def cost_keys(self):
@@ -124,23 +123,58 @@ def test_what_waits_is_bounded(monkeypatch):
     assert most < 10 + 4
 
 
-def test_a_sick_rank_gets_no_more_tasks_unless_all_are():
-    dispatcher = Dispatcher(3, CostModel(), time.monotonic)
-    dispatcher.add([Job("chore", 1.0) for _ in range(20)])
-    given, ranks = list(dispatcher.assign()), []
-    while given:
-        rank, assignment = given.pop(0)
-        if rank in (0, 2):
-            dispatcher.shun(rank)
-        dispatcher.deliver(rank, assignment.number, 0.01)
-        new = list(dispatcher.assign())
-        ranks += [rank for rank, _ in new]
-        given += new
-    assert dispatcher.done
-    assert set(ranks) == {1}
-    dispatcher.shun(1)
-    dispatcher.add([Job("chore", 1.0)])
-    assert [rank for rank, _ in dispatcher.assign()] == [1]
+# --- arrays in a file that several processes map, and which ranks see it ---
+
+
+def test_a_scene_is_the_same_with_its_arrays_in_a_file(tmp_path):
+    model = build_scene("sdof_slider")
+    other = open_mapped(write_mapped(model, tmp_path / "model"))
+    assert describe_scene(other).digest == describe_scene(model).digest
+
+
+def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path):
+    given = {"c": np.arange(6.0).reshape(2, 3), "f": np.asfortranarray(np.eye(3)), "none": np.zeros((0, 2)), "n": None}
+    given["part"] = np.arange(10.0)[::2]
+    written = write_mapped(given, tmp_path / "things")
+    one, other = open_mapped(written), open_mapped(written)
+    one["c"][0, 0] = 7.0
+    assert other["c"][0, 0] == 0.0
+    written.remove()
+    for name in ("f", "none", "part"):
+        np.testing.assert_array_equal(other[name], given[name])
+    assert other["c"].flags.aligned
+    assert other["f"].flags.f_contiguous
+    assert other["n"] is None
+
+
+class Blind:
+    """Ranks of which some do not see a file."""
+
+    rank = 0
+
+    def __init__(self, size, blind):
+        self.size, self._blind = size, blind
+        self._answers = []
+
+    def send(self, message, rank):
+        self._answers.append((rank, message.answer() and rank not in self._blind))
+
+    def receive(self):
+        return self._answers.pop(0)
+
+
+@pytest.mark.parametrize(("size", "blind", "expected"), [(1, (), ()), (3, (), (1, 2)), (4, (1, 3), (2,))])
+def test_ranks_that_see_a_file_are_found_and_the_file_goes(size, blind, expected, tmp_path, monkeypatch):
+    assert ranks_that_see(Blind(size, blind), tmp_path / "file") == frozenset(expected)
+    assert list(tmp_path.iterdir()) == []
+
+    def create(path):
+        path.touch()
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(mapped_file, "create", create)
+    assert ranks_that_see(Blind(size, ()), tmp_path / "file") == frozenset()
+    assert list(tmp_path.iterdir()) == []
 
 
 # --- what a user sees ---
@@ -204,7 +238,7 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     histories = []
     for sweep in plan.sweeps:
         for start in fake_sweep(sweep):
-            progress.costs.learn(sweep.cost_keys, sweep.cost_of(first=False), 1.0)
+            progress.costs.learn(sweep.cost_keys, sweep.cost / sweep.n_results, 1.0)
             histories.extend(progress.take(sweep, start))
     for number, task in enumerate(histories, start=1):
         progress.costs.learn(task.cost_keys, task.cost, 2.0 * task.cost)

@@ -42,7 +42,7 @@ def test_every_default_is_filled_in():
         "scheme": ("adaptive",),
         "sweep": ("up",),
     }
-    assert (study.harmonics, study.samples, study.tolerance, study.rtol) == (("auto",), ("auto",), (1e-8,), (1e-2,))
+    assert [getattr(study.solver, key) for key in SOLVER_AXES] == [("auto",), ("auto",), (1e-8,), (1e-2,)]
     assert (study.solver.time_limit, study.solver.shortcuts) == (None, True)
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5

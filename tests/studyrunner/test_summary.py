@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
-from studyrunner.advice import Used
-from studyrunner.result.certainty import settings_of
 from studyrunner.result.opening import as_history
 from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
@@ -280,15 +278,6 @@ def test_wear_that_is_not_small_is_pointed_out():
 def test_frequencies_in_radians_are_asked_about(frequencies, asked):
     made = wearing(f"axes.frequency={frequencies}").assign(stuck_frequency=25.0)
     assert any("rad/s" in doubt for doubt in summary(made).doubts) is asked
-
-
-def test_settings_of_a_point_are_its_own():
-    changes = ("axes.scheme=['implicit', 'explicit']", "axes.harmonics=['auto', 5]", "axes.rtol=[1e-2, 1e-3]")
-    result = result_of(wearing(*changes, "axes.frequency=1", "slow_time.largest_depth=1e-6"))
-    place = tuple(int(name in ("scheme", "harmonics", "rtol")) for name in result.axes)
-    assert settings_of(result, place) == Used(
-        "explicit", "up", 5, "auto", 1e-3, ("implicit", "explicit"), ("up",), by_depth=True
-    )
 
 
 # --- errors in percent ---

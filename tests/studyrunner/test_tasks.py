@@ -11,14 +11,12 @@ from solver.outcome import Outcome
 from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
-from studyrunner.kinds.task import StartResult
 from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study_file import read_study
 from studyrunner.variables import ASKED, USUAL
-from tests.mpi.launching import results
+from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import changed, points_of, totals_of, without_values
 from tests.studyrunner.histories import history
-from tests.studyrunner.small_studies import words
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")
 GRID = (
@@ -87,23 +85,8 @@ def test_points_know_their_task():
                 assert values["step"] == scaled.step or integrated.scheme == "adaptive"
 
 
-def test_histories_cost_little_and_go_last_where_nothing_moves():
-    alone = "solver.shortcuts=false"
-    _, plan = plan_of("axes.frequency=[1, 2]", "axes.step=[100, 1000]", "axes.scheme=implicit", alone)
-    planned = plan.waiting[0, 0]
-    n_unknowns = planned[0].n_unknowns
-    moving = [task.from_start(StartResult(0, "state", moves=True, n_unknowns=n_unknowns)) for task in planned]
-    short, long = sorted(moving, key=lambda task: task.cost)
-    resting = [task.from_start(StartResult(0, "state", moves=False, n_unknowns=n_unknowns)) for task in planned]
-    assert long.start == "state"
-    assert [task.integrated[0].step for task in (long, short)] == [100.0, 1000.0]
-    assert all(0.0 < task.cost < short.cost for task in resting)
-    assert [task.cost for task in planned] == [long.cost, short.cost]
-    assert {task.cost_keys[0] for task in moving} != {task.cost_keys[0] for task in resting}
-
-
 def printed_plan(overrides, capsys, study="sdof_slider"):
-    assert main([study, "--plan", *words(*overrides)]) == 0
+    assert main([study, "--plan", *options(*overrides)]) == 0
     captured = capsys.readouterr()
     assert captured.err == ""
     return {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
@@ -140,7 +123,7 @@ def test_estimates_hold_to_a_factor_of_two(study, n_displacements, used):
 
 # --- from results of tasks to the exit status ---
 
-RUN = ["sdof_slider", *words("axes.frequency=[100, 110, 120]", "axes.scheme=implicit"), "-o", "out.nc"]
+RUN = ["sdof_slider", *options("axes.frequency=[100, 110, 120]", "axes.scheme=implicit"), "-o", "out.nc"]
 
 
 def at_the_second_frequency(change):

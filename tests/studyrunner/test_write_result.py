@@ -13,14 +13,14 @@ import xarray as xr
 from studyrunner.accessor import FretwearAccessor
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
-from studyrunner.result.arrays import coordinates, scene_arrays
+from studyrunner.result.arrays import coordinates
 from studyrunner.result.provenance import describe_run
 from studyrunner.result.target import Target
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
-from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories, fake_history, started, without_values
+from tests.studyrunner.fakes import FACTS, fake_completion, fake_history, started, without_values
 from tests.studyrunner.results import build_dataset, write_dataset
 
 OVERRIDES = (
@@ -38,19 +38,19 @@ SHAPE = (2, 1, 1, 1, 2, 1, 2)
 
 def fake_results(*overrides):
     plan = build_tasks(read_study("sdof_slider", (*OVERRIDES, *overrides)), FACTS.n_displacements)
-    return [result for _, result in fake_histories(plan)]
+    return [fake_history(task, place=place) for task in started(plan) for place in task.order]
 
 
-def write_study(study, results, path, of_scene=()):
+def write_study(study, results, path):
+    """The file of a run of the study with these results."""
     plan = build_tasks(study, FACTS.n_displacements)
     completion = fake_completion(study, plan, results, Target(path).progress)
-    arrays = [*coordinates(study, FACTS, pair_arrays(study, [FACTS])), *scene_arrays(study, of_scene)]
+    arrays = [*coordinates(study, FACTS, pair_arrays(study, [FACTS]))]
     with contextlib.closing(completion.store):
         return writing.write_result(study, FACTS, completion, Target(path), arrays, describe_run(study, FACTS))
 
 
 def write(results, path, *overrides):
-    """The file of a run of the study with these results."""
     return write_study(read_study("sdof_slider", (*OVERRIDES, *overrides)), results, path)
 
 

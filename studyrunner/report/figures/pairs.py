@@ -56,7 +56,7 @@ def draw_depths(result: Result) -> Drawn:
         panel.plot(at, scale(depth), label=label or "computed", **style)
     plot.set_from_zero(panel, scale(max(float(np.nanmax(depth, initial=0.0)) for depth in series.values())).item())
     panel.set(xlim=(pairs[0] - 0.8, pairs[-1] + 0.8), xlabel="contact pair")
-    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(result.last_kept(shown))}"))
+    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(result.last_reached(shown))}"))
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
     if "contact_surface" in result.dataset.coords:
@@ -82,7 +82,7 @@ def draw_pressure(result: Result) -> Drawn:
     shown, scar = result.shown_point(), find_scar(result)
     if scar is None and result.dataset.sizes["contact"] == 1:
         return None
-    kept = sorted({0, result.last_kept(shown)})
+    kept = sorted({0, result.last_reached(shown)})
     fields = {result.cycle_label(cycle): result.at("mean_pressure", shown, cycle).values for cycle in kept}
     scale = scale_for("Pa", *fields.values())
     flanks, said = most_of_flanks(result, *fields.values())
@@ -108,7 +108,7 @@ def draw_profile(result: Result) -> Drawn:
     if not flanks:
         # without positions there is nothing that the wear depth per pair does not show
         return None
-    when, scale = result.cycle_label(result.last_kept(result.shown_point())), scale_for("m", depth)
+    when, scale = result.cycle_label(result.last_reached(result.shown_point())), scale_for("m", depth)
     if all(flank.cells is not None for flank in flanks):
         figure = _draw_profiles(flanks, depth, scale)
     else:
@@ -171,7 +171,7 @@ def _draw_scar(
 def _draw_scar_depth(result: Result, scar: Scar, after: FloatArray) -> Drawn:
     """Depth over x before and after wear, downwards as the surface sinks, with a measured one where there is one."""
     shown, measured, error = result.shown_point(), result.measured, None
-    last = result.last_kept(shown)
+    last = result.last_reached(shown)
     scale = scale_for("m", after, *([measured.depth] if measured else []))
     if result.has("wear_depth_error"):
         error = np.asarray(result.at("wear_depth_error", shown, last).values, dtype=float)

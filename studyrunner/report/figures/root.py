@@ -51,7 +51,7 @@ def draw_root(result: Result) -> Drawn:
     shown, surface = result.shown_point(), _read_surface(result)
     if surface is None or not (has_depths(result) or result.has("mean_pressure")):
         return None
-    last = result.last_kept(shown)
+    last = result.last_reached(shown)
     depth = last_depth(result, shown) if has_depths(result) else np.zeros(result.dataset.sizes["contact"])
     name, values, units = "wear depth", depth, "m"
     if result.has("mean_pressure") and not float(depth.max()) > NO_DEPTH:

@@ -171,7 +171,7 @@ def draw_final(result: Result) -> Drawn:
 
 def _mark_care(result: Result, panel: Axes, course: Course, choice: Choice, fields: FloatArray) -> None:
     """Marks at points to be taken with care. fields (n_lines, n): their worn volumes, as shown."""
-    sensitive, early = result.ended("sensitive"), result.held & ~result.computed
+    sensitive, early = result.ended("sensitive"), result.has_values & ~result.computed
     kinds = {"above rtol": ("s", result.above & ~sensitive), "sensitive": ("D", sensitive), "ended early": ("^", early)}
     for label, (marker, where) in kinds.items():
         marked = np.array([course.along(result, where, point) for point in choice.points]) & np.isfinite(fields)

@@ -53,15 +53,17 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
     first; `start`: variable, horizontal and coloured dimension. `messages`: of points, by number, the last axis
     fastest. Sentences on what is left out are appended to `notes`.
     """
-    if not result.held.any():
+    if not result.has_values.any():
         return None
-    if result.held.size > _MOST_POINTS:
-        notes.append(f"The study has {result.held.size} points, more than the {_MOST_POINTS} that can be picked here.")
+    if result.has_values.size > _MOST_POINTS:
+        notes.append(
+            f"The study has {result.has_values.size} points, more than the {_MOST_POINTS} that can be picked here."
+        )
         return None
     if result.has("cycle_count"):
         notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
     shown = result.shown_point()
-    last = 0 if result.has_modes else result.last_kept(shown)
+    last = 0 if result.has_modes else result.last_reached(shown)
     floats = math.inf if result.has_modes else limit / _CHARACTERS_A_FLOAT
     arrays, kept = _fit(dict(_arrays(result)), floats, notes)
     used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])

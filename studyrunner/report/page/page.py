@@ -1,23 +1,19 @@
 """One HTML page of a result, with everything inside: opens from a disk, without a network.
 
-A template puts it together and escapes all texts; only pictures, scripts, the style sheet and the numbers are taken as
-they are.
-
-By hand: ids in the SVG files of matplotlib are alike, and no library makes one page of several.
+A template puts it together and escapes all texts; only scripts, the style sheet and the numbers are taken as they are.
 """
 
 from __future__ import annotations
 
+import base64
 import json
 import os
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from studyrunner.coordinates import COORDINATES
 from studyrunner.report.drawing import Drawing, Item, Missing, Table
@@ -34,16 +30,12 @@ DATA_LIMIT = 5e6
 """Most characters of numbers of the interactive part, those of the root in three dimensions aside."""
 
 _SCRIPTS = ("panel.js", "root.js", "page.js")  # each uses what stands in those before it
-_SVG, _XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
-_UNWANTED = {f"{{{_SVG}}}metadata", f"{{{_SVG}}}style"}
-_GREY = re.compile(r"#([0-9a-f]{2})\1\1\b")
-_DARKEST, _BRIGHTEST = 0x18, 0xE8
 _MOST_VALUES = 12
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A drawing as it stands on the page: SVG elements for wide and narrow windows, and names of its files."""
+    """A drawing as it stands on the page: pictures for wide and narrow windows as data, and names of its files."""
 
     name: str
     title: str
@@ -82,41 +74,11 @@ def write_page(result: Result, items: Iterable[Item], path: Path) -> Written:
 
 def _save(drawing: Drawing, folder: Path) -> Shown:
     paths = drawing.save(folder)
-    wide, narrow = (inline_svg(path.read_text(encoding="utf-8"), f"{path.stem}-", drawing.title) for path in paths)
+    # in pictures of its own the ids of an SVG file, which matplotlib names alike, do not meet those of another
+    wide, narrow = (f"data:image/svg+xml;base64,{base64.b64encode(path.read_bytes()).decode()}" for path in paths)
     files = [f"{drawing.name}.{kind}" for kind in ("svg", "png", "csv")] + [paths[1].name]
     there = tuple(name for name in files if (folder / name).exists())
     return Shown(drawing.name, drawing.title, drawing.caption, wide, narrow, there)
-
-
-def inline_svg(text: str, prefix: str, label: str) -> str:
-    """An SVG file of matplotlib as an element of the page.
-
-    Its ids begin with `prefix`, its style sheet is left out, and its greys, black and white among them, change places
-    on a dark page.
-    """
-
-    def turn_grey(found: re.Match[str]) -> str:
-        level = _BRIGHTEST - (_BRIGHTEST - _DARKEST) * int(found[1], 16) // 255
-        return f"light-dark({found[0]}, #{level:02x}{level:02x}{level:02x})"
-
-    root = ElementTree.fromstring(text)
-    for parent in list(root.iter()):
-        for child in [child for child in parent if child.tag in _UNWANTED]:
-            parent.remove(child)
-    for element in root.iter():
-        for name, value in element.attrib.items():
-            if name == "id":
-                value = prefix + value
-            elif name in ("href", f"{{{_XLINK}}}href"):
-                value = f"#{prefix}{value[1:]}" if value.startswith("#") else value
-            elif name == "style":
-                value = _GREY.sub(turn_grey, value)
-            element.set(name, value if name == "id" else value.replace("url(#", f"url(#{prefix}"))
-    root.set("role", "img")
-    root.set("aria-label", label)
-    ElementTree.register_namespace("", _SVG)
-    ElementTree.register_namespace("xlink", _XLINK)
-    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str:

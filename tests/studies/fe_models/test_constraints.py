@@ -11,25 +11,26 @@ from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calcu
 from tests.studies.fe_models.solid_meshes import needs_ccx
 
 REFERENCE = "*NODE\n900, 45., 5., 0.\n"
+LINE, END = (f"{REFERENCE}*RIGID BODY, NSET={name}, REF NODE=900" for name in ("XM", "XE"))
+COUPLING = f"{REFERENCE}*COUPLING, REF NODE=900, SURFACE=SE, CONSTRAINT NAME=C\n*KINEMATIC\n"
+CYLINDRICAL = "*TRANSFORM, NSET=XM, TYPE=C\n-20., -30., 0., -20., -30., 1.\n"
 STATIC = "*STEP\n*STATIC\n*DLOAD\nEALL1, CENTRIF, 1e7, -100., 0., 0., 0., 0., 1.\n*END STEP\n"
 BOTH_READ = {
     "equations that depend on each other": "*EQUATION\n2\n5,3,1.,15,3,1.\n*EQUATION\n3\n15,3,1.,10,3,-.5,3,3,.25\n"
     "2\n5,2,1.,3,2,1.\n",
-    "rigid line": f"{REFERENCE}*RIGID BODY, NSET=XM, REF NODE=900\n",
-    "rigid end with nodes in contact": f"{REFERENCE}*RIGID BODY, NSET=XE, REF NODE=900\n",
+    "rigid line": f"{LINE}\n",
+    "rigid end with nodes in contact": f"{END}\n",
     "rigid elements": f"{REFERENCE}*ELSET, ELSET=RB\n4\n*RIGID BODY, ELSET=RB, REF NODE=900\n",
-    "rigid body that cannot turn about two axes": f"{REFERENCE}901, 45, 5, 0\n"
-    "*RIGID BODY, NSET=XE, REF NODE=900, ROT NODE=901\n*BOUNDARY\n901, 1, 2\n900, 3\n",
-    "two rigid lines in one equation": f"{REFERENCE}901, 3, 5, 9\n*NSET, NSET=X2\n116, 121, 126\n"
-    "*RIGID BODY, NSET=XM, REF NODE=900\n*RIGID BODY, NSET=X2, REF NODE=901\n*EQUATION\n2\n900,3,1.,901,3,-1.\n",
-    "coupling": f"{REFERENCE}*COUPLING, REF NODE=900, SURFACE=SE, CONSTRAINT NAME=C\n*KINEMATIC\n1, 3\n",
-    "coupling of some dofs": f"{REFERENCE}*COUPLING, REF NODE=900, SURFACE=SE, CONSTRAINT NAME=C\n*KINEMATIC\n1\n3\n",
+    "rigid body that cannot turn about two axes": f"*NODE\n901, 45, 5, 0\n{END}, ROT NODE=901\n"
+    "*BOUNDARY\n901, 1, 2\n900, 3\n",
+    "two rigid lines in one equation": f"{LINE}\n*NODE\n901, 3, 5, 9\n*NSET, NSET=X2\n116, 121, 126\n"
+    "*RIGID BODY, NSET=X2, REF NODE=901\n*EQUATION\n2\n900,3,1.,901,3,-1.\n",
+    "coupling": f"{COUPLING}1, 3\n",
+    "coupling of some dofs": f"{COUPLING}1\n3\n",
     "rectangular directions": "*TRANSFORM, NSET=XM, TYPE=R\n1., 1., 0.3, -1., 1., 0.\n*BOUNDARY\nXM, 1\n",
     "cylindrical directions": "*TRANSFORM, NSET=XM, TYPE=C\n-20., -30., 0., -19., -30., 4.\n*BOUNDARY\nXM, 1, 2\n",
-    "directions of nodes in contact": "*NSET, NSET=XO\n20, 25, 30\n*TRANSFORM, NSET=XO, TYPE=C\n"
-    "-20., -30., 0., -20., -30., 1.\n*BOUNDARY\nXO, 1\n",
-    "equations along such directions": "*TRANSFORM, NSET=XM, TYPE=C\n-20., -30., 0., -20., -30., 1.\n"
-    "*EQUATION\n2\n5,1,1.,10,1,-1.\n3\n15,2,1.,10,2,-1.,3,1,0.5\n",
+    "directions of nodes in contact": f"*NSET, NSET=XO\n20,25,30\n{CYLINDRICAL.replace('XM', 'XO')}*BOUNDARY\nXO, 1\n",
+    "equations along such directions": f"{CYLINDRICAL}*EQUATION\n2\n5,1,1.,10,1,-1.\n3\n15,2,1.,10,2,-1.,3,1,0.5\n",
 }
 
 
@@ -58,25 +59,17 @@ def test_constraints_on_matrices_of_calculix(name, tmp_path):
     np.testing.assert_allclose(own, frequencies(tmp_path, text), rtol=1e-8)
 
 
+PINNED = "".join(f"*EQUATION\n2\n{a},{k},1.,{b},{k},-1.\n" for a, b in ((5, 15), (10, 3)) for k in (1, 2, 3))
 SAME = {
-    "PIN": (
-        "*MPC\nPIN, 5, 15\nTIE, 10, 3\n",
-        "".join(f"*EQUATION\n2\n{a},{k},1.,{b},{k},-1.\n" for a, b in ((5, 15), (10, 3)) for k in (1, 2, 3)),
-    ),
+    "PIN": ("*MPC\nPIN, 5, 15\nTIE, 10, 3\n", PINNED),
     "BEAM keeps a distance": ("*MPC\nBEAM, 5, 18\n", "*EQUATION\n4\n5,1,20.,5,3,-5.,18,1,-20.,18,3,5.\n"),
     "BEAM of a set": ("*MPC\nBEAM, XM, 3\n", "*RIGID BODY, NSET=XM, REF NODE=3\n"),
-    "KINEMATIC COUPLING": (
-        f"{REFERENCE}*KINEMATIC COUPLING, REF NODE=900\nXM, 1, 6\n",
-        f"{REFERENCE}*RIGID BODY, NSET=XM, REF NODE=900\n",
-    ),
+    "KINEMATIC COUPLING": (f"{REFERENCE}*KINEMATIC COUPLING, REF NODE=900\nXM, 1, 6\n", f"{LINE}\n"),
     "rotations of the reference node": (
-        f"{REFERENCE}*RIGID BODY, NSET=XE, REF NODE=900\n*BOUNDARY\n900, 4, 5\n",
-        f"{REFERENCE}901, 9, 9, 9\n*RIGID BODY, NSET=XE, REF NODE=900, ROT NODE=901\n*BOUNDARY\n901, 1, 2\n",
+        f"{END}\n*BOUNDARY\n900, 4, 5\n",
+        f"*NODE\n901, 9, 9, 9\n{END}, ROT NODE=901\n*BOUNDARY\n901, 1, 2\n",
     ),
-    "a reference node that is held": (
-        f"{REFERENCE}*RIGID BODY, NSET=XE, REF NODE=900\n*BOUNDARY\n900, 1, 6\n",
-        "*BOUNDARY\nXE, 1, 3\n",
-    ),
+    "a reference node that is held": (f"{END}\n*BOUNDARY\n900, 1, 6\n", "*BOUNDARY\nXE, 1, 3\n"),
     "axes that are turned": (
         "*TRANSFORM, NSET=XE, TYPE=R\n0, 1, 0, -1, 0, 0\n*BOUNDARY\nXE, 1\n",
         "*BOUNDARY\nXE, 2\n",

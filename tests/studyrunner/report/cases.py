@@ -1,10 +1,15 @@
 """Figures of results and their numbers, and results with a mesh, for the tests of the report."""
 
 from functools import lru_cache
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from studies.finite_element.pairing import ContactPairs
@@ -12,7 +17,7 @@ from studies.scene_answers import SurfaceMesh
 from studies.scenes.dovetail_parameters import Parameters
 from studies.scenes.dovetail_sector import define_sector, describe_mesh
 from studyrunner.report.contents import FIGURES
-from studyrunner.report.drawing import Drawing, plotted_values
+from studyrunner.report.drawing import COLUMN_WIDTH, Drawing, fit_into_column, plotted_values, style
 from studyrunner.result.view import Result
 from tests.studyrunner.results import build_file
 
@@ -36,6 +41,27 @@ def numbers_of(drawing: Drawing) -> dict[str, NDArray[np.float64]]:
 
 def values_of(result: Result, name: str, **where: int) -> NDArray[np.float64]:
     return np.asarray(result.dataset[name].isel(where).squeeze(drop=True).values, dtype=float)
+
+
+def check_print(figure: Figure, width_in_print: float, name: str) -> None:
+    """Legends cover no panel, nothing is cut off or runs into its neighbour, on a page and in a column."""
+    thin = 2.0  # pixels by which boxes of text may touch
+    if width_in_print == COLUMN_WIDTH:
+        fit_into_column(figure)
+    with style():
+        canvas = FigureCanvasAgg(figure)
+        figure.draw_without_rendering()
+    renderer = canvas.get_renderer()
+    inside = figure.get_tightbbox(renderer)
+    width, height = figure.get_size_inches()
+    assert width == width_in_print
+    assert min(inside.x0, inside.y0, width - inside.x1, height - inside.y1) > -thin / figure.dpi, name
+    whole = [panel.get_tightbbox(renderer) for panel in figure.axes]
+    whole += [legend.get_window_extent(renderer) for legend in figure.legends]
+    for one, other in combinations([box for box in whole if box is not None], 2):
+        common = Bbox.intersection(one, other)
+        assert common is None or np.min(common.size) <= thin, name
+    assert all(text.get_fontsize() >= 7.0 for text in figure.findobj(Text) if text.get_text()), name
 
 
 @lru_cache

@@ -4,24 +4,20 @@ The numbers are those of the table (CSV) that is written beside each figure from
 """
 
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 
 from studies.scene_answers import SurfaceMesh
 from studyrunner.report.contents import draw_report
-from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, fit_into_column, style
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.result.view import Result
-from tests.studyrunner.report.cases import dovetail_file, draw_figure, numbers_of, values_of, with_mesh
+from tests.studyrunner.report.cases import check_print, dovetail_file, draw_figure, numbers_of, values_of, with_mesh
 from tests.studyrunner.report.test_precision import finest_file
 from tests.studyrunner.results import fail, make_result, sample_file
 
@@ -35,8 +31,6 @@ NOTHING = (
 )
 FLAT = "worn_volume_map final_worn_volume wear_depth worn_profile"
 ALONG = "frequency_response worn_volume_map final_worn_volume outcome_map"
-_THIN = 2.0
-"""Pixels by which boxes of text may touch."""
 
 
 def with_sector(result):
@@ -89,32 +83,12 @@ def test_each_kind_of_result_has_its_figures_and_they_can_be_read(case):
             assert item.caption.endswith(".")
             assert "nan" not in item.caption
             if case in ON_PAPER:
-                _check_print(item.figure, WIDTH, item.name)
-                _check_print(item.narrow(), COLUMN_WIDTH, item.name)
+                check_print(item.figure, WIDTH, item.name)
+                check_print(item.narrow(), COLUMN_WIDTH, item.name)
         elif isinstance(item, Missing):
             assert item.sentence.endswith(".")
         else:
             assert all(len(row) == len(item.columns) for row in item.rows)
-
-
-def _check_print(figure, width_in_print, name):
-    """Legends cover no panel, nothing is cut off or runs into its neighbour, on a page and in a column."""
-    if width_in_print == COLUMN_WIDTH:
-        fit_into_column(figure)
-    with style():
-        canvas = FigureCanvasAgg(figure)
-        figure.draw_without_rendering()
-    renderer = canvas.get_renderer()
-    inside = figure.get_tightbbox(renderer)
-    width, height = figure.get_size_inches()
-    assert width == width_in_print
-    assert min(inside.x0, inside.y0, width - inside.x1, height - inside.y1) > -_THIN / figure.dpi, name
-    whole = [panel.get_tightbbox(renderer) for panel in figure.axes]
-    whole += [legend.get_window_extent(renderer) for legend in figure.legends]
-    for one, other in combinations([box for box in whole if box is not None], 2):
-        common = Bbox.intersection(one, other)
-        assert common is None or np.min(common.size) <= _THIN, name
-    assert all(text.get_fontsize() >= 7.0 for text in figure.findobj(Text) if text.get_text()), name
 
 
 # --- numbers ---
@@ -359,10 +333,3 @@ def test_variables_are_read_no_more_than_needed(tmp_path):
         # values of the pairs are read for the points shown; what is small is kept
         assert not dataset["wear_depth"].variable._in_memory
         assert not dataset["mean_pressure"].variable._in_memory
-
-
-def test_the_output_to_ask_for_is_named():
-    items = draw_report(make_result(without=NOTHING))
-    sentences = {item.name: item.sentence for item in items if isinstance(item, Missing)}
-    asked = {"worn_volume": "worn_volume", "frequency_response": "response_amplitude", "fretting_loops": "loops = [0]"}
-    assert all(word in sentences[name] for name, word in asked.items())

@@ -110,7 +110,7 @@ def test_a_point_at_its_target_is_drawn_where_it_ended():
     result = make_result()
     for point in range(8):
         fail(result.dataset, point, 0, 6000.0)
-    assert result.last_kept(result.shown_point()) == 2
+    assert result.last_reached(result.shown_point()) == 2
     assert "5000 cycles" in draw_figure(result, "worn_profile").caption.replace("\N{NO-BREAK SPACE}", " ")
 
 

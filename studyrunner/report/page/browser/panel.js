@@ -52,7 +52,7 @@ function errorAt(entry, at) {
   return entry.factor * (entry.relative ? error * Math.abs(valueAt(entry, at)) : error);
 }
 
-function told(entry, at) {
+function describeValue(entry, at) {
   const value = valueAt(entry, at) * entry.factor;
   if (entry.words[value] !== undefined) return entry.words[value];
   const error = errorAt(entry, at);
@@ -90,7 +90,7 @@ function lineTraces(entry, x) {
     const colour = COLOURS[i % COLOURS.length];
     return {
       x: x.order.map((index) => x.values[index]), y: at.map((each) => valueAt(entry, each) * entry.factor),
-      customdata: x.order.map((index) => [index, number]), text: at.map((each) => plain(told(entry, each))),
+      customdata: x.order.map((index) => [index, number]), text: at.map((each) => plain(describeValue(entry, each))),
       hovertemplate: `%{text}<br>${plain(dims[x.dim].label)} %{x}<extra>${number === null ? "" : plain(place(state.colour, number))}</extra>`,
       mode: x.scattered ? "markers" : "lines+markers", name: number === null ? plain(entry.name) : plain(place(state.colour, number)), meta: "line",
       line: { color: colour, width: 2, dash: DASHES[i % DASHES.length] }, marker: { color: colour, size: x.order.length > 60 ? 4 : 7, symbol: SYMBOLS[i % SYMBOLS.length] },
@@ -103,7 +103,7 @@ function mapTrace(entry, x, y) {
   const at = y.order.map((row) => x.order.map((column) => ({ ...state.at, [x.dim]: column, [y.dim]: row })));
   return {
     type: "heatmap", x: x.order.map((i) => x.values[i]), y: y.order.map((i) => y.values[i]), z: at.map((line) => line.map((each) => valueAt(entry, each) * entry.factor)),
-    customdata: y.order.map((row) => x.order.map((column) => [column, row])), text: at.map((line) => line.map((each) => plain(told(entry, each)))),
+    customdata: y.order.map((row) => x.order.map((column) => [column, row])), text: at.map((line) => line.map((each) => plain(describeValue(entry, each)))),
     hovertemplate: "%{text}<br>%{x}, %{y}<extra></extra>", colorscale: "Cividis", meta: "map",
     colorbar: { title: { text: plain(entry.unit), side: "top" }, thickness: 14, outlinewidth: 0 },
   };
@@ -151,7 +151,7 @@ function describe() {
     const row = document.createElement("div");
     row.dataset.name = entry.name;
     row.appendChild(document.createElement("dt")).textContent = [entry.label, ...others].join(", ");
-    row.appendChild(document.createElement("dd")).textContent = told(entry, state.at);
+    row.appendChild(document.createElement("dd")).textContent = describeValue(entry, state.at);
     return row;
   });
   byId("numbers").replaceChildren(...rows);
