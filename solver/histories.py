@@ -57,28 +57,29 @@ def march_wear(
 
     A failure is no exception: `outcome` and `message` of the history give the reason and the last cycle count.
 
-    model: from `build_model`, `studies.build_scene` or `studies.read_scene`.
-    frequency: of the excitation, Hz; or "resonance" or "peak", which it follows while the joint wears, see `between`.
-    excitation_amplitude: N, multiplies the unit harmonic load of the model.
-    friction_coefficient: one number for all pairs, or (n_contact,). None for a model with its own.
-    wear_coefficient: k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
-    cycles: ascending cycle counts at which the history is reported, or the last count alone. A missing 0 is added. With
-        inf the history ends where wear has come to an end, see `outputs`.
-    scheme, step: "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step`
-        cycles, Eqs. (23), (24). "final" is "adaptive" to the final state, in which nothing wears any more; with
-        `cycles` = inf.
-    sweep: way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
-    law: of wear (`solver.contact.wear_law`).
-    until: wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
-    outputs, final_share: for `cycles` = inf: number of reported states, spaced evenly in worn volume and cycles; the
-        history ends where the wear rate of each pair is below this share of its own largest wear rate.
-    wear_depth: (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of
-        the history count from there.
-    between: range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance
-        that the sweep meets in the range. "resonance" is phase resonance: `F^H x` of the first harmonics of excitation
-        and motion has no real part. "peak" is the largest amplitude of the first response in its first harmonic, over
-        the frequency at constant wear depth; for one degree of freedom with the damping ratio zeta it lies lower by a
-        factor sqrt(1 - 2 zeta^2).
+    - model: from `build_model`, `studies.build_scene` or `studies.read_scene`.
+    - frequency: of the excitation, Hz; or "resonance" or "peak", which it follows while the joint wears, see `between`.
+    - excitation_amplitude: N, multiplies the unit harmonic load of the model.
+    - friction_coefficient: one number for all pairs, or (n_contact,). None for a model with its own.
+    - wear_coefficient: k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
+    - cycles: ascending cycle counts at which the history is reported, or the last count alone. A missing 0 is added.
+      With inf the history ends where wear has come to an end, see `outputs`.
+    - scheme, step: "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step`
+      cycles, Eqs. (23), (24). "final" is "adaptive" to the final state, in which nothing wears any more; with
+      `cycles` = inf.
+    - sweep: way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one
+      frequency.
+    - law: of wear (`solver.contact.wear_law`).
+    - until: wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
+    - outputs, final_share: for `cycles` = inf: number of reported states, spaced evenly in worn volume and cycles; the
+      history ends where the wear rate of each pair is below this share of its own largest wear rate.
+    - wear_depth: (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of
+      the history count from there.
+    - between: range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance
+      that the sweep meets in the range. "resonance" is phase resonance: `F^H x` of the first harmonics of excitation
+      and motion has no real part. "peak" is the largest amplitude of the first response in its first harmonic, over
+      the frequency at constant wear depth; for one degree of freedom with the damping ratio zeta it lies lower by a
+      factor sqrt(1 - 2 zeta^2).
 
     Raises ValueError where a number is out of its range; where counts do not ascend; where the scheme needs a step that
     is not given; where model, friction or law do not fit together; where the law "table", whose factors depend on the
@@ -159,14 +160,14 @@ def integrate_mission(
     Depths are carried from block to block. Thousands of missions are integrated in steps of many missions at once. A
     failure is no exception: `outcome` and `message` of the history give the reason.
 
-    blocks: in the order; of `solver.Block`.
-    missions: ascending whole numbers of missions at which the history is reported, or the last number alone. A missing
-        0 is added.
-    wear_coefficient, settings, law: as for `march_wear`.
-    until: wear depth or worn volume at which the history ends before; `missions_to_target` of the history is its
-    number.
-    sweep: way to the state of the first mission, where its first block continues the last one of the mission before.
-    largest_step: most missions that are computed at once; 1: every mission by itself. By default the error decides.
+    - blocks: in the order; of `solver.Block`.
+    - missions: ascending whole numbers of missions at which the history is reported, or the last number alone. A
+      missing 0 is added.
+    - wear_coefficient, settings, law: as for `march_wear`.
+    - until: wear depth or worn volume at which the history ends before; `missions_to_target` of the history is its
+      number.
+    - sweep: way to the state of the first mission, where its first block continues the last one of the mission before.
+    - largest_step: most missions that are computed at once; 1: every mission by itself. By default the error decides.
 
     Raises ValueError where a number is out of its range; where numbers of missions are not whole or do not ascend;
     where there is no block; where the blocks do not have equal contact pairs; where a block continues another one with
