@@ -114,15 +114,13 @@ def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray
 
 
 def _known(outputs: Both, found: HistoryError, unknown: BoolArray, area: FloatArray) -> HistoryError:
-    """Errors whose worn volume, m3, becomes relative: inf where unknown (n,), NaN beyond the end of the history.
-
-    An unworn state has errors of its own, from states with more harmonics.
-    """
+    """Errors whose worn volume, m3, becomes relative: inf where unknown (n,), NaN beyond the end of the history."""
     fine, depth = outputs.fine, outputs.fine["wear_depth"]
     volume = depth @ area
     reached, unworn = np.isfinite(volume), (outputs.counts == 0.0) | (volume <= 0.0)
 
     def of_state(name: str, error: FloatArray) -> FloatArray:
+        # an unworn state has errors of its own, from states with more harmonics
         larger = np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], error)))
         return np.where(reached, larger, np.nan)
 
@@ -149,7 +147,7 @@ def error_of_target(
     """Estimated error of the count at which a history reaches its target: its difference to the other solution, or the
     time that the error of the wear takes, if that is longer.
 
-    at, other: counts at which both solutions reach the target; inf or NaN where the other one does not.
+    at, other: counts at which both solutions reach the target; NaN where the other one does not.
     fine, error: values and errors of the history at two counts, of which the target is the second.
     last_rate (n_contact,): wear rates at the end of the history, m per count. area (n_contact,): m2.
     """

@@ -24,7 +24,7 @@ from solver.packing import Packed, packable
 from solver.results.verdict import describe_cut_off, describe_uncertain
 from solver.wear.course import Course, Node
 from solver.wear.history import compare
-from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Ended, Guide, Integrator, Solutions, guarded
+from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Guide, Integrator, Solution, Solutions, guarded
 
 STEP_ERROR = 0.5
 """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
@@ -61,7 +61,7 @@ class MissionProblem:
     # each step computes at least one mission
     iterations_per_save = 0
 
-    def __init__(self, mission: Mission, fine: Ended | None = None) -> None:
+    def __init__(self, mission: Mission, fine: Solution | None = None) -> None:
         self.mission, self.fine, self.budget = mission, fine, Budget()
         self.last = mission.missions[-1] if fine is None else int(fine.course.ends[-1])
         # how each block began last, and why a step was not found
@@ -163,8 +163,7 @@ def integrate_missions(
 ) -> MissionHistory:
     """Mission history of one point of a study, as far as computed, with its outcome.
 
-    keep: called after each step with the progress. resume: such progress of an equal mission, which goes on from there
-    with a result that is equal to the last bit, except `run_time`.
+    keep: called after each step with the progress. resume: as for `wear.history.integrate_together`.
     """
     unworn, integrator = unworn_course(mission), Integrator(mission.settings.time_limit, keep, resume)
     fine = integrator.integrate("history", MissionProblem(mission), unworn)
@@ -258,11 +257,11 @@ def _target_error(mission: Mission, at: float, fine: Course, reference: Course) 
     """Estimated error of the number of missions to the target, NaN where it was never reached."""
     if mission.until is None or math.isnan(at):
         return math.nan
-    counts, ahead = np.array([0.0, at]), reference.reach_ahead(mission.until)
+    counts, of_other = np.array([0.0, at]), reference.reach(mission.until)[0]
     whole, *_ = _errors(mission, counts, fine, reference)
     values = _of_blocks(slice(None), mission.area, fine.read(counts))
     last_rate = fine.nodes[-1].rate.reshape(-1, mission.area.size).sum(axis=0)
-    return error_of_target(mission.until, at, ahead, values, last_rate, whole, mission.area)
+    return error_of_target(mission.until, at, of_other, values, last_rate, whole, mission.area)
 
 
 def _judged(mission: Mission, solutions: Solutions, history: MissionHistory) -> Failure:

@@ -135,9 +135,8 @@ def _slope_of(case: BlockCase, state: SweptState) -> FloatArray:
 
 
 def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Wear (n_contact,), m, of a passage through states in this order, and its derivative by the depth before.
-
-    slopes: derivative (n_contact, n_contact) of the density of each state with respect to the depth, 1/Hz.
+    """Wear (n_contact,), m, of a passage through states in this order, and its derivative by the depth before, from the
+    derivatives `slopes` (n_contact, n_contact) of their densities by the depth, 1/Hz.
     """
     unit = np.eye(states[0].density.size)
     # columns: the wear, and the change of the depth behind the passage

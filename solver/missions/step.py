@@ -15,9 +15,9 @@ falls, and each block has its part of the sum. With the third divided difference
 
     e = w H (H + a) (H - 1) (H - 1 + a) / (2H - 1 + a).
 
-Z is found by Newton's method. The derivative of R is the product of the flows of the linearised wear rates of the
-blocks, corrected by Broyden's method where a second iteration is needed. Mostly one mission is enough: by how much the
-derivative misses the change of the wear since the last node is a part of the error of the step.
+Z is found by one step of Newton's method from the parabola through three nodes before. The derivative of R is the
+product of the flows of the linearised wear rates of the blocks. By how much it misses the change of the wear since the
+last node is a part of the error of the step.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ import numpy as np
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
 from solver.model import FloatArray
-from solver.outcome import Outcome
 from solver.wear.course import Node
 from solver.wear.step import allowed_error
 
@@ -41,12 +40,6 @@ RunMission = Callable[[FloatArray, bool], tuple[BlockRun, ...] | Failure]
 Nodes = tuple[Node, ...]
 """Ends of steps, of which the last missions were computed, with the depths and rates of all blocks in one row. Values
 (n_block, ...) by their names in `BlockRun`, and `local` (n_contact,): sum of the errors of steps and blocks, m."""
-
-MOST_ITERATIONS = 6
-"""Most missions computed for a step. Sliders and roots need 1 to 3."""
-
-DEPTH_TOLERANCE = 0.1
-"""Error of the depth before the mission, as worn volume, over the allowed error of the step."""
 
 
 @dataclass(frozen=True)
@@ -98,46 +91,25 @@ def attempt_step(nodes: Nodes, length: int, area: FloatArray, run: RunMission, s
         runs = run(depth_now, False)
         return runs if isinstance(runs, Failure) else _one_mission(nodes, area, runs, share)
     formula, unit = Formula.of(nodes, length, area), np.eye(area.size)
-    base, factor, depth = formula.base.sum(axis=0), formula.factor, formula.first
-    slope, last = np.zeros_like(unit), None
-    depth_before = depth_now - rate_before
-    for _ in range(MOST_ITERATIONS):
-        runs = run(depth, last is None)
-        if isinstance(runs, Failure):
-            return runs
-        rates = np.array([each.growth for each in runs])
-        rate = rates.sum(axis=0)
-        if last is None:
-            whole = unit
-            for each in runs:
-                assert each.slope is not None
-                whole = (unit + each.slope) @ whole
-            slope = whole - unit
-        else:
-            moved, change = depth - last[0], rate - last[1]
-            slope = slope + np.outer(change - slope @ moved, moved) / max(float(moved @ moved), 1e-300)
-        last = depth, rate
-        try:
-            ahead = depth + np.linalg.solve(unit - factor * slope, base + factor * rate - depth)
-        except np.linalg.LinAlgError:
-            break
-        if not np.isfinite(ahead).all():
-            break
-        depth = np.maximum(ahead, base)
-        # the last correction of the depth is shared by the blocks in proportion to their wear
-        wanted = (depth - base) / factor
-        rates = rates * np.divide(wanted, rate, out=np.ones_like(rate), where=rate > 0.0)
-        end = depth + rates.sum(axis=0)
-        missed = np.abs(rate - rate_before - slope @ (last[0] - depth_before))
-        part = np.abs(depth - last[0]) @ area / max(float(np.abs(last[0] - depth_before) @ area), 1e-300)
-        left = factor * part * missed
-        error = np.abs(formula.share * (end - formula.ahead)) + left
-        most = allowed_error(share, float(depth_now @ area), float(end @ area), now.count, length)
-        ratio = float(error @ area) / most
-        if ratio > 1.0 or left @ area <= DEPTH_TOLERANCE * most:
-            return Step(_end_of(now, length, formula.base + (factor + 1.0) * rates, rates, runs, error), runs, ratio)
-    said = f"the depth before mission {now.count + length:.0f}, {length} missions at once, was not found"
-    return Failure(Outcome.MARCH_FAILED, said)
+    base, factor, first = formula.base.sum(axis=0), formula.factor, formula.first
+    runs = run(first, True)
+    if isinstance(runs, Failure):
+        return runs
+    whole, rates = unit, np.array([each.growth for each in runs])
+    for each in runs:
+        assert each.slope is not None
+        whole = (unit + each.slope) @ whole
+    slope, rate = whole - unit, rates.sum(axis=0)
+    depth = np.maximum(first + np.linalg.solve(unit - factor * slope, base + factor * rate - first), base)
+    # the correction of the depth is shared by the blocks in proportion to their wear
+    rates = rates * np.divide((depth - base) / factor, rate, out=np.ones_like(rate), where=rate > 0.0)
+    end, moved = depth + rates.sum(axis=0), first - (depth_now - rate_before)
+    missed = np.abs(rate - rate_before - slope @ moved)
+    part = np.abs(depth - first) @ area / max(float(np.abs(moved) @ area), 1e-300)
+    error = np.abs(formula.share * (end - formula.ahead)) + factor * part * missed
+    most = allowed_error(share, float(depth_now @ area), float(end @ area), now.count, length)
+    after = _end_of(now, length, formula.base + (factor + 1.0) * rates, rates, runs, error)
+    return Step(after, runs, float(np.nan_to_num(error @ area / most, nan=np.inf)))
 
 
 def _one_mission(nodes: Nodes, area: FloatArray, runs: tuple[BlockRun, ...], share: float) -> Step:

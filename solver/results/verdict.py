@@ -48,10 +48,8 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
 
 
 def last_error(history: WearHistory, rows: IntArray, last: float) -> float:
-    """Estimated relative error of the last worn volume of a history; NaN where there is none.
-
-    A history may reach its target before its first count: what has worn there is not known.
-    rows: indices of the counts that were reached, ascending. last: count up to which the history was computed.
+    """Estimated relative error of the last worn volume of a history; NaN where there is none, as where a history
+    reaches its target before its first count. rows: indices of the counts reached. last: count that was computed.
     """
     if not rows.size or (history.cycles[rows[-1]] == 0.0 and last > 0.0 and bool(history.wear_rate[rows[-1]] > 0.0)):
         return math.nan
@@ -59,10 +57,7 @@ def last_error(history: WearHistory, rows: IntArray, last: float) -> float:
 
 
 def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
-    """Sentence about an uncertain worn volume, m3, beside that of the reference solution; NaN where that ended before.
-
-    coarser: what the reference solution is, in words.
-    """
+    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before."""
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
     own, its = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
     if not math.isfinite(other):
@@ -73,9 +68,8 @@ def describe_uncertain(volume: float, other: float, error: float, rtol: float, c
 
 
 def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:
-    """First count at which a pair at an edge of the modelled contact carries load or has worn, NaN if never.
-
-    cycles (n_output,). pressure, depth (n_output, n_contact): Pa and m, NaN at counts without a state.
+    """First of the counts (n_output,) at which a pair at an edge of the modelled contact carries load or has worn, NaN
+    if never. pressure, depth (n_output, n_contact): Pa and m, NaN without a state.
     """
     if contact.edge is None or not contact.edge.any():
         return math.nan

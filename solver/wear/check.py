@@ -62,7 +62,7 @@ def full_check(
         if not estimate.largest < worst.largest:
             worst = UNKNOWN if unknown else estimate
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
-    case, joint = setup.of(state)
+    case, joint = setup.case_and_joint(state)
     if state.hold is not None and creeps(joint, state.hold, state.at):
         return Failure(Outcome.ADRIFT)
     if _vibrates_otherwise(state):
@@ -91,13 +91,10 @@ def _certified(
 def report_only(
     setup: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
 ) -> Checked:
-    """A state of a reference solution with its report, with the harmonics wanted at its count where it is found there.
-
-    resolutions: as in `Guide`, of the reference solution.
-    """
+    """A state of a reference solution with its report, where it is found with the harmonics wanted at its count."""
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
-        case, _ = setup.of(state)
+        case, _ = setup.case_and_joint(state)
         point = setup.run.move(case, case.at(wanted).joint(state.omega, setup.excitation_amplitude), state.point)
         moved = point and setup.at_followed(replace(state, point=point, resolution=wanted))
         state = moved if isinstance(moved, WearState) else state
@@ -126,7 +123,7 @@ def chosen_for_another(setup: WearingJoint, state: WearState) -> bool:
 
 def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    refined = refine(setup.of(state)[0], state.omega, setup.excitation_amplitude, state.point, setup.run)
+    refined = refine(setup.case_and_joint(state)[0], state.omega, setup.excitation_amplitude, state.point, setup.run)
     resolution, point = refined.case.resolution, refined.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
     return setup.at_followed(replace(state, estimate=refined.estimate, accurate=refined.accurate))
@@ -144,7 +141,7 @@ def unstable_at_end(setup: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
     if state.cycle == 0.0 and setup.follow is None and not _vibrates_otherwise(state):
         return None
-    case, joint = setup.of(state)
+    case, joint = setup.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, state.at) is None and not setup.is_stable(state):
         return Failure(Outcome.UNSTABLE)
@@ -152,10 +149,7 @@ def unstable_at_end(setup: WearingJoint, state: WearState) -> Failure | None:
 
 
 def why_endless(setup: WearingJoint, state: WearState, course: Course, final_share: float) -> Failure | None:
-    """Why a history to the end of wear ends: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on.
-
-    final_share: as in `ToTheEnd`.
-    """
+    """Why a history to the end of wear ends: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
     largest = state.largest_rates[:-1]
     if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():
         return AS_ASKED

@@ -194,16 +194,6 @@ class Course:
         count, straight = (self._count_of(WearTarget("worn_volume", float(each)), end) for each in (found, line))
         return count, abs(count - straight) + by_resonance
 
-    def reach_ahead(self, target: WearTarget) -> float:
-        """As `reach`; a target not reached is extrapolated by the mean rate of the last step, inf where that is 0."""
-        found = self.reach(target)[0]
-        if not math.isnan(found) or len(self.nodes) < 2:
-            return math.inf if math.isnan(found) else found
-        before, end = self.nodes[-2:]
-        first, last = self._values(target)[-2:]
-        ahead = (target.value - last) * (end.count - before.count)
-        return float(end.count + ahead / (last - first)) if last > first else math.inf
-
     def _count_of(self, target: WearTarget, end: int) -> float:
         """Count of a depth or a volume within the step to node `end`."""
         from scipy.optimize import brentq  # where it is used: it takes a while to load

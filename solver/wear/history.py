@@ -22,7 +22,7 @@ from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
 from solver.wear.course import Course, Node
 from solver.wear.integrate import Integrations, SlowTime
-from solver.wear.slow_time import ENDS_ALL, Ended, Guide, Integrator, Solutions
+from solver.wear.slow_time import ENDS_ALL, Guide, Integrator, Solution, Solutions
 from solver.wear.step import Adaptive
 from solver.wear.wearing_joint import WearState
 
@@ -52,7 +52,7 @@ def integrate_together(
         integrations = Integrations(case, start, Integrator(settings.time_limit, keep, resume))
     for each in asked:
         if integrations is None:
-            nothing = Ended(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)))
+            nothing = Solution(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)))
             solutions = Solutions(nothing, nothing)
         else:
             solutions = _solve(integrations, model, each, settings.rtol)
@@ -81,7 +81,7 @@ def unknown_course(model: ReducedModel, n_loops: int) -> Course:
 def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rtol: float) -> Solutions:
     """A history and what it is compared with; without a step the errors of the start state suffice."""
 
-    def is_compared(ended: Ended) -> bool:
+    def is_compared(ended: Solution) -> bool:
         steps = len(ended.course.ends) > 1 or asked.follow is not None
         return ended.state is not None and steps and ended.failure.outcome not in ENDS_ALL
 
@@ -108,7 +108,7 @@ def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rto
     return Solutions(own, adaptive, integrations.reference(asked, guide, compared, spent))
 
 
-def _counts(asked: SlowTime, fine: Ended) -> FloatArray:
+def _counts(asked: SlowTime, fine: Solution) -> FloatArray:
     """Counts (n_output,) at which a history is read."""
     if not isinstance(asked.cycles, ToTheEnd):
         return asked.cycles
@@ -196,5 +196,5 @@ def _target_error(solutions: Solutions, asked: SlowTime) -> float:
         return math.inf
     at, by_interpolation = course.reach(until)
     both, error = _compare(solutions, np.array([0.0, at]), follows=asked.follow is not None)
-    ahead = other.course.reach_ahead(until)
-    return error_of_target(until, at, ahead, both.fine, course.nodes[-1].rate, error, course.area) + by_interpolation
+    of_other = other.course.reach(until)[0]
+    return error_of_target(until, at, of_other, both.fine, course.nodes[-1].rate, error, course.area) + by_interpolation

@@ -32,7 +32,7 @@ from solver.settings import FIRST_HARMONICS, FollowedFrequency, Resolution, Solv
 from solver.structure.joint import Case
 from solver.wear.check import full_check, report_only, unstable_at_end, why_endless
 from solver.wear.course import Course, Node
-from solver.wear.slow_time import AS_ASKED, RTOL_RATIO, Ended, Guide, Integrator
+from solver.wear.slow_time import AS_ASKED, RTOL_RATIO, Guide, Integrator, Solution
 from solver.wear.step import Adaptive, Steps, WearLine
 from solver.wear.wearing_joint import WearingJoint, WearState
 
@@ -179,14 +179,14 @@ class Integrations:
         self._case, self._start = case, start
         self._integrator = integrator or Integrator(case.settings.time_limit)
 
-    def history(self, asked: SlowTime, spent: float = 0.0, *, stable_end: bool = True) -> Ended:
+    def history(self, asked: SlowTime, spent: float = 0.0, *, stable_end: bool = True) -> Solution:
         """Integrate a history. spent: CPU seconds of its time limit so far. stable_end: as in WearProblem."""
         outputs = np.zeros(0) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
         problem = WearProblem(self._joint(asked), asked, asked.end, stable_end=stable_end)
         course = Course(problem.setup.area, outputs, asked.until)
         return self._integrator.integrate(asked.name, problem, course, spent)
 
-    def reference(self, asked: SlowTime, guide: Guide, compared: FloatArray, spent: float = 0.0) -> Ended:
+    def reference(self, asked: SlowTime, guide: Guide, compared: FloatArray, spent: float = 0.0) -> Solution:
         """Integrate the reference solution of an adaptive history of which the start state may be another one.
 
         compared (n,): ascending counts at which it is read, the first 0. spent: as for `history`.
@@ -203,10 +203,8 @@ class Integrations:
 
 
 def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
-    """Harmonics and samples of the reference solution: those of the next lower level.
-
-    With one harmonic alone a joint that slips is another joint: three harmonics or one become more, where the model has
-    matrices for them.
+    """Harmonics and samples of the reference solution: those of the next lower level. With one harmonic alone a joint
+    that slips is another joint: three harmonics or one become more, where the model has matrices for them.
     """
     richer = shifted(resolution, 1)
     if resolution.highest <= FIRST_HARMONICS and model.holds(richer.highest):

@@ -42,11 +42,8 @@ def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) 
 
 
 def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
-    """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends.
-
-    drifts: whether the joint is known to slide as a whole, although some pairs still stick.
-    """
-    case, joint = setup.of(state)
+    """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends."""
+    case, joint = setup.case_and_joint(state)
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
@@ -69,7 +66,7 @@ def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) 
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    case, joint = setup.of(state)
+    case, joint = setup.case_and_joint(state)
     found = relax_to_periodic(case, joint, worn, state.point, joint, setup.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
@@ -80,8 +77,8 @@ def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) 
 
 
 def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | None:
-    """Hold of the mean position of a state; None unless every pair slips at some time, or it `drifts`, and the
-    structure is free to slide in one direction. Masses on rigid ground have a hold of their own (`Penalty.mean`).
+    """Hold of the mean position of a state; None unless every pair slips at some time, or is known to drift although it
+    sticks, and the structure can slide in one direction. Masses on rigid ground have their own hold (`Penalty.mean`).
     """
     if ((at.status_t == STICK).all(axis=1).any() and not drifts) or joint.law.rate_dependent:
         return None

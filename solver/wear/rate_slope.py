@@ -32,9 +32,8 @@ def rate_slope(setup: WearingJoint, state: WearState, pairs: BoolArray) -> Float
 
 
 def _rate_changes(setup: WearingJoint, state: WearState, depths: FloatArray, *, fixed_factors: bool) -> FloatArray:
-    """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m.
-
-    To the relative residual of a Newton direction. fixed_factors: whether the factors of a table keep their values.
+    """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m, as exact as a
+    Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
     at, joint, balance, gain = state.at, setup.joint_of(state), setup.balance_of(state), setup.gain(1.0)
     fixed = replace(setup.wearing, depth_held=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
@@ -19,8 +19,8 @@ from solver.wear.course import Course
 
 T = TypeVar("T")
 
-AS_ASKED = Failure(Outcome.CONVERGED)
-"""The regular end of a history."""
+AS_ASKED, UNFINISHED = Failure(Outcome.CONVERGED), Failure(Outcome.NOT_COMPUTED)
+"""The regular end of a history, and that of one that goes on."""
 
 ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
 """Ends of an integration that end the whole history, and after which no other solution is integrated."""
@@ -64,10 +64,10 @@ class Guide:
 
 @packable
 @dataclass(frozen=True)
-class Ended:
-    """A finished integration, with Newton iterations and CPU seconds.
+class Solution:
+    """What an integration has found at its end, or when it is saved, with Newton iterations and CPU seconds.
 
-    state: the last one; None where there is no first state. failure: reason of the end; CONVERGED for a regular end.
+    state: the last one; None where there is no first state. failure: reason of the end.
     """
 
     state: Any
@@ -84,12 +84,12 @@ class Solutions:
     adaptive: the history itself where its steps are adaptive. reference: None where there is none.
     """
 
-    own: Ended
-    adaptive: Ended
-    reference: Ended | None = None
+    own: Solution
+    adaptive: Solution
+    reference: Solution | None = None
 
     @property
-    def all(self) -> tuple[Ended, ...]:
+    def all(self) -> tuple[Solution, ...]:
         """Each of them once."""
         adaptive = () if self.adaptive is self.own else (self.adaptive,)
         return (self.own, *adaptive, *(() if self.reference is None else (self.reference,)))
@@ -98,19 +98,6 @@ class Solutions:
     def failure(self) -> Failure:
         """The end of the history."""
         return next((each.failure for each in self.all if each.failure.outcome in ENDS_ALL), self.own.failure)
-
-
-@packable
-@dataclass(frozen=True)
-class Progress:
-    """How far integrations are: the complete ones by name, and name, state, course and effort of the present one."""
-
-    done: dict[str, Ended] = field(default_factory=dict)
-    name: str = ""
-    state: Any = None
-    course: Course | None = None
-    iterations: int = 0
-    seconds: float = 0.0
 
 
 class Integrator:
@@ -123,35 +110,33 @@ class Integrator:
         self, time_limit: float, keep: Callable[[Packed], None] | None = None, resume: Packed | None = None
     ) -> None:
         self._time_limit, self._keep = time_limit, keep
-        self._resumed: Progress = Progress() if resume is None else unpack(resume)
-        self._done: dict[str, Ended] = dict(self._resumed.done)
+        self._known: dict[str, Solution] = {} if resume is None else unpack(resume)
 
-    def integrate(self, name: str, problem: SlowProblem, course: Course, spent: float = 0.0) -> Ended:
+    def integrate(self, name: str, problem: SlowProblem, course: Course, spent: float = 0.0) -> Solution:
         """Integrate from the first or the saved state to the end. name: tells the histories apart.
 
         course: before the first step. spent: CPU seconds of the time limit so far.
         """
-        if name in self._done:
-            return self._done[name]
-        budget, saved, state, began = problem.budget, self._resumed, None, computing_time()
-        if saved.name == name and saved.course is not None:
-            state, course, budget.iterations = saved.state, saved.course, saved.iterations
-            began -= saved.seconds
+        budget, state, began, known = problem.budget, None, computing_time(), self._known.get(name)
+        if known is not None and known.failure != UNFINISHED:
+            return known
+        if known is not None:
+            state, course, budget.iterations, began = known.state, known.course, known.iterations, began - known.seconds
         budget.deadline, saved_at = began + self._time_limit - spent, budget.iterations
         while True:
             after = guarded(partial(problem.advance, state, course))
             if isinstance(after, Failure):
-                ended = Ended(state, after, course, budget.iterations, computing_time() - began)
-                self._done[name] = ended
-                return ended
+                self._known[name] = Solution(state, after, course, budget.iterations, computing_time() - began)
+                return self._known[name]
             state, course = after
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
                 state, saved_at = problem.saved(state), budget.iterations
+                self._known[name] = Solution(state, UNFINISHED, course, saved_at, computing_time() - began)
                 if self._keep is not None:
                     # what its time limit has ended is not complete
-                    done = {key: each for key, each in self._done.items() if each.failure.outcome not in ENDS_ALL}
-                    self._keep(pack(Progress(done, name, state, course, saved_at, computing_time() - began)))
+                    kept = {key: each for key, each in self._known.items() if each.failure.outcome not in ENDS_ALL}
+                    self._keep(pack(kept))
 
 
 def guarded(compute: Callable[[], T]) -> T | Failure:

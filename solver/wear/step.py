@@ -269,7 +269,7 @@ def first_guess(setup: WearingJoint, state: WearState, balance: Balance, length:
     ahead = now + further * (now - last.predicted_h)
     if setup.follow is not None:
         omega = state.omega + further * (state.omega - last.omega)
-        there = replace(balance, joint=setup.of(state)[0].joint(omega, setup.excitation_amplitude))
+        there = replace(balance, joint=setup.case_and_joint(state)[0].joint(omega, setup.excitation_amplitude))
     found = there.evaluate(ahead)
     if found.scaled_residual() > balance.evaluate(now).scaled_residual():
         return now, balance

@@ -137,7 +137,7 @@ class WearingJoint:
         """Area of the pairs (n_contact,), m2."""
         return self.case.model.contact.area
 
-    def of(self, state: WearState) -> tuple[Case, Joint]:
+    def case_and_joint(self, state: WearState) -> tuple[Case, Joint]:
         """Case and joint of a state. The last ones are stored; others drop the factorisation."""
         last = self._joint
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
@@ -153,7 +153,7 @@ class WearingJoint:
 
     def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
-        return self.of(state)[1]
+        return self.case_and_joint(state)[1]
 
     def balance_of(self, state: WearState) -> Balance:
         """The balance that a state solves at constant wear depth."""
@@ -216,7 +216,7 @@ class WearingJoint:
         if self.follow is None:
             point = self.run.state(balance, start, most=most)
             return None if point is None else replace(state, point=point)
-        case, lag = self.of(state)[0], state.lag
+        case, lag = self.case_and_joint(state)[0], state.lag
         if self.follow.of == "peak":
             peak = solve_at_peak(case, balance, start, lag, self.run, most)
             found, lag = (None, lag) if peak is None else peak

@@ -29,10 +29,7 @@ from tests.solver.models import branch_states, glued_frequency, march_wear, rand
 
 WEAR = 1.1e-11  # 1/Pa
 STEPS = [250.0, 500.0, 1000.0, 2000.0]
-FREQUENCIES = {
-    1: (212.5, 212.75, 213.0, 213.25),
-    2: (211.0, 211.25, 211.375, 211.5, 211.75, 212.0, 212.25, 212.5),
-}
+FREQUENCIES = {1: (212.5, 212.75, 213.0, 213.25), 2: (211.0, 211.25, 211.375, 211.5, 211.75, 212.0, 212.25, 212.5)}
 OFFSETS = (-0.25, 0.25)  # Hz, from the resonance of the glued structure, of travelling waves
 HARMONICS = 21  # whose nodal diameters the scene holds
 FLOOR = 2e-3

@@ -209,5 +209,5 @@ def test_a_history_goes_on_to_the_same_numbers(scheme, step, monkeypatch):
 @pytest.mark.slow
 def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
     monkeypatch.setattr(integrate, "ITERATIONS_PER_SAVE", 30)
-    whole, own, _ = from_every_stop(worn_wall(), 1e-3, wall_start(), 1e-7, 100.0, "implicit", 1000.0, IMPACT)
+    whole, own, _ = from_every_stop(worn_wall(), 1e-3, wall_start(), 1e-7, 1.0, "adaptive", 1000.0, IMPACT)
     assert min(own) < whole.jump_cycle < max(own)
