@@ -186,24 +186,30 @@ class Sent:
 
 def test_ranks_that_see_the_files_get_one_copy_and_others_their_own(folder):
     sent = Sent(folder)
-    given = sent(0, 0)
-    assert isinstance(given, MappedFile)
-    assert sent(1, 0) == given
-    assert sent.read == [0]
-    assert sent(2, 0) is sent.models[0]
-    assert describe_scene(open_mapped(given)).digest == describe_scene(sent.models[0]).digest
+    first, second = sent(0, 1), sent(1, 1)
+    assert isinstance(first, MappedFile)
+    assert first == second
+    assert sent.read == [1]
+    assert describe_scene(open_mapped(first)).digest == describe_scene(sent.models[1]).digest
+    assert sent(2, 1) is sent.models[1]
     # each has it by now
-    assert [sent(rank, 0) for rank in (1, 2)] == [None, None]
+    assert [sent(rank, 1) for rank in (1, 2)] == [None, None]
+
+
+def test_a_file_goes_once_no_rank_holds_its_model(folder):
+    sent = Sent(folder)
+    given = sent(0, 0)
+    assert sent(1, 0) == given
     for scene in (1, 2):
         sent(0, scene)
     assert open_mapped(given) is not None, "rank 1 may not have opened it yet"
     for scene in (1, 2):
         assert isinstance(sent(1, scene), MappedFile)
-    # no rank has the model in memory any more
     with pytest.raises(FileNotFoundError):
         open_mapped(given)
+    assert sent.read == [0, 1, 2]
     assert isinstance(sent(0, 0), MappedFile)
-    assert sent.read == [0, 0, 1, 2, 0]
+    assert sent.read == [0, 1, 2, 0]
 
 
 # --- pairs at the edge of a surface ---
