@@ -15,7 +15,7 @@ import xarray as xr
 from studyrunner.result.opening import ENDED, outcome_words
 from studyrunner.result.pairs import find_grid
 from studyrunner.statistics.study_statistics import worn_volume_statistics
-from studyrunner.study.toml_text import read_toml
+from studyrunner.study.text import read_toml
 from studyrunner.summary.answer import Summary, summary
 from studyrunner.user_error import UserError
 

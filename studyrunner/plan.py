@@ -144,7 +144,7 @@ def _in_units(what: str, unit: str, factors: dict[str, float], plausible: tuple[
 
 
 def _on_wear(study: Study) -> Iterator[str]:
-    table, coefficients = study.wear_law.table, study.axes.wear_coefficient
+    table, coefficients = study.wear.as_law.table, study.axes.wear_coefficient
     factors = [1.0] if table is None else [factor for row in table.factor for factor in row if factor > 0.0]
     values = [value * factor for value in coefficients if value > 0.0 for factor in factors]
     off = [value for value in values if not _PLAUSIBLE[0] <= value <= _PLAUSIBLE[1]]

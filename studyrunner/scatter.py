@@ -37,10 +37,7 @@ _DIGITS = 30  # binary digits of a Sobol' sequence in scipy
 
 
 class Distribution(Section):
-    """A distribution. LOCATION: key of its location, which is the study's own value where it is left out.
-
-    WIDTHS: sets of keys of which one has to be given.
-    """
+    """A distribution. LOCATION: its key that may be left out. WIDTHS: sets of keys of which one has to be given."""
 
     LOCATION: ClassVar[str]
     WIDTHS: ClassVar[tuple[tuple[str, ...], ...]]
@@ -220,10 +217,7 @@ class Drawn:
     distribution: Distribution
 
     def apply(self, own: ArrayLike) -> Array:
-        """The input (samples,) or (samples, n_pairs), of the study's own value: a number, or (n_pairs,).
-
-        Without width it is the own value to the last bit.
-        """
+        """The input (samples,) or (samples, n_pairs) of the study's own value, equal to it without width."""
         own = np.asarray(own, dtype=np.float64)
         score = self.score if own.ndim == 0 or self.score.ndim == 2 else self.score[:, None]
         return np.zeros_like(own + score) + self.distribution.at(own, score)
@@ -233,10 +227,8 @@ def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: S
     """What the samples draw of each input that scatters, in the order of `section.inputs`.
 
     own_values: of the study: a number, (n_pairs,), or (n_values, 1) for an axis; not needed for an absolute
-    distribution.
-
-    Raises WrongValueError, with its key, where a draw is none that physics allows, positions that a correlation length
-    needs are missing, or a width is a share of 0.
+    distribution. Raises WrongValueError, with its key, where physics forbids a draw, positions are missing, or a width
+    is a share of 0.
     """
     from scipy.special import ndtri
 

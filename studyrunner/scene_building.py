@@ -21,9 +21,15 @@ from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.mapped_file import MappedFile, ranks_that_see, write_mapped
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
-from studyrunner.scene.answers import SceneVariable, build_scene_variables, exact_answers, join_scene_variables
-from studyrunner.scene.computed import InMemory, model_key
-from studyrunner.scene.scene import KeptScene, SceneFacts, build_study_scene, describe_scene, scene_to_keep
+from studyrunner.scene.answers import (
+    KeptScene,
+    SmallArray,
+    build_scene_variables,
+    exact_answers,
+    join_scene_variables,
+    scene_to_keep,
+)
+from studyrunner.scene.scene import InMemory, SceneFacts, build_study_scene, describe_scene, model_key
 from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
 from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
@@ -113,7 +119,7 @@ class SceneBuilt:
     """
 
     facts: SceneFacts | None
-    variables: tuple[SceneVariable, ...] = ()
+    variables: tuple[SmallArray, ...] = ()
     model: Packed | None = None
     error: UserError | None = None
 
@@ -128,7 +134,7 @@ class Scenes:
 
     scenes: SceneSet
     facts: tuple[SceneFacts, ...]
-    variables: tuple[SceneVariable, ...]
+    variables: tuple[SmallArray, ...]
     kept: KeptScene | None
     notes: tuple[str, ...]
     models: SceneModels

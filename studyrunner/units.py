@@ -158,6 +158,6 @@ def show_power(value: float, _position: object = None) -> str:
     if value <= 0.0:
         return ""
     exponent = round(float(np.log10(value)))
-    if not np.isclose(value, 10.0**exponent):
+    if not math.isclose(value, 10.0**exponent, rel_tol=1e-6):
         return show_number(value, 2)
     return "1" if exponent == 0 else "10" + str(exponent).translate(_RAISED)

@@ -126,8 +126,8 @@ class NonlinearMode:
     def solve(self, states: tuple[ModeState, ...], target: float, run: Run) -> ModeState | None:
         """As in Path: Newton's method starts on the line through both states, or from the last one in proportion.
 
-        Nodes, too, are solved to the tolerance of results. Otherwise the dovetail, raised to 1.47e-3 m sqrt(kg), comes to
-        another branch, on which no state is found at smaller amplitudes.
+        Nodes, too, are solved to the tolerance of results. Otherwise the dovetail, raised to 1.47e-3 m sqrt(kg),
+        comes to another branch, on which no state is found at smaller amplitudes.
         """
         here, run = states[-1], run.to(self.case.settings.tolerance)
         history, last = history_at_rest(self.joint_of(here.values), here), here.evaluation.predicted_h

@@ -203,7 +203,7 @@ def _task(
         settings=settings,
         cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.cycles_kept[-1], one_pair=one_pair)),
         blocks=blocks,
-        law=part.study.wear_law,
+        law=part.study.wear.as_law,
         wear_coefficient=part.study.axes.wear_coefficient[at["wear_coefficient"]],
         # only a first block that continues begins by it
         begin=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",

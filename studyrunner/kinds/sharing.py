@@ -69,6 +69,9 @@ class Integrated:
 
     def counts(self, cycles: Sequence[float], scaled: ScaledHistory) -> tuple[float, ...]:
         """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
+        if scaled == self.histories[0] and not self.unworn:
+            # also where both wear coefficients are 0
+            return tuple(cycles)
         ratio = 0.0 if self.unworn else scaled.wear_coefficient / self.wear_coefficient
         return tuple(ratio * cycle for cycle in cycles)
 

@@ -99,7 +99,7 @@ class _Planner:
         for position, starts in enumerate(at.values()):
             by_law: dict[object, list[_Start]] = {}
             for start in starts:
-                by_law.setdefault(start.part.study.wear_law, []).append(start)
+                by_law.setdefault(start.part.study.wear.as_law, []).append(start)
             for same in by_law.values():
                 self._add_histories(sweep, position, same)
 
@@ -111,7 +111,7 @@ class _Planner:
         study = starts[0].part.study
         axes = study.axes.model_copy(update={"wear_coefficient": tuple(owners)})
         study = study.model_copy(update={"axes": axes})
-        key = (study.wear_law, tuple(owners))
+        key = (study.wear.as_law, tuple(owners))
         if key not in self._shared:
             # the same from each start state
             self._shared[key] = share_histories(study)
@@ -149,7 +149,7 @@ class _Planner:
             History(
                 number=len(self.histories),
                 joint=sweep.joint,
-                law=study.wear_law,
+                law=study.wear.as_law,
                 sweep=sweep.number,
                 position=position,
                 frequency=sweep.frequencies[position],

@@ -32,7 +32,7 @@ Measurement = Sequence[tuple[Hashable, float, float]]
 key contains the corrections of all other sequences of keys."""
 
 WATCH_SECONDS = 1.0
-"""Shortest time between two looks at the running tasks, s. Without these looks 256 ranks are 0.81 busy for 0.98
+"""Shortest time between two looks at the running tasks, s. Without these looks 256 ranks are 0.81 busy for 0.97
 (`tests.benchmarks.scheduling usual`)."""
 
 _WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer

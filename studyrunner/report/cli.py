@@ -48,10 +48,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
-    """The command line: `result`, `folder` and `measured` are paths, None where left out; `point` is by axis.
-
-    Raises UserError where it is wrong, SystemExit after --help.
-    """
+    """The options; paths are None where left out. Raises UserError where they are wrong, SystemExit after --help."""
     look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
     parser = _Parser("study-report", description=_DESCRIPTION, epilog=_EPILOG, **look)
     add, flag = parser.add_argument, dict[str, Any](action="store_true")

@@ -60,11 +60,10 @@ CAPTIONS = {
 class Entry:
     """One figure or table of the report.
 
-    name: of its files. title: {slow} stands for cycles or missions, {over} for the axis that figures are drawn over;
-    (table) is left out of the heading. kinds: of the results that have it. needs: variables without which a sentence
-    says what to ask for. scene: where scenes of a study differ in these variables, that of the shown point is drawn.
-    at: whether the title names the "point" that is shown, or its "course" alone. always: also where no point has a
-    result.
+    title: with {slow} for cycles or missions and {over} for the axis that figures are drawn over. kinds: of results
+    that have it. needs: variables without which a sentence says what to ask for. scene: variables of which the scene of
+    the shown point is drawn. at: what the title names, the "point" that is shown or its "course". always: also where no
+    point has a result.
     """
 
     name: str

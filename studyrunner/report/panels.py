@@ -74,10 +74,7 @@ def new_panel(height: float) -> tuple[Figure, Axes]:
 
 
 def panel_grid(labels: Sequence[str], height: float, **shared: Any) -> tuple[Figure, NDArray[Any]]:
-    """A figure and its panels (rows, columns) with these titles, two by two where there are four, else side by side.
-
-    height: of a row, inches.
-    """
+    """A figure and its panels with these titles, two by two if four, else side by side. height: of a row, inches."""
     n_columns = 2 if len(labels) == 4 else len(labels)
     n_rows = len(labels) // n_columns
     figure, panels = new_panels(n_rows, n_columns, 0.5 + height * n_rows, sharey=True, **shared)
@@ -101,10 +98,9 @@ def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
 def add_line(
     panel: Axes, x: FloatArray, y: FloatArray, error: FloatArray | None = None, *, band: bool = False, **look: Any
 ) -> float:
-    """A line with the errors of its values as bars, or as a band; how high it and its errors reach.
+    """A line with its errors as bars, or as a band; how high both reach, errors up to twice the largest value.
 
-    x, y, error (n,): as shown, error NaN, infinite or 0 where there is none to draw. Errors count to the height up to
-    twice the largest value: beyond they are cut.
+    x, y, error (n,): as shown, error NaN, infinite or 0 where there is none to draw.
     """
     (line,) = panel.plot(x, y, **look)
     highest = float(np.nanmax(y, initial=0.0))
@@ -142,10 +138,7 @@ def add_colour_bar(figure: Figure, panels: Any, norm: Normalize, label: str, **o
 
 
 def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
-    """A legend below all panels, where it covers no curve, in as many columns as fit; the figure grows by its height.
-
-    handles: what is named; by default whatever has a label in any panel, each label once, if there are at least two.
-    """
+    """A legend below all panels of these handles, by default of each label, if there are two; the figure grows."""
     if handles is None:
         handles = [handle for panel in figure.axes for handle in panel.get_legend_handles_labels()[0]]
     found = {str(handle.get_label()): handle for handle in reversed(handles)}
@@ -185,15 +178,13 @@ def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
         return f"{text} %" if percent else text
 
     axis.set_minor_locator(NullLocator())
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,), numticks=_MOST_TICKS))
+    steps = (1.0, 2.0, 5.0) if high < 20.0 * low else (1.0, 3.0) if high < 100.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=steps, numticks=_MOST_TICKS))
     axis.set_major_formatter(FuncFormatter(show))
 
 
 def mark_failed(panel: Axes, positions: FloatArray, failed: NDArray[np.bool_]) -> str:
-    """Crosses on the horizontal axis where points have no result; a sentence about them, empty where there are none.
-
-    positions (n,): along the axis. failed (n_lines, n).
-    """
+    """Crosses at those of positions (n,) where a line has failed (n_lines, n), and a sentence about them."""
     if not failed.any():
         return ""
     at = positions[failed.any(axis=0)]

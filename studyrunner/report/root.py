@@ -77,10 +77,7 @@ class RootSurface:
     flanks: tuple[str, ...]
 
     def worn(self, depth: Floats, factor: float) -> Floats:
-        """Nodes (n_nodes, 3), m, with the wear depth (n_contact,), m, of the pairs times a factor taken off.
-
-        The depth of a pair is that of both its surfaces together: it is drawn into each of them. NaN counts as no wear.
-        """
+        """Nodes (n_nodes, 3), m, with the wear depth (n_contact,), m, times a factor taken off both surfaces."""
         worn = self.nodes.copy()
         worn[self.contact.nodes] -= factor * np.nan_to_num(depth[self.contact.pairs])[:, None] * self.contact.normals
         return worn
@@ -157,9 +154,8 @@ def face_normals(nodes: Floats, faces: Places) -> Floats:
 
 
 def find_contact_faces(nodes: Floats, faces: Places, positions: Floats, flank: Places) -> ContactFaces:
-    """Faces in contact of a mesh.
+    """Faces in contact of a mesh: nodes (n_nodes, 3), m, faces (n_faces, 4).
 
-    nodes (n_nodes, 3), m. faces (n_faces, 4): nodes anticlockwise from outside; triangles repeat their last one.
     positions (n_contact, 3) of the pairs, m. flank (n_contact,): number of the contact surface of each pair.
     """
     distance, nearest = cKDTree(positions).query(nodes)
@@ -273,10 +269,7 @@ def rgb(names: tuple[str, ...], which: Places) -> Floats:
 
 
 def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View, *, lines: float = 0.2) -> None:
-    """Faces (n, 4) with their colours (n, 3) as seen in a view, darker where they turn away from the eye, in mm.
-
-    The inner side of a face, which is seen where a mesh is cut, is grey. lines: width of the edges, points; 0 for none.
-    """
+    """Faces (n, 4) with colours (n, 3) as seen in a view, in mm; inner sides, where a mesh is cut, are grey."""
     order = np.argsort(nodes[faces].mean(axis=1) @ view.to_eye, kind="stable")
     normals = face_normals(nodes, faces)
     turned = normals @ view.to_eye / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)

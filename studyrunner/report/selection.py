@@ -23,10 +23,7 @@ _MANY = 60  # points from which markers are small
 
 @dataclass(frozen=True)
 class Choice:
-    """Points that a figure shows, as indices along all axes that are not free, with labels.
-
-    sentence: on combinations that are left out; empty where there are none.
-    """
+    """Points that a figure shows, with labels, and a sentence on combinations that are left out, or nothing."""
 
     points: tuple[dict[str, int], ...]
     labels: tuple[str, ...]
@@ -38,10 +35,9 @@ class Choice:
 
 
 def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:
-    """At most `limit` combinations of the axes that are not `free`; the one of the shown point is among them.
+    """At most `limit` combinations of the axes that are not `free`; that of the shown point is among them.
 
-    Where there are more, the axes `first` are split first, then the others, each whole or not at all; the rest stays at
-    the shown point.
+    The axes `first` are split first, then the others, each whole or not at all; the rest stays at the shown point.
     """
     order = [name for name in dict.fromkeys((*first, *result.axes)) if name in result.varying and name not in free]
     shown = {name: index for name, index in result.shown_point().items() if name not in free}

@@ -26,10 +26,7 @@ SERIES = "root.pvd"
 
 
 def find_writer(result: Result) -> Callable[[Path], int]:
-    """What writes the series into a folder; all that can be wrong with it is found before anything is written.
-
-    Raises UserError where the library is missing, or the result has nothing to draw.
-    """
+    """What writes the series into a folder. Raises UserError without the library, or without anything to draw."""
     if find_spec("meshio") is None:
         remedy = "install the library: pip install meshio"
         raise UserError("command line", "--vtu", Verbatim("needs meshio, which is not installed"), remedy)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY, WORN_DEPTH
-from studyrunner.scene.answers import SceneVariable
+from studyrunner.scene.answers import SmallArray
 from studyrunner.scene.pairs import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import (
@@ -27,19 +26,6 @@ from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
 
 _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
-
-
-@dataclass(frozen=True)
-class SmallArray:
-    """A coordinate, or a variable that no task computes. over_axes: whether it has the axes of the study, which may be
-    of length 1 in `values`.
-    """
-
-    name: str
-    dimensions: tuple[str, ...]
-    values: NDArray[np.generic]
-    entry: Variable
-    over_axes: bool = False
 
 
 def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, object]:
@@ -62,12 +48,9 @@ def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, 
 
 
 def small_arrays(
-    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SceneVariable] = ()
+    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SmallArray] = ()
 ) -> list[SmallArray]:
-    """Coordinates of the file, and its variables that no task computes. facts: of each scene.
-
-    of_scene: what the study asks of the scene.
-    """
+    """Coordinates of the file, and its variables that no task computes. of_scene: what the study asks of the scene."""
     hertz = frequencies_of_ratios(study, facts, scenes)
     return [
         *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
@@ -75,7 +58,7 @@ def small_arrays(
         SmallArray("stuck_frequency", *stuck_frequencies_of(study, facts, scenes), STUCK_FREQUENCY),
         *_worn_coordinate(study, facts),
         *sample_coordinates(study, facts, scenes),
-        *scene_arrays(study, of_scene),
+        *of_scene,
     ]
 
 
@@ -116,23 +99,12 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
 
 
 def _labels(values: Sequence[object] | NDArray[np.generic]) -> NDArray[np.generic]:
-    """Values of an axis: whole numbers in 32 bits, which every NetCDF reader knows; text where one value is text.
-
-    True and false, which NetCDF does not have, are 1 and 0.
-    """
+    """Values of an axis: whole numbers and flags as NetCDF has them; texts where one value is text."""
     texts = any(isinstance(value, str) for value in values)
     array = np.array([str(value) for value in values] if texts else values)
     if array.dtype.kind == "b":
         return array.astype(np.int8)
     return array.astype(np.int32) if array.dtype.kind == "i" else array
-
-
-def scene_arrays(study: Study, of_scene: Sequence[SceneVariable]) -> Iterator[SmallArray]:
-    """Variables of the scene."""
-    for each in of_scene:
-        own = (each.name,) if each.coordinate else each.entry.dimensions
-        dimensions = (*study.dimensions, *own) if each.axes else own
-        yield SmallArray(each.name, dimensions, each.values, each.entry, over_axes=each.axes)
 
 
 def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SmallArray]:
@@ -148,10 +120,9 @@ def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Smal
 
 
 def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
-    """The drawn values of each input, in the unit of the input.
+    """The drawn values of each input, in its unit, along the samples.
 
-    Along the samples; along an axis as well where the input is drawn around the values of the axis; along the pairs
-    where pairs differ.
+    Along an axis as well where they are drawn around its values; along the pairs where pairs differ.
     """
     if study.scatter is None:
         return

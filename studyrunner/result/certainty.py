@@ -61,10 +61,7 @@ class Certainty:
 
 
 def certainty_of(result: Result, *, wore: bool = True) -> Certainty | None:
-    """How well worn volumes are known; where nothing wore, the responses. Of modes natural frequency and damping ratio.
-
-    None where the file has no errors.
-    """
+    """How well worn volumes, or where nothing wore responses, or modes are known; None where the file has no errors."""
     if result.has_modes:
         return _certainty(result, "point", _errors_of_modes(result))
     responses = result.has("response_error") and result.blocks is None

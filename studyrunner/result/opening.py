@@ -20,8 +20,7 @@ import xarray as xr
 
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.statistics.samples import DRAWN, SAMPLE
-from studyrunner.study.study_of_result import check_result_file
-from studyrunner.study.toml_text import read_toml
+from studyrunner.study.text import check_result_file, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import (
     ASKED,

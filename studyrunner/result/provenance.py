@@ -43,10 +43,7 @@ _COMMENT = (
 
 
 def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
-    """Attributes of the file: not of time, place or number of ranks, so that equal runs have equal files.
-
-    The id is a hash of all inputs of the result.
-    """
+    """Attributes that equal runs share, not of time, place or number of ranks; the id is a hash of all inputs."""
     text, solver = format_study(study), solver_digest()
     own = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
     return {
@@ -90,10 +87,7 @@ def describe_versions() -> str:
 
 
 def compare_with_archived(study: Study, scene_sha256: str) -> tuple[str, ...]:
-    """Reasons why a study from a result file may now have another result, as lines; none for other studies.
-
-    scene_sha256: digest of the scene built now.
-    """
+    """Why a study from a result file may have another result with a scene of this digest, as lines; none for others."""
     if study.archived is None:
         return ()
     return study.archived.differences(scene_sha256, solver_digest(), describe_versions())
@@ -116,10 +110,7 @@ def check_date(text: str, place: str, key: str) -> str:
 
 
 def describe_time_and_commit(checked: str | None) -> dict[str, str]:
-    """Attributes that equal runs may differ in: the date, only on request, and the commit of the checkout that runs.
-
-    checked: date as `check_date` gives it, in UTC for `NOW`; None for none.
-    """
+    """Attributes that equal runs may differ in: the date, where asked for, see `check_date`, and the commit."""
     commit = commit_of(Path(__file__).parents[2])
     found = {"software_commit": commit} if commit else {}
     if checked == NOW:

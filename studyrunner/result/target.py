@@ -15,7 +15,7 @@ from studies.scene_error import SceneError
 from studies.scene_file import has_mesh
 from studyrunner.checkpoint.store import read_study
 from studyrunner.result.provenance import POINTS_LEFT
-from studyrunner.study.toml_text import read_toml
+from studyrunner.study.text import read_toml
 from studyrunner.system.files import create, new_partial, sync
 from studyrunner.user_error import UserError
 
@@ -100,9 +100,8 @@ def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> 
 def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
     """Target of a result, after `check_output` and a test that nothing forbids to replace what exists there.
 
-    study: of the new result. overwrite: whether a result of another study may be replaced. how: the user asks for that,
-    in words. Raises UserError where the file cannot be written, is no result of run-study, or where it or its progress
-    belongs to another study.
+    overwrite: whether a result of another study may be replaced. how: the user asks for that, in words. Raises
+    UserError where what exists, or its progress, is no result of run-study or belongs to another study.
     """
     target = Target(check_output(option, path, study.files))
     own, (standing, finished) = identity_of(study), _read_result(option, target.path)

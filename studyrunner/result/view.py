@@ -252,8 +252,7 @@ class Result:
     def counts(self, point: Point) -> NDArray[np.float64]:
         """Cycle counts of one point, NaN for outputs that it has not.
 
-        Numbers of the outputs where it has counts of its own and they do not ascend, or are not finite, as old files
-        have them for a final state.
+        Numbers of its outputs where its own counts do not ascend or are not finite, as of a final state in old files.
         """
         numbers = np.asarray(self.dataset["cycle"].values, dtype=float)
         if not self.has("cycle_count"):
@@ -337,10 +336,9 @@ def _in_slabs(values: xr.DataArray, axes: Sequence[str]) -> Iterator[xr.DataArra
 
 
 def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -> Result:
-    """Open a result file as the report reads it.
+    """Open a result file as the report reads it. chosen: values of axes, as text, of the point that is shown.
 
-    chosen: values of axes, as text, of the point that figures of a single point show. Raises UserError where it is no
-    result of `run-study`, or has no such point.
+    Raises UserError where it is no result of `run-study`, or has no such point.
     """
     dataset, blocks = as_history(open_known(path))
     values = {name: find_value(dataset, name, text) for name, text in (chosen or {}).items()}

@@ -23,12 +23,13 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import RESULTS
-from studyrunner.result.arrays import SmallArray, attributes
+from studyrunner.result.arrays import attributes
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.result.target import Target
-from studyrunner.scene.scene import KeptScene, SceneFacts, variable_sizes
+from studyrunner.scene.answers import KeptScene, SmallArray
+from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.study.study import Study
-from studyrunner.study.study_of_result import SCENE_GROUP
+from studyrunner.study.text import SCENE_GROUP
 from studyrunner.system.files import find_fault, replacing
 from studyrunner.user_error import StorageError
 from studyrunner.variables import LOOPS, Variable

@@ -1,9 +1,11 @@
-"""What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, a check by eye."""
+"""What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, a check by eye, and
+the scene that a result keeps.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +16,7 @@ from studies.scene_answers import ExactAnswer, WearQuestion, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import changed_keys, scene_answer, scene_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.scene.computed import harmonics_to_build
-from studyrunner.scene.scene import build_mesh, has_frequencies
+from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build, has_frequencies
 from studyrunner.scene.scene_set import SceneSet, axes_of_difference
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.realisation import realise
@@ -28,21 +29,20 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class SceneVariable:
-    """A variable or coordinate of the result file that no task computes.
+class SmallArray:
+    """A coordinate of the result file, or a variable that no task computes.
 
-    values: with the dimensions of the entry; for an exact answer the axes of the study come before them, of length 1
-    where it does not depend on an axis. axes: whether they do. coordinate: whether it is one.
+    over_axes: whether it has the axes of the study, which may be of length 1 in `values`.
     """
 
     name: str
-    entry: Variable
+    dimensions: tuple[str, ...]
     values: NDArray[np.generic]
-    axes: bool = False
-    coordinate: bool = False
+    entry: Variable
+    over_axes: bool = False
 
 
-def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SceneVariable, ...]:
+def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SmallArray, ...]:
     """What the study asks of its scene, but exact answers. Natural frequencies of a bundled sector take some seconds.
 
     Raises UserError where the scene cannot give them.
@@ -52,7 +52,7 @@ def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SceneVaria
         return of_mesh + (tuple(_frequencies(study, model)) if "natural_frequency" in study.scene_variables else ())
 
 
-def _mesh(study: Study) -> Iterator[SceneVariable]:
+def _mesh(study: Study) -> Iterator[SmallArray]:
     mesh = build_mesh(study)
     if mesh is None:
         raise SceneError("variables", "mesh", "leave it out: the scene has none")
@@ -62,22 +62,45 @@ def _mesh(study: Study) -> Iterator[SceneVariable]:
         "mesh_part": np.array(mesh.parts),
     }
     for name, entry in SCENE["mesh"].items():
-        yield SceneVariable(name, entry, values[name])
+        yield SmallArray(name, entry.dimensions, values[name], entry)
 
 
-def _frequencies(study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
+def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
     scene = study.scene
     found = scene_frequencies(scene.model, scene.parameters) if has_frequencies(study) else stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()
     labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
-    yield SceneVariable("natural_frequency", entry, found.frequencies)
+    yield SmallArray("natural_frequency", entry.dimensions, found.frequencies, entry)
     for name, values in labels.items():
-        yield SceneVariable(name, COORDINATES[name], np.array(values, dtype=np.int32), coordinate=True)
+        yield SmallArray(name, (name,), np.array(values, dtype=np.int32), COORDINATES[name])
+
+
+@dataclass(frozen=True)
+class KeptScene:
+    """A scene in a result file: attributes, and datasets with groups, by the names of scene files.
+
+    origin: attributes of the result on the files of a finite-element model.
+    """
+
+    attributes: Mapping[str, int]
+    datasets: tuple[tuple[str, NDArray[np.generic]], ...]
+    origin: Mapping[str, str] = field(default_factory=dict)
+
+
+def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
+    """Contents of a scene file for the result; of a bundled scene only on request, as the parameters give it again."""
+    if study.scene.is_bundled and not study.outputs.scene:
+        return None
+    from studies.scene_file import scene_attributes, scene_datasets
+
+    with scene_errors(study.source, study.scene.path):
+        datasets = tuple(scene_datasets(model, build_mesh(study)))
+        return KeptScene(scene_attributes(model), datasets, describe_origin(study))
 
 
 def join_scene_variables(
-    study: Study, scenes: SceneSet, of_scenes: Sequence[Sequence[SceneVariable]]
-) -> tuple[tuple[SceneVariable, ...], tuple[str, ...]]:
+    study: Study, scenes: SceneSet, of_scenes: Sequence[Sequence[SmallArray]]
+) -> tuple[tuple[SmallArray, ...], tuple[str, ...]]:
     """Variables of all scenes, and notes on those that are left out.
 
     A variable that differs between the scenes gets the axes along which it differs as first dimensions. Variables of
@@ -92,14 +115,13 @@ def join_scene_variables(
         names, numbers = axes_of_difference(study, scenes, [each.values.tobytes() for each in variables])
         if names:
             values = np.stack([each.values for each in variables])[numbers]
-            entry = replace(first.entry, dimensions=(*names, *(first.entry.dimensions or (first.name,))))
-            first = replace(first, entry=entry, values=values, coordinate=False)
+            first = replace(first, dimensions=(*names, *first.dimensions), values=values)
         joined.append(first)
     notes = [f"{', '.join(left_out)}: left out of the result, as the scenes differ in their sizes"] if left_out else []
     return tuple(joined), tuple(notes)
 
 
-def exact_answers(study: Study) -> tuple[SceneVariable, ...]:
+def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     """Exact answers at all points, where the study asks for them; steps, schemes and settings change nothing.
 
     Their axes are those of the study, of length 1 where nothing depends on an axis.
@@ -113,7 +135,7 @@ def exact_answers(study: Study) -> tuple[SceneVariable, ...]:
     for name, entry in SCENE["exact"].items():
         values = np.stack([part[name] for part in parts], axis=own)
         values = values.reshape(*values.shape[:own], *shape, *values.shape[own + 1 :])
-        variables.append(SceneVariable(name, entry, values, axes=True))
+        variables.append(SmallArray(name, (*study.dimensions, *entry.dimensions), values, entry, over_axes=True))
     return tuple(variables)
 
 
@@ -139,7 +161,7 @@ def _answers(study: Study) -> dict[str, np.ndarray]:
     counts, given = np.array(study.cycles_kept), np.array(axes.wear_coefficient)
 
     def answer(frequency: float, amplitude: float) -> ExactAnswer:
-        asked = WearQuestion(frequency, amplitude, given, counts, study.wear_law, depth, changed)
+        asked = WearQuestion(frequency, amplitude, given, counts, study.wear.as_law, depth, changed)
         return scene_answer(study.scene.model, study.scene.parameters, asked)
 
     answers = [[answer(one, other) for other in axes.excitation_amplitude] for one in axes.frequency]

@@ -1,13 +1,18 @@
-"""The scene of a study: builds or reads the reduced model and describes the scene for the runner."""
+"""The scene of a study: builds or reads the reduced model and describes the scene for the runner.
+
+A model that takes long to build is the same in each run of a study: it is kept for later runs.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
-from collections.abc import Callable, Hashable, Iterator, Mapping
+import time
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,29 +20,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
+from solver.packing import Packed, pack_model, unpack_model
 from studies.contact_compliance import make_compliant
+from studies.fe_models.model_files import file_digest
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import build_scene, scene_has, scene_mesh
-from studyrunner.scene.computed import (
-    Computed,
-    InMemory,
-    describe_origin,
-    harmonics_to_build,
-    model_once,
-    scene_parameters_of,
-)
+from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene, scene_has, scene_mesh
 from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.study.mistakes import scene_errors
+from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
+from studyrunner.system.machine import package_digest
 from studyrunner.user_error import UserError
 from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from studies.scene_answers import SurfaceMesh
+    from studyrunner.checkpoint.store import Store
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
+
+LEAST_SECONDS = 2.0
+"""Time, s, above which a model is kept. Shorter times are not worth the space in the file."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +76,18 @@ class SceneFacts:
         return self.surface, self.position.tobytes(), self.area.tobytes()
 
 
+class InMemory(dict[str, Packed]):
+    """Stands for the file of a run in commands that leave nothing behind: values by hash of their inputs."""
+
+    keep_computed = dict.__setitem__
+    read_computed = dict.get
+
+
 def _silent(_: str) -> None: ...
 
 
 def build_study_scene(
-    study: Study, progress: Callable[[str], None] = _silent, computed: Computed | None = None
+    study: Study, progress: Callable[[str], None] = _silent, computed: Store | InMemory | None = None
 ) -> ReducedModel:
     """Reduced model of the scene for the largest number of harmonics of the study and those that show the error.
 
@@ -89,8 +101,7 @@ def build_study_scene(
     # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
     with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
         if scene.path is None:
-            kept = InMemory() if computed is None else computed
-            model = model_once(study, kept, partial(_build_here, study, progress))
+            model = _build_once(study, progress, InMemory() if computed is None else computed)
         else:
             # h5py is loaded for scene files only: the bundled scenes do without it.
             from studies.scene_file import read_scene
@@ -102,6 +113,60 @@ def build_study_scene(
     _check_pairs(study, model)
     _check_outputs(study, model)
     return model
+
+
+def _build_once(study: Study, progress: Callable[[str], None], computed: Store | InMemory) -> ReducedModel:
+    """The model of a scene that is not read from a scene file, built or from an earlier run, which is equal to the last
+    bit (`solver.packing`).
+    """
+    key = model_key(study)
+    if (known := computed.read_computed(key)) is not None:
+        # what is damaged, or of another version, is built again
+        with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
+            return unpack_model(known)
+    began = time.monotonic()
+    model = _build_here(study, progress)
+    if time.monotonic() > began + LEAST_SECONDS and (packed := pack_model(model)) is not None:
+        computed.keep_computed(key, packed)
+    return model
+
+
+def harmonics_to_build(study: Study) -> int:
+    """Number of harmonics that a scene is built for, those that show the error of a given number included."""
+    # two levels up: 1, 3, 5, 7, 9, 13, 19, 27...
+    shown = 2 * max(study.given_harmonics, default=0) + 3
+    return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.solver.harmonics else shown
+
+
+def model_key(study: Study) -> str:
+    """Hash under which the model of a scene is kept: of its parameters and files, and of the source of the scenes."""
+    sources = [package_digest(package) for package in ("studies", "solver")]
+    content = None if study.scene.path is None else file_digest(study.scene.path)
+    own = study.scene.model, scene_parameters_of(study), describe_origin(study), content, harmonics_to_build(study)
+    return hashlib.sha256(json.dumps((sources, own), sort_keys=True).encode()).hexdigest()[:32]
+
+
+def scene_parameters_of(study: Study) -> dict[str, object]:
+    """Parameters that the model of a scene depends on: mostly without one friction coefficient for all pairs."""
+    given: dict[str, object] = study.scene.parameters.model_dump(mode="json")
+    depends = study.scene.is_bundled and scene_has(study.scene.model, "FRICTION_IN_MODEL")
+    if not depends and not isinstance(given["friction_coefficient"], dict):
+        del given["friction_coefficient"]
+    return given
+
+
+def describe_origin(study: Study) -> dict[str, str]:
+    """Attributes on the files of a finite-element model; none for other scenes. Raises OSError, SceneError."""
+    # imported where they are used: most studies have no such model
+    if study.scene.files is not None:
+        from studies.fe_models.from_files.scene import describe_origin as describe_files
+
+        return describe_files(study.scene.files, study.scene.parameters)
+    if study.scene.path is None:
+        return {}
+    from studies.scene_file import read_origin
+
+    return read_origin(study.scene.path)
 
 
 def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
@@ -130,7 +195,7 @@ def _check_pairs(study: Study, model: ReducedModel) -> None:
         raise UserError(study.source, key, value, remedy)
     if study.wear.surfaces is not None:
         try:
-            surface_factors(model.contact.surface, study.wear_law.surfaces)
+            surface_factors(model.contact.surface, study.wear.as_law.surfaces)
         except ValueError as error:
             raise UserError(study.source, "wear.surfaces", study.wear.surfaces, str(error)) from None
 
@@ -216,29 +281,6 @@ def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] 
     except OSError as error:
         remedy = f"give a file that can be written: {error.strerror or error}"
         raise UserError("command line", "--write-scene", str(path), remedy) from None
-
-
-@dataclass(frozen=True)
-class KeptScene:
-    """A scene in a result file: attributes, and datasets with groups, by the names of scene files.
-
-    origin: attributes of the result on the files of a finite-element model.
-    """
-
-    attributes: Mapping[str, int]
-    datasets: tuple[tuple[str, NDArray[np.generic]], ...]
-    origin: Mapping[str, str] = field(default_factory=dict)
-
-
-def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
-    """Contents of a scene file for the result; of a bundled scene only on request, as the parameters give it again."""
-    if study.scene.is_bundled and not study.outputs.scene:
-        return None
-    from studies.scene_file import scene_attributes, scene_datasets
-
-    with scene_errors(study.source, study.scene.path):
-        datasets = tuple(scene_datasets(model, build_mesh(study)))
-        return KeptScene(scene_attributes(model), datasets, describe_origin(study))
 
 
 def describe_scene(model: ReducedModel) -> SceneFacts:

@@ -12,8 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.scene.computed import harmonics_to_build, scene_parameters_of
-from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
+from studyrunner.scene.scene import (
+    SceneFacts,
+    build_study_scene,
+    describe_scene,
+    harmonics_to_build,
+    scene_parameters_of,
+)
 from studyrunner.study.realisation import Realisation, realise
 from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study

@@ -254,10 +254,7 @@ def two_groups(values: SampleValues) -> Groups | None:
 
 
 def density(values: SampleValues, groups: Groups | None, grid: Array) -> Array:
-    """Density of the samples with a value at the points of a grid (m,): Gaussian kernels, Silverman's width.
-
-    The width is of each group alone, so that both peaks stay as sharp as they are. NaN for samples that are all equal.
-    """
+    """Density of the samples with a value on a grid (m,): Gaussian kernels, Silverman's width of each group alone."""
     known = values.is_known
     upper = np.zeros_like(known) if groups is None else groups.is_upper
     whole = np.zeros(grid.shape)

@@ -95,10 +95,7 @@ def worn_volume_statistics(
 
 
 def statistics_of_file(dataset: xr.Dataset) -> xr.Dataset | None:
-    """`worn_volume_statistics` at all counts, or at some of these, evenly spaced, where a file has many.
-
-    None without samples, without worn volumes, or with too many of them.
-    """
+    """`worn_volume_statistics` of a file, at some counts where it has many; None without samples, or with too many."""
     if dataset.sizes.get(SAMPLE, 0) < 2 or "worn_volume" not in dataset:
         return None
     counts = dataset.sizes[CYCLE]
@@ -302,8 +299,7 @@ def measure_of(statistics: xr.Dataset) -> str | None:
 def deciding_input(intervals: Array) -> int | None:
     """Place of the input that decides most, from intervals (n_inputs, 2); None where the samples do not tell.
 
-    They tell where the interval of the strength of one input, a share or a correlation without its sign, is above those
-    of all others.
+    They tell where the interval of its strength, a correlation without sign, is above those of all others.
     """
     ends = np.nan_to_num(intervals)
     least = np.where((ends[:, 0] < 0.0) & (ends[:, 1] > 0.0), 0.0, np.abs(ends).min(axis=1))

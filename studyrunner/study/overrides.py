@@ -11,7 +11,7 @@ import numpy as np
 
 from studyrunner.study.scene_axes import is_table
 from studyrunner.study.sections import SOLVER_AXES
-from studyrunner.study.toml_text import read_toml
+from studyrunner.study.text import read_toml
 from studyrunner.user_error import UserError
 
 Table = dict[str, Any]

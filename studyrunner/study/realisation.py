@@ -208,7 +208,7 @@ def expected_wear(study: Study) -> ExpectedWear:
         scattered = None if study.scatter is None else study.scatter.inputs.get(name)
         return own if scattered is None else float(scattered.distribution.at(np.array(own), np.array(_FAR)))
 
-    law, until = study.wear_law, study.slow_time.until or {}
+    law, until = study.wear.as_law, study.slow_time.until or {}
     factor = sum(largest(f"surfaces_{label}", value) for label, value in law.surfaces) if law.surfaces else 1.0
     if law.name == "energy":
         factor *= study.friction_coefficient or 0.0

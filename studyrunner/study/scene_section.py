@@ -18,7 +18,7 @@ from studies.scenes import scene_has, scene_parameters
 from studyrunner.study.mistakes import Mistakes, check_table, close_name, scene_errors
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.sections import ELSEWHERE
-from studyrunner.study.study_of_result import SCENE_GROUP, Archived, check_result_file
+from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file
 from studyrunner.system.progress import count as counted
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
 from studyrunner.values import NotNegative, Section, Wrong, listed, once

@@ -161,7 +161,7 @@ class WearSection(Section):
         return self.model_copy(update={"threshold": values.get("threshold", self.threshold), "surfaces": surfaces})
 
     @property
-    def wear_law(self) -> WearLaw:
+    def as_law(self) -> WearLaw:
         """As the solver takes it."""
         table = None
         if self.pressure is not None and self.depth is not None and self.factor is not None:

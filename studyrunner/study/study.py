@@ -10,7 +10,6 @@ from pathlib import Path
 
 from pydantic import Field
 
-from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scatter import ScatterSection
@@ -28,7 +27,7 @@ from studyrunner.study.sections import (
     StudySection,
     WearSection,
 )
-from studyrunner.study.study_of_result import Archived
+from studyrunner.study.text import Archived
 from studyrunner.values import Section
 from studyrunner.variables import (
     ASKED,
@@ -203,11 +202,6 @@ class Study(Section):
         """Coulomb friction coefficient of all pairs; None where each pair has its own."""
         value = dict(self.scene.parameters)["friction_coefficient"]
         return None if value is None or isinstance(value, dict) else float(value)
-
-    @property
-    def wear_law(self) -> WearLaw:
-        """The wear law as the solver takes it."""
-        return self.wear.wear_law
 
     @property
     def until(self) -> WearTarget | None:

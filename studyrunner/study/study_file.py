@@ -40,8 +40,7 @@ from studyrunner.study.sections import (
     WearSection,
 )
 from studyrunner.study.study import MODES, Study
-from studyrunner.study.study_of_result import read_archived
-from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
+from studyrunner.study.text import format_toml, read_archived, read_toml, read_toml_file
 from studyrunner.user_error import UserError
 from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY

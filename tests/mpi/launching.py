@@ -36,7 +36,7 @@ PATIENCE = 240.0
 """Seconds after which something hangs, however busy the machine is; nothing that is right takes a tenth of that."""
 
 SOON = 30.0
-"""Seconds in which a run ends that is told to, on a machine with ten times the work that it has cores for; ranks that
+"""Seconds in which a run ends after a signal, on a machine with ten times the work that it has cores for; ranks that
 wait for a lost one take 60 and more."""
 
 _MARK = "FRETWEAR_TEST_RUN"

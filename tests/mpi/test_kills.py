@@ -151,7 +151,7 @@ def whole(tmp_path_factory):
 
 @pytest.mark.parametrize("case", ENDED_BY)
 def test_a_run_that_is_ended_leaves_a_result_and_goes_on(case, whole, tmp_path):
-    """The launcher tells all ranks, some earlier than others: rank 0 may be writing by then."""
+    """The launcher sends it to all ranks, to some earlier than others: rank 0 may be writing by then."""
     study, (n_ranks, number, victims) = FAKED_STUDY, ENDED_BY[case]
     arguments = [*study.arguments, "-o", "out.nc"]
 

@@ -1,21 +1,17 @@
 """Runs of the command with a stand-in for the solver, which may do something else at one of its results."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import pytest
 
 from studyrunner import task_runs
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
 from studyrunner.scene.scene import describe_scene
+from tests.mpi.launching import options
 from tests.studyrunner.fakes import fake_evaluate
 
-SMALL = [
-    "sdof_slider",
-    *("--set", "axes.frequency=[100, 110]"),
-    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
-    *("--set", "axes.scheme=implicit"),
-    *("-o", "out.nc"),
-]
+AXES = ("axes.frequency=[100, 110]", "axes.wear_coefficient=[5e-12, 1e-11]", "axes.scheme=implicit")
+SMALL = ["sdof_slider", *options(*AXES), "-o", "out.nc"]
 """A study of two start states and four histories."""
 
 
@@ -30,14 +26,11 @@ class Solver:
         self.n_results = 0
         self.disturb: Callable[[Task, int], None] = lambda *_: None
         self.change: Callable[[Task, PointResult], PointResult] = lambda _, result: result
+        monkeypatch.setattr(task_runs, "compute_task", self.evaluate)
 
-        monkeypatch.setattr(
-            task_runs, "compute_task", lambda task, models, keep: self.evaluate(models[task.scenes[0]], task, keep)
-        )
-
-    def evaluate(self, model: object, task: Task, keep: Keep) -> Iterator[Result]:
+    def evaluate(self, task: Task, models: Mapping[int, object], _: Keep) -> Iterator[Result]:
         self.tasks.append(task)
-        for result in fake_evaluate(task, keep, describe_scene(model)):
+        for result in fake_evaluate(task, describe_scene(models[task.scenes[0]])):
             self.n_results += 1
             self.disturb(task, self.n_results)
             yield self.change(task, result) if isinstance(result, PointResult) else result

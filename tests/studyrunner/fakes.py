@@ -10,7 +10,7 @@ import numpy as np
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex, record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.kinds.task import Identity, Index, Keep, PointResult, Result, StartResult, Task, TaskPlan, digest
+from studyrunner.kinds.task import Identity, Index, PointResult, Result, StartResult, Task, TaskPlan, digest
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
@@ -26,13 +26,7 @@ FACTS = SceneFacts(
 )
 
 
-def no_keep(progress: Packed | str) -> None:
-    """Progress that nobody keeps."""
-
-
-def fake_evaluate(
-    task: Task, keep: Keep = no_keep, facts: SceneFacts = FACTS, seconds: float = 0.0
-) -> Iterator[Result]:
+def fake_evaluate(task: Task, facts: SceneFacts = FACTS, seconds: float = 0.0) -> Iterator[Result]:
     """Results that depend on everything in the task but its cost; a history takes up to `seconds`, unevenly."""
     if isinstance(task, Sweep):
         yield from fake_sweep(task)

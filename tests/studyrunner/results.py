@@ -27,7 +27,6 @@ from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOPS, OF_SAMPLES, USUAL, Variable
 from tests.studyrunner.fakes import FACTS
 
-FAILED = int(Outcome.MARCH_FAILED)
 AXES: Mapping[str, Sequence[object]] = {
     "frequency": (190.0, 191.0, 192.5, 193.0),
     "wear_coefficient": (1e-11, 2e-11),
@@ -53,13 +52,12 @@ def build_file(
     responses: Sequence[str] = ("tip",),
     variables: Sequence[str] = USUAL,
     loops: Sequence[int] = (),
-    failing: int = FAILED,
     **of_file: str,
 ) -> xr.Dataset:
     """A result of random numbers up to 1e-6.
 
-    failed: numbers of the points that end with `failing`, the last axis fastest.
-    positions, surfaces: of the pairs, two flanks if not given. of_file: attributes of the file.
+    failed: numbers of the points without a history, the last axis fastest. positions, surfaces: of the pairs, two
+    flanks if not given. of_file: attributes of the file.
     """
     random = np.random.default_rng(1)
     positions = flank_positions() if positions is None else positions
@@ -79,7 +77,7 @@ def build_file(
     for name in LOOPS if loops else ():
         dataset[name].values[..., ~np.isin(np.arange(len(positions)), loops), :, :] = np.nan
     for flat in failed:
-        fail(dataset, flat, failing)
+        fail(dataset, flat, int(Outcome.MARCH_FAILED))
     pairs = {f"contact_{axis}": positions[:, i] for i, axis in enumerate("xyz")}
     pairs |= {"contact_area": np.full(len(positions), 1e-5)}
     pairs |= {"contact_surface": np.array(surfaces or ["intrados"] * half + ["extrados"] * (len(positions) - half))}
@@ -124,9 +122,9 @@ def _empty(
     found = {}
     for name, entry in variables.items():
         dimensions = (*axes, *entry.dimensions)
-        values = np.zeros([sizes[each] for each in dimensions], object if entry.is_text else entry.dtype)
-        values[...] = "" if entry.is_text else np.nan if entry.dtype.startswith("float") else 0
-        found[name] = xr.Variable(dimensions, values, attributes(name, entry, "modal_amplitude" in axes))
+        gap = "" if entry.is_text else np.nan if entry.dtype.startswith("float") else 0
+        values = np.full([sizes[each] for each in dimensions], gap, object if entry.is_text else entry.dtype)
+        found[name] = xr.Variable(dimensions, values, attributes(name, entry))
     found["outcome"].values[...] = Outcome.NOT_COMPUTED
     return xr.Dataset(found)
 
@@ -268,9 +266,7 @@ def mesh_file() -> xr.Dataset:
     there = xr.DataArray(exists, dims=("mesh", "contact"))
     for name in ("wear_depth", "mean_pressure", "open_fraction", "slip_range"):
         dataset[name] = dataset[name].where(there).transpose(*dataset[name].dims)
-    surfaces = np.full(exists.shape, "", dtype="U8")
-    for row, n_pairs in zip(surfaces, exists.sum(axis=1), strict=True):
-        row[:n_pairs] = np.repeat(["intrados", "extrados"], n_pairs // 2)
+    surfaces = [["intrados"] * n + ["extrados"] * n + [""] * (24 - 2 * n) for n in (6, 12)]
     pairs = ("mesh", "contact")
     return dataset.assign_coords(
         **{f"contact_{axis}": (pairs, position[..., i], {"units": "m"}) for i, axis in enumerate("xyz")},

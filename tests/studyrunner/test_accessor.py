@@ -38,8 +38,8 @@ def result():
         "loops": (PAIR,),
     }
     axes = {"frequency": (100.0, 101.0, 102.0), "scheme": ("b", "a")}
-    told = {"scene_sha256": "0", "history": "computed", "study": "[scene]\nfriction_coefficient = 0.5\n"}
-    found = build_file(axes, (0.0, 1000.0), responses=("tip", "root"), **pairs, **told)
+    attributes = {"scene_sha256": "0", "history": "computed", "study": "[scene]\nfriction_coefficient = 0.5\n"}
+    found = build_file(axes, (0.0, 1000.0), responses=("tip", "root"), **pairs, **attributes)
     found["phase"].attrs = {"units": "rad"}
     return found
 

@@ -117,14 +117,14 @@ def test_every_point_of_the_extremes_is_whole_or_says_why_not():
     failed = ~result.outcome.isin(list(COMPLETE))
     assert (whole | failed).all()
     assert not failed.sel(excitation_amplitude=[5e-5, 0.5], wear_coefficient=1.1e-14).any()
-    held = result.cycle <= result.last_cycle
+    computed = result.cycle <= result.last_cycle
     for name in ("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "slip_range"):
-        others = [dimension for dimension in result[name].dims if dimension not in held.dims]
-        assert (result[name].notnull().all(others) == held).all(), name
-        assert (result[name].isnull().all(others) == ~held).all(), name
+        others = [dimension for dimension in result[name].dims if dimension not in computed.dims]
+        assert (result[name].notnull().all(others) == computed).all(), name
+        assert (result[name].isnull().all(others) == ~computed).all(), name
     assert (result.wear_depth.isel(cycle=0).fillna(0.0) == 0.0).all()
     assert (result.wear_depth.diff("cycle").fillna(0.0) >= 0.0).all()
-    assert (result.harmonics_used.where(~held, 0) == 0).all()
+    assert (result.harmonics_used.where(~computed, 0) == 0).all()
     found = summary(result)
     assert found.n_points == result.outcome.size
     assert found.n_points - found.n_complete == sum(each.n_points for each in found.failures if not each.is_complete)

@@ -192,5 +192,5 @@ def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
     Path(name).write_text("[study", encoding="utf-8")
     assert r"\x1b[2J\udcff.toml" in refused([name])
     assert "[2J" in refused(["sdof_slider", "--set", "axes.step=\x1b[2J"])
-    assert main(["sdof_slider", "--plan", "--set", "study.title=a\x1b[2J"]) == 0
+    assert main(["sdof_slider", "--plan", "--set", 'study.title="a\\u001b[2J"']) == 0
     assert "\x1b" not in capsys.readouterr().out

@@ -1,7 +1,5 @@
 """Studies of nonlinear modes: axes.modal_amplitude in place of frequency, excitation and wear."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -49,9 +47,8 @@ def path(tmp_path_factory):
 
 
 @pytest.fixture
-def study(folder):
-    Path("modes.toml").write_text(SLIDER, encoding="utf-8")
-    return "modes.toml"
+def study(path):
+    return str(path.with_suffix(".toml"))
 
 
 @pytest.fixture

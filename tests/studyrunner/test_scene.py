@@ -15,11 +15,16 @@ from studies.scenes import sector as sector_room
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
-from studyrunner.scene import computed as computed_room
 from studyrunner.scene import scene as scene_room
-from studyrunner.scene.computed import InMemory
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics, write_study_scene
+from studyrunner.scene.scene import (
+    InMemory,
+    _parts,
+    build_study_scene,
+    describe_scene,
+    largest_harmonics,
+    write_study_scene,
+)
 from studyrunner.scene_building import SceneModels
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
@@ -47,7 +52,7 @@ SCENES = {
 @pytest.fixture
 def keep_all(monkeypatch):
     """What takes no time is kept as well."""
-    monkeypatch.setattr(computed_room, "LEAST_SECONDS", -1.0)
+    monkeypatch.setattr(scene_room, "LEAST_SECONDS", -1.0)
 
 
 def memory(model):
@@ -73,14 +78,14 @@ def test_what_takes_long_is_computed_once(case, monkeypatch):
 
 def test_a_changed_file_or_source_makes_another_scene(monkeypatch):
     def key():
-        return {computed_room.model_key(read_study("blade_root"))}
+        return {scene_room.model_key(read_study("blade_root"))}
 
     before = key()
     with monkeypatch.context() as changed:
         changed.setattr(from_files, "file_digest", lambda _: "of another file")
         assert key() != before
     assert key() == before
-    monkeypatch.setattr(computed_room, "package_digest", lambda package: f"another {package}")
+    monkeypatch.setattr(scene_room, "package_digest", lambda package: f"another {package}")
     assert key() != before
 
 
@@ -90,7 +95,7 @@ def test_a_changed_scene_file_makes_another_scene():
     keys = []
     for mass in (1.0, 2.0):
         write_study_scene(read_study("two_masses", {"scene.mass_1": mass}), Path("scene.h5"))
-        keys += [computed_room.model_key(variant) for variant in read_study("s.toml").variants]
+        keys += [scene_room.model_key(variant) for variant in read_study("s.toml").variants]
     assert len(set(keys)) == 4
 
 
@@ -146,9 +151,9 @@ def test_nodal_diameters_in_a_scene_file_bound_automatic_harmonics(n_harmonics, 
     wave = replace(sector(), n_sectors=47, nodal_diameter=4)
     standing, travelling = wave.linear.values()
     needed = needed_nodal_diameters(4, 47, n_harmonics)
-    held = replace(wave, linear={k: standing if k == 0 else travelling for k in needed})
-    assert largest_harmonics(held) == n_harmonics
-    write_scene(held, Path("wave.h5"))
+    scene = replace(wave, linear={k: standing if k == 0 else travelling for k in needed})
+    assert largest_harmonics(scene) == n_harmonics
+    write_scene(scene, Path("wave.h5"))
     text = SLIDER.replace('"sdof_slider"', '"wave.h5"\nfriction_coefficient = 0.3').replace("= 5", '= "auto"')
     Path("s.toml").write_text(text, encoding="utf-8")
     assert main(["s.toml", "--plan"]) == 0
@@ -181,30 +186,24 @@ class Sent:
 
 def test_ranks_that_see_the_files_get_one_copy_and_others_their_own(folder):
     sent = Sent(folder)
-    first, second = sent(0, 1), sent(1, 1)
-    assert isinstance(first, MappedFile)
-    assert first == second
-    assert sent.read == [1]
-    assert describe_scene(open_mapped(first)).digest == describe_scene(sent.models[1]).digest
-    assert sent(2, 1) is sent.models[1]
-    # each has it by now
-    assert [sent(rank, 1) for rank in (1, 2)] == [None, None]
-
-
-def test_a_file_goes_once_no_rank_holds_its_model(folder):
-    sent = Sent(folder)
     given = sent(0, 0)
+    assert isinstance(given, MappedFile)
     assert sent(1, 0) == given
+    assert sent.read == [0]
+    assert sent(2, 0) is sent.models[0]
+    assert describe_scene(open_mapped(given)).digest == describe_scene(sent.models[0]).digest
+    # each has it by now
+    assert [sent(rank, 0) for rank in (1, 2)] == [None, None]
     for scene in (1, 2):
         sent(0, scene)
     assert open_mapped(given) is not None, "rank 1 may not have opened it yet"
     for scene in (1, 2):
         assert isinstance(sent(1, scene), MappedFile)
+    # no rank has the model in memory any more
     with pytest.raises(FileNotFoundError):
         open_mapped(given)
-    assert sent.read == [0, 1, 2]
     assert isinstance(sent(0, 0), MappedFile)
-    assert sent.read == [0, 1, 2, 0]
+    assert sent.read == [0, 0, 1, 2, 0]
 
 
 # --- pairs at the edge of a surface ---

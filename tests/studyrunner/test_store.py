@@ -223,7 +223,7 @@ def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(code, sai
 
 
 @pytest.mark.parametrize("replaced", [False, True])
-def test_a_file_that_was_removed_meanwhile_is_told(replaced, opened, path):
+def test_a_file_that_was_removed_meanwhile_is_said(replaced, opened, path):
     path.unlink()
     if replaced:
         path.write_bytes(b"of somebody else")

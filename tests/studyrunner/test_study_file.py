@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from studyrunner.cli import main
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study_file import format_study, read_study
-from studyrunner.study.toml_text import format_toml, read_toml
+from studyrunner.study.text import format_toml, read_toml
 from studyrunner.user_error import UserError
 from studyrunner.variables import USUAL
 from tests.studies.fe_models.decks import SECTOR

@@ -40,7 +40,7 @@ def result_of(dataset):
 # --- where it wears most ---
 
 
-def test_of_numerical_settings_the_best_known_is_told():
+def test_of_numerical_settings_the_best_known_is_shown():
     """Explicit steps wear most, and are known least: they are no other case."""
     volumes = {(0, 0): 1.0, (1, 0): 2.0, (1, 1): 9.0, (1, 2): 2.1, (2, 2): 2.05}
     errors = {(1, 0): 0.04, (1, 1): 0.4, (1, 2): 0.01}
@@ -120,13 +120,13 @@ def test_nothing_wore_says_why():
     assert summary(slips).wear.largest_slip == 1e-6
     some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)
     assert summary(some).wear.where.startswith("at 3 of 9 points")
-    told = summary(
+    stuck = summary(
         made_result(read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))).assign(
             stuck_frequency=212.6
         )
     )
-    assert "nothing wore: all pairs stick at all 3 frequencies (first resonance 212.6 Hz)" in summary_lines(told)[0]
-    assert told.certainty.of == "response"
+    assert "nothing wore: all pairs stick at all 3 frequencies (first resonance 212.6 Hz)" in summary_lines(stuck)[0]
+    assert stuck.certainty.of == "response"
 
 
 # --- the resonance and the life ---
@@ -289,12 +289,9 @@ def test_frequencies_in_radians_are_asked_about(frequencies, asked):
         (0.026, 0.01, "2.6 %"),
         (0.0099999, 0.01, "1 %"),
         (0.0100001, 0.01, "1.00001 %"),
-        (0.01049, 0.01, "1.05 %"),
         (0.01163, 0.01165, "1.16 %"),
         (0.29, 0.29, "29 %"),
-        (0.999, 0.01, "100 %"),
         (12.3, 0.01, "1e+03 %"),
-        (0.0, 0.01, "0 %"),
     ],
 )
 def test_an_error_is_shown_on_its_side_of_rtol(error, rtol, text):

@@ -183,7 +183,7 @@ def history_task(*overrides):
 
 
 def ended_at(last, at, outcome=Outcome.CERTIFICATE_FAILED):
-    """The history as it is where the march has ended there."""
+    """The history as it is where it has ended there."""
     behind = at.cycles > last
     changed = {}
     for name, values in vars(at).items():

@@ -143,10 +143,7 @@ def _edges(at: FloatArray, share: FloatArray, length: float, lone: float) -> Flo
 
 
 def most_of_flanks(result: Result, *values: FloatArray) -> tuple[tuple[Flank, ...], str]:
-    """Surfaces with the largest values (n_contact,), as many as fit side by side; how they are drawn, in sentences.
-
-    No surfaces where the file has no positions of the pairs.
-    """
+    """Surfaces with the largest values (n_contact,), as many as fit, none without positions; how they are drawn."""
     flanks = find_flanks(result)
     if any(flank.seen is None for flank in flanks):
         return (), ""

@@ -133,7 +133,7 @@ def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -
         for number, row in enumerate(np.unique(np.linspace(0, n_rows - 1, min(n_rows, _MOST_PROFILES)).round())):
             label = f"{own}{1e3 * cells.y[int(row)]:.3g} mm {flank.directions[1]}"
             panel.plot(1e3 * cells.x, values[cells.pair[int(row)]], label=label, **plot.line_style(number))
-        panel.set_ylim(1.06 * deepest, -0.04 * deepest)
+        panel.set(xlim=above.get_xlim(), ylim=(1.06 * deepest, -0.04 * deepest))
         panel.set(xlabel=f"{flank.directions[0]} (mm)", ylabel=scale.label("wear depth"))
     plot.label_outer(panels)
     plot.add_colour_bar(figure, panels, norm, scale.label("wear depth"), fraction=0.05)

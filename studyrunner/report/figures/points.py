@@ -75,10 +75,7 @@ def draw_trends(result: Result) -> Drawn:
 
 
 def find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArray]]:
-    """Numbers of every point that the file has: label, unit in the file, values and errors in the shape of the axes.
-
-    The worn volume, and the response after wear, of several frequencies the largest, with length 1 along them.
-    """
+    """Label, unit, values and errors (axes...) of what every point has; the largest response over the frequencies."""
     found = []
     if result.has("worn_volume") and len(result.cycles) > 1:
         worn = np.where(result.computed, result.worn, np.nan)

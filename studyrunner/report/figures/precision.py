@@ -80,10 +80,7 @@ class ComparedPoint:
         return np.asarray((self.errors[quantity] >= least) & np.isfinite(self.errors[quantity]))
 
     def front(self, quantity: str, scheme: str | None = None) -> list[int]:
-        """Rows of settings, of all schemes or of one, than which no quicker one is as exact; the quickest first.
-
-        An error that is not resolved counts as the smallest that would be.
-        """
+        """Rows of settings than which no quicker one is as exact, the quickest first."""
         errors = np.maximum(self.errors[quantity], RESOLVED * self.uncertainty[quantity])
         own = [row for row, each in enumerate(self.settings) if scheme in (None, each.scheme)]
         own = sorted((row for row in own if np.isfinite(errors[row])), key=lambda row: (self.time[row], errors[row]))
@@ -92,10 +89,9 @@ class ComparedPoint:
 
 
 def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
-    """What the settings of a file cost and how wrong they are, at all points of the axes that are no settings.
+    """What the settings of a file cost and how wrong they are, at all points of the other axes.
 
-    Empty where the file does not compare at least two with a third one, or with the exact answer. Schemes alone are
-    compared with the exact answer only.
+    Empty without two to compare with a third one, or with the exact answer, as schemes alone are.
     """
     varying = [key for key in KEYS if key in result.varying]
     alone = set(varying) <= {"scheme"} and not result.has("exact_worn_volume")
@@ -155,10 +151,7 @@ def _compare(label: str, settings: tuple[Setting, ...], own: Mapping[str, FloatA
 
 
 def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:
-    """All settings, each with the number of its first place among the values of `keys`, the last axis fastest.
-
-    A setting holds no value that it does not use: the file may have it at several places.
-    """
+    """All settings, without values that they do not use, each with its first place among the values of `keys`."""
 
     def read(key: str, value: object) -> float | str:
         # numbers beside "auto" are texts in the file

@@ -37,11 +37,7 @@ _Curves = dict[int, tuple[FloatArray, FloatArray]]
 
 
 def draw_responses(result: Result) -> Drawn:
-    """Amplitude of the first harmonic over frequency, one panel a response.
-
-    Lines are of the new joint, or of joints that were worn before; with `result.again["response"]` also of the joint
-    that is worn as the shown point is.
-    """
+    """Amplitude of the first harmonic over frequency, a panel a response: of the new and of the shown worn joint."""
     course, again = find_course(result, "frequency"), result.again.get("response")
     if course is None and again is None:
         said = "The study has one frequency: give several under [axes] frequency"

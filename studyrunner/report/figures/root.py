@@ -80,10 +80,7 @@ def draw_fraction(result: Result, name: str) -> Drawn:
 
 
 def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale: Scale, label: str) -> Figure:
-    """The root as a whole, and the contact surfaces of its outer body from close by.
-
-    nodes: of its faces, worn. of_pairs (n_contact,): values in SI that colour the contact surfaces.
-    """
+    """The root with these nodes, and its contact surfaces from close by, coloured by values of the pairs in SI."""
     views = find_views(surface)
     close_ups = [view for view in views[:-1] if view.body == views[0].body][:_MOST_CLOSE_UPS]
     ratios = [1.0] + [2.0] * len(close_ups)
@@ -103,10 +100,7 @@ def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale:
 
 
 def draw_disk(result: Result) -> Drawn:
-    """The disk of all sectors, that of the mesh in full colour; only faces that look to the eye are drawn.
-
-    None where the study names no sectors about z, or their faces are too many.
-    """
+    """The disk of all sectors, that of the mesh in full colour; None without sectors, or with too many faces."""
     scene, surface = result.study.get("scene", {}), _read_surface(result)
     number = scene.get("n_sectors")
     if scene.get("model") != "dovetail_sector" or not isinstance(number, int) or surface is None:

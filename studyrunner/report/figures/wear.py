@@ -181,10 +181,7 @@ def _mark_care(result: Result, panel: Axes, course: Course, choice: Choice, fiel
 
 
 def draw_map(result: Result, name: str) -> Drawn:
-    """Worn volume or wear rate over the course and the cycles, one panel a combination.
-
-    Nothing where each point has cycle counts of its own.
-    """
+    """Worn volume or wear rate over the course and the cycles; nothing where each point has counts of its own."""
     course = _worn_over(result)
     if course is None or result.has("cycle_count"):
         return None

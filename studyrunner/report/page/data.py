@@ -48,10 +48,9 @@ def encode_floats(values: ArrayLike) -> str:
 def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str, Any] | None:
     """What the script of the page reads, in about `limit` characters; None where there is nothing to show.
 
-    `dims`: the dimensions, the axes of the study first, with label, unit and values. `coords`: numbers along one
-    dimension that may be its values instead. `variables`: see `_encode`. `at`: index along each dimension that is shown
-    first; `start`: variable, horizontal and coloured dimension. `messages`: of points, by number, the last axis
-    fastest. Sentences on what is left out are appended to `notes`.
+    `dims`: the dimensions, the axes first. `coords`: numbers along one that may stand for it. `variables`: see
+    `_encode`. `at`: index along each dimension, and `start`: what is shown at first. `messages`: of points by number,
+    the last axis fastest. `notes` gets sentences on what is left out.
     """
     if not result.has_values.any():
         return None
@@ -119,10 +118,7 @@ def _fit(
 
 
 def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
-    """A variable: `dims`, `data` in SI, times `factor` in `unit`.
-
-    `error`: the variable that holds its error, `relative` or in the same unit. `words`: what its values mean.
-    """
+    """A variable: `data` in SI times `factor` in `unit`, `error` the variable of its error, `words` of its values."""
     name, attributes = str(array.name), array.attrs
     values = array.values.astype(float)
     scale = scale_for(str(attributes.get("units", "")), values)
@@ -185,10 +181,8 @@ def _start(result: Result, arrays: Mapping[str, xr.DataArray]) -> dict[str, str]
 def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | None:
     """Faces and views as the script on the page reads them; None where there are none to draw, or too many.
 
-    `nodes`, m, three numbers each; `faces`, four nodes each; `body` and `flank` of each face; `seen`: bits of the views
-    that show a face; of `contact`: `nodes`, `pairs`, one at each node, and `normals`; all of these as `encode_floats`
-    has them. `well_seen`: m, the depth that is well seen. `scene`: index along the axes
-    along which scenes differ, of the one that is drawn.
+    As `encode_floats` has them: `nodes`, m, `faces`, of each `body`, `flank` and bits `seen` of the views; of `contact`
+    nodes, pairs and normals. `well_seen`: m, a depth that is well seen. `scene`: index of the drawn scene along axes.
     """
     n_pairs = result.dataset.sizes["contact"]
     if n_pairs > _MOST_PAIRS:

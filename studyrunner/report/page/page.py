@@ -56,10 +56,9 @@ class Written:
 
 
 def write_page(result: Result, items: Iterable[Item], path: Path) -> Written:
-    """Write the page, and beside it the files of each drawing.
+    """Write the page, and beside it the files of each drawing, into a folder that exists.
 
-    items: what the page shows beside the interactive part, in its order. path: of the page, in a folder that exists;
-    an older page is replaced when the new one is complete. Raises OSError where something cannot be written.
+    An older page is replaced when the new one is complete. Raises OSError where something cannot be written.
     """
     parts = [_save(item, path.parent) if isinstance(item, Drawing) else item for item in items]
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
