@@ -185,11 +185,11 @@ def from_every_stop(model, friction, start, wear, step, scheme, end, settings):
     whole = march_wear(*asked, keep=kept.append)
     places = [unpack(progress) for progress in kept]
     # within the history itself, one that it is compared with, and the reference solution: from the last one backwards
-    stages = {len(at.done): [n for n, other in enumerate(places) if len(other.done) == len(at.done)] for at in places}
+    stages = {len(at): [n for n, other in enumerate(places) if len(other) == len(at)] for at in places}
     for found in stages.values():
         for n in found[:: -max(1, len(found) // 2)][:2]:
             assert_same(march_wear(*asked, resume=kept[n]), whole)
-    own = [at.state.cycle for at in places if not at.done]
+    own = [solution.state.cycle for at in places if len(at) == 1 for solution in at.values()]
     return whole, own, len(stages)
 
 
