@@ -172,6 +172,9 @@ def settings_of(result: Result, place: tuple[int, ...]) -> Used:
     schemes, sweeps = (
         tuple(map(str, dataset[name].values)) if name in result.axes else () for name in ("scheme", "sweep")
     )
+    if result.has_modes:
+        # a mode has no ramp to advise
+        sweeps = (*sweeps, "ramp")
     return Used(
         scheme=str(of["scheme"]),
         sweep=str(of["sweep"]),

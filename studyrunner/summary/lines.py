@@ -161,13 +161,16 @@ def _life(life: Life, summary: Summary) -> str:
 def _mode(mode: ModeRange) -> str:
     if not mode.n_found:
         return f"found at none of {count(mode.n_points, 'point')}"
-    frequency, damping = (
-        " to ".join(dict.fromkeys(f"{factor * each:.{digits}g}{unit}" for each in ends))
-        for ends, factor, digits, unit in ((mode.frequency, 1.0, 6, ""), (mode.damping, 100.0, 3, " %"))
-    )
+    ranges = ("natural frequency", mode.frequency, 1.0, 6, " Hz"), ("damping ratio", mode.damping, 100.0, 3, " %")
+    known = [
+        f"{name} {' to '.join(dict.fromkeys(f'{factor * each:.{digits}g}' for each in ends))}{unit}"
+        for name, ends, factor, digits, unit in ranges
+        if not math.isnan(ends[0])
+    ]
+    values = ", ".join(known) or "neither natural_frequency nor damping_ratio is among outputs.variables"
     found = "" if mode.n_found == mode.n_points else f", found at {mode.n_found} of {mode.n_points} points"
     over = f" over {mode.over}" if mode.over else ""
-    return f"natural frequency {frequency} Hz, damping ratio {damping}{over}{found}"
+    return f"{values}{over}{found}"
 
 
 def _mesh(mesh: MeshChange) -> str:
