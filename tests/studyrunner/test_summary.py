@@ -177,6 +177,13 @@ def test_the_shortest_life():
     assert never.n_beyond == 3
 
 
+def test_a_shift_of_the_frequency_is_relative():
+    study = ("axes.frequency=1", "axes.scheme=adaptive", "slow_time.until={frequency_shift=0.002}")
+    made = wearing(*study, cycles_to_target=lambda _: 300.0, cycles_to_target_error=lambda _: 3.0)
+    lines = summary_lines(summary(made))
+    assert any(line.startswith("life") and line.endswith("to frequency shift 0.002") for line in lines)
+
+
 # --- certainty and failures ---
 
 
