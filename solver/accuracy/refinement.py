@@ -218,7 +218,7 @@ class _Search:
 
     def _compared(self, here: ResolvedState, resolution: Resolution) -> ResolvedState | None:
         """The state with other harmonics and samples, as accurately as a comparison needs; None where not found."""
-        return here.solve_at(resolution, self.run.to(here.case.settings.rough_tolerance))
+        return here.solve_at(resolution, self.run.with_tolerance(here.case.settings.rough_tolerance))
 
     def _next(
         self, here: ResolvedState, wanted: Resolution, finer: ResolvedState | None, richer: ResolvedState | None

@@ -58,7 +58,7 @@ class Line(Protocol[HereT, EndT]):
     def attempt(self, here: HereT, length: float, /) -> EndT | None:
         """End of a step; None where it is not found."""
 
-    def judge(self, here: HereT, end: EndT, length: float, /) -> float:
+    def ratio(self, here: HereT, end: EndT, length: float, /) -> float:
         """Change or error of a step over the allowed one; above 1 the step is refused."""
 
     def rescue(self, here: HereT, length: float, /) -> EndT | Failure:
@@ -69,7 +69,7 @@ class Line(Protocol[HereT, EndT]):
 class Lengths:
     """The rule for the length of a step.
 
-    order: power of the length with which the judged quantity grows. safety: as `STEP_SAFETY`.
+    order: power of the length with which the ratio of `Line` grows. safety: as `STEP_SAFETY`.
     shortest: shortest step. rescue: length at and below which a step that is not found is left to the rescue.
     """
 
@@ -90,13 +90,13 @@ def take_step(line: Line[HereT, EndT], here: HereT, length: float, lengths: Leng
     length = max(length, lengths.shortest)
     while True:
         end = line.attempt(here, length)
-        ratio = math.inf if end is None else line.judge(here, end, length)
+        ratio = math.inf if end is None else line.ratio(here, end, length)
         if end is not None and ratio <= 1.0:
             return end, length * lengths.factor(ratio, accepted=True)
-        if length <= (lengths.rescue if end is None else lengths.shortest):
+        floor = lengths.rescue if end is None else lengths.shortest
+        if length <= floor:
             rescued = line.rescue(here, length)
             return rescued if isinstance(rescued, Failure) else (rescued, length)
-        floor = lengths.rescue if end is None else lengths.shortest
         length = max(lengths.factor(ratio, accepted=False) * length, floor)
 
 

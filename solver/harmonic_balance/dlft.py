@@ -194,11 +194,11 @@ class Linearisation:
         blocks = self.force_tangent, joint.law.compliance, self.growth_tangent
         return untransmitted(np.ascontiguousarray(step), joint.pair_rows, self.active, *blocks)
 
-    def dense(self, pairs: IntArray, kept: int | None = None) -> FloatArray:
-        """Rows and columns of the Jacobian for some pairs and the first `kept` harmonics, 2H'+1, by default all; in the
-        order (relative displacement, harmonic).
+    def dense(self, pairs: IntArray, width: int | None = None) -> FloatArray:
+        """Rows and columns of the Jacobian for some pairs and their first `width` = 2H'+1 Fourier coefficients, by
+        default all; in the order (relative displacement, coefficient).
         """
-        motion, matrix = self.matrices(pairs, kept)
+        motion, matrix = self.matrices(pairs, width)
         rows, k, structure = self.joint.rows_of(pairs), motion.shape[1], self.joint.structure
         matrix[:, 0] += structure.static_stiffness[np.ix_(rows, rows)] @ motion[:, 0]
         if k > 1:
@@ -209,13 +209,13 @@ class Linearisation:
             matrix[:, 2::2] -= moved.imag
         return np.asarray(matrix.reshape(rows.size * k, rows.size * k))
 
-    def matrices(self, pairs: IntArray, kept: int | None = None) -> FloatArray:
+    def matrices(self, pairs: IntArray, width: int | None = None) -> FloatArray:
         """`du/dp`, m/N, and `dlambda/dp` (2, n, k, n k) of the n displacements of some pairs; order as in `dense`."""
         m = self.joint.basis.synthesis.shape[0]
-        k, rows = kept or m, self.joint.rows_of(pairs)
+        k, rows = width or m, self.joint.rows_of(pairs)
         pair, component = np.divmod(self.joint.component_index[rows], 3)
         pair = np.searchsorted(pairs, pair)
-        # blocks of the pairs, spread over the existing rows and columns: (row, harmonic, column, harmonic)
+        # blocks of the pairs, spread over the existing rows and columns: (row, coefficient, column, coefficient)
         spread = np.zeros((2, rows.size, k, rows.size, k))
         row, column = np.nonzero(pair[:, None] == pair[None, :])
         for place, part in enumerate((self.motion_tangent, self.force_tangent)):

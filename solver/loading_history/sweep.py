@@ -194,11 +194,11 @@ class Sweep(Generic[S]):
 
     def attempt(self, here: S, length: float) -> Step[S] | None:
         """As in Line."""
-        run = self.run.to(self.path.case.settings.rough_tolerance)
+        run = self.run.with_tolerance(self.path.case.settings.rough_tolerance)
         found = self.path.solve(self.state.nodes.states, self._target(here, length), run)
         return None if found is None else Step(found)
 
-    def judge(self, here: S, end: Step[S], length: float) -> float:
+    def ratio(self, here: S, end: Step[S], length: float) -> float:
         """As in Line: the shortest step is accepted, whatever the change of the vibration is."""
         ratio = self.path.change(here, end.state, 1.0)
         self._rate = ratio / length
@@ -278,7 +278,7 @@ class Sweep(Generic[S]):
         for target in targets:
             if nodes is not None:
                 path, rough = self.path.at(nodes.resolution), self.path.case.settings.rough_tolerance
-                found = path.solve(nodes.states, target, self._reference_run.to(rough))
+                found = path.solve(nodes.states, target, self._reference_run.with_tolerance(rough))
                 nodes = None if found is None else nodes.then(found)
         return nodes
 

@@ -41,9 +41,10 @@ steps of the sweep, as in a wear history."""
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
 
-CHANGE_OF_A_WAY = 0.5
-"""Change of the vibration behind such a sweep, after which the sweep chooses its nodes anew and its error is estimated
-again. A state without its way is left after `SMOOTH_CHANGE`, as only the way tells on which branch it lies."""
+NEW_SWEEP_CHANGE = 0.5
+"""Largest change of the vibration at the end of such a sweep since the sweep that has chosen its nodes. Above, a new
+sweep chooses them and estimates its error. Without a sweep, which alone says on which branch a state lies, the limit is
+`SMOOTH_CHANGE`."""
 
 MOST_HALVINGS = 12
 """Most halvings of the distance of two such nodes in one sweep, to come past a corner at the resonance."""
@@ -55,7 +56,7 @@ class Begun:
     """The way by which a block began in an earlier mission.
 
     nodes: frequencies, rad/s, or load factors of the nodes of its sweep; of a passage the frequencies that count, Hz.
-    start, resolution: state behind the sweep, and harmonics and samples of the last node; None for a passage.
+    start, resolution: state at the end of the sweep, and harmonics and samples of the last node; None for a passage.
     """
 
     nodes: tuple[float, ...]
@@ -69,7 +70,7 @@ class BlockRun:
     """A block that was computed once.
 
     growth (n_contact,): depth worn in the block, m.
-    response, response_peak (2, n_response): complex first harmonic and largest magnitude at begin and end, m.
+    response, response_peak (2, n_response): complex first harmonic and largest magnitude at start and end, m.
     slope (n_contact, n_contact): derivative of the growth by the depth before, 1; None if not asked for.
     response_error, growth_error: estimated relative errors.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
@@ -105,7 +106,7 @@ class BlockCase:
     carried: state that the block continues; None for a block that begins anew.
     begun, guide: of this block in an earlier mission, and in the history for its reference solution; else None.
     with_slope: whether the slope of the growth is asked for.
-    every: whether stability is tested at begin and end, also where nothing speaks for a loss of stability.
+    every: whether stability is tested at start and end, also where nothing speaks for a loss of stability.
     """
 
     mission: Mission
@@ -125,7 +126,7 @@ class BlockCase:
 
     @property
     def is_continued(self) -> bool:
-        """Whether the block behind begins from the last state of this one."""
+        """Whether the next block begins from the last state of this one."""
         blocks = self.mission.blocks
         return blocks[(self.place + 1) % len(blocks)].way == "continue"
 
@@ -247,16 +248,16 @@ def _again(case: BlockCase, begun: Begun) -> StartState | None:
     start, run = begun.start, case.run()
     if start is None or start.state is None or start.branch > 0:
         return None
-    ramp, omega, (setup, begins) = case.block.way == "ramp", start.state.omega, case.begin(start)
+    ramp, omega, (setup, earlier) = case.block.way == "ramp", start.state.omega, case.begin(start)
     path = LoadingPath(setup.case, case.block.excitation_amplitude, omega if ramp else None)
     target = 1.0 if ramp else omega
-    before = State(begins.at, start.state.start_history, target)
+    before = State(earlier.at, start.state.start_history, target)
     try:
         found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if found is None or not path.forgets(found):
-            every_node = 1 if case.guide is None else NODES_OF_A_REFERENCE_STEP
-            found, most = _through_nodes(path, begun, target, every_node, run), CHANGE_OF_A_WAY
-        if found is None or vibration_change(begins.at, found.evaluation) > most:
+            stride = 1 if case.guide is None else NODES_OF_A_REFERENCE_STEP
+            found, most = _through_nodes(path, begun, target, stride, run), NEW_SWEEP_CHANGE
+        if found is None or vibration_change(earlier.at, found.evaluation) > most:
             return None
         joint = path.joint_at(target)
         if find_instability(setup.case, joint, found.evaluation, run, case.every):
@@ -267,21 +268,21 @@ def _again(case: BlockCase, begun: Begun) -> StartState | None:
     return replace(start, state=state, reference=None, newton_iterations=run.budget.iterations)
 
 
-def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: int, run: Run) -> State | None:
+def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, run: Run) -> State | None:
     """The state at a target of the path, through nodes of an earlier sweep; None where it is not found."""
     if not begun.nodes or begun.resolution is None:
         return None
-    coarse, (first, *nodes) = path.at(begun.resolution), begun.nodes[::every_node]
+    coarse, (first, *nodes) = path.at(begun.resolution), begun.nodes[::stride]
     joint, unworn = coarse.joint_at(first), np.zeros(path.case.model.contact.n_contact)
     found: State | Outcome | None = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
     if not isinstance(found, State):
         return None
     states: tuple[State, ...] = (replace(found, parameter=first),)
-    ahead, halvings, rough = [*nodes, target], 0, run.to(coarse.case.settings.rough_tolerance)
+    ahead, halvings, rough = [*nodes, target], 0, run.with_tolerance(coarse.case.settings.rough_tolerance)
     while ahead:
         here, parameter = states[-1], ahead[0]
         after = coarse.solve(states, parameter, run if parameter == target else rough)
-        if after is not None and coarse.change(here, after, float(every_node)) <= LARGEST_CHANGE:
+        if after is not None and coarse.change(here, after, float(stride)) <= LARGEST_CHANGE:
             states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > MOST_HALVINGS:
@@ -299,9 +300,9 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
     """
     before, run, frequency = carried.state, case.run(), case.block.steady[0]
     assert before is not None
-    setup, begins = case.begin(carried)
-    balance = setup.balance_of(begins)
-    found = run.state(balance, begins.at.predicted_h)
+    setup, last = case.begin(carried)
+    balance = setup.balance_of(last)
+    found = run.state(balance, last.at.predicted_h)
     if found is None:
         return replace(carried, state=None, outcome=Outcome.BRANCH_LOST)
     start = replace(carried, state=periodic_state(balance.joint, State(found.evaluation, before.start_history)))
@@ -319,9 +320,9 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
             break
         if here.excitation_amplitude == load if way == "ramp" else here.omega == 2.0 * np.pi * target:
             continue
-        line, (setup, begins) = case.line(way, load), case.begin(start)
+        line, (setup, last) = case.line(way, load), case.begin(start)
         parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
-        if not line.go_on_from(setup.case, replace(begins.point, parameter=parameter), target):
+        if not line.go_on_from(setup.case, replace(last.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)
         _, after = next(follow_line(line, np.array([target])))
         start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)

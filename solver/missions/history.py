@@ -82,8 +82,8 @@ class MissionProblem:
             return AS_ASKED
         longest = min(self.last - done, self.mission.largest_step or self.last)
         longest = min(longest, self.last if len(course.ends) > 2 else 1)
-        begins = state.runs if done or self.fine is None else self.fine.state.first
-        self._begun = [run.begun for run in begins] or [None] * len(self.mission.blocks)
+        earlier = state.runs if done or self.fine is None else self.fine.state.first
+        self._begun = [run.begun for run in earlier] or [None] * len(self.mission.blocks)
         taken = take_step(self, state, min(state.length, longest), Lengths(2, shortest=1, rescue=1))
         if isinstance(taken, Failure):
             return taken
@@ -115,7 +115,7 @@ class MissionProblem:
         self._failure = found
         return None
 
-    def judge(self, _: MissionState, end: Step, __: float) -> float:
+    def ratio(self, _: MissionState, end: Step, __: float) -> float:
         """As in Line."""
         return end.ratio
 
@@ -126,12 +126,12 @@ class MissionProblem:
     def _mission(
         self, state: MissionState, number: int, depth: FloatArray, with_slopes: bool
     ) -> tuple[BlockRun, ...] | Failure:
-        """Compute the blocks of the mission of a number behind a state. depth (n_contact,): m, before the mission."""
+        """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
         mission, carried = self.mission, state.runs[-1].last if state.runs else None
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.fine is not None:
             guides = self.fine.course.nodes[int(np.searchsorted(self.fine.course.counts, number))].guides
-        # as in a wear history: stability is tested at the begin and the end
+        # as in a wear history: stability is tested at the start and the end
         every = self.fine is None and number in (1, mission.missions[-1])
         runs: list[BlockRun] = []
         for place, (block, guide, begun) in enumerate(zip(mission.blocks, guides, self._begun, strict=True)):

@@ -66,7 +66,7 @@ class Block:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Frequencies at begin and end, Hz."""
+        """Frequencies at start and end, Hz."""
         of = self.frequency
         return (of.start, of.stop) if isinstance(of, Passage) else (of, of)
 
@@ -120,11 +120,11 @@ class MissionHistory(Presented):
       block and their propagation, harmonics, samples and start states; 0 where nothing has worn.
     - wear_depth, wear_depth_error (n_output, n_contact): m.
     - block_volume (n_output, n_block): m3, their sum is `worn_volume`; block_volume_error: relative.
-    - response_begin, response_end (n_output, n_block, n_response): complex first harmonic, m, at begin and end of each
+    - response_begin, response_end (n_output, n_block, n_response): complex first harmonic, m, at start and end of each
       block, in the mission that ends at the number, at 0 in the first one.
     - response_peak_begin, response_peak_end: largest magnitude over a period there, m.
     - response_error (n_output, n_block): relative, of these responses.
-    - excitation_frequency (n_block, 2): Hz, at begin and end of each block.
+    - excitation_frequency (n_block, 2): Hz, at start and end of each block.
     - reference_volume (n_output,): m3, worn volume of the reference solution.
     - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, of the damping ratio of the joint at rest; 0 where
       nothing wears and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).

@@ -139,7 +139,7 @@ def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tupl
     derivatives `slopes` (n_contact, n_contact) of their densities by the depth, 1/Hz.
     """
     unit = np.eye(states[0].density.size)
-    # columns: the wear, and the change of the depth behind the passage
+    # columns: the wear, and the change of the depth after the passage
     grown: FloatArray = np.zeros((len(unit), len(unit) + 1))
     last: tuple[SweptState, FloatArray, FloatArray] | None = None
     for state, slope in zip(states, slopes, strict=True):

@@ -57,14 +57,14 @@ class Formula:
 
     base (n_block, n_contact): m, by blocks.
     first, ahead (n_contact,): Z, and the depth at the end, of the parabola through three nodes before, m.
-    share: error over the difference of the end to `ahead`.
+    error_factor: error over the difference of the end to `ahead`.
     """
 
     base: FloatArray
     factor: float
     first: FloatArray
     ahead: FloatArray
-    share: float
+    error_factor: float
 
     @classmethod
     def of(cls, nodes: Nodes, length: int, area: FloatArray) -> Formula:
@@ -106,7 +106,7 @@ def attempt_step(nodes: Nodes, length: int, area: FloatArray, run: RunMission, s
     end, moved = depth + rates.sum(axis=0), first - (depth_now - rate_before)
     missed = np.abs(rate - rate_before - slope @ moved)
     part = np.abs(depth - first) @ area / max(float(np.abs(moved) @ area), 1e-300)
-    error = np.abs(formula.share * (end - formula.ahead)) + factor * part * missed
+    error = np.abs(formula.error_factor * (end - formula.ahead)) + factor * part * missed
     most = allowed_error(share, float(depth_now @ area), float(end @ area), now.count, length)
     after = _end_of(now, length, formula.base + (factor + 1.0) * rates, rates, runs, error)
     return Step(after, runs, float(np.nan_to_num(error @ area / most, nan=np.inf)))
@@ -123,7 +123,7 @@ def _one_mission(nodes: Nodes, area: FloatArray, runs: tuple[BlockRun, ...], sha
     # the error grows with the third divided difference
     growth = 2.0 * (2.0 + a) * (2.0 + a + b) / ((1.0 + a) * (1.0 + a + b))
     before, after = grown.sum(axis=0), (grown + rates).sum(axis=0)
-    error = two.share * growth * float(np.abs(after - two.first) @ area)
+    error = two.error_factor * growth * float(np.abs(after - two.first) @ area)
     most = 2.0 * allowed_error(share, float(before @ area), float(after @ area), now.count, 1)
     return Step(end, runs, float(min(0.25 * error / most, 1.0)))
 

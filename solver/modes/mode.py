@@ -129,7 +129,7 @@ class NonlinearMode:
         Nodes, too, are solved to the tolerance of results. Otherwise the dovetail, raised to 1.47e-3 m sqrt(kg),
         comes to another branch, on which no state is found at smaller amplitudes.
         """
-        here, run = states[-1], run.to(self.case.settings.tolerance)
+        here, run = states[-1], run.with_tolerance(self.case.settings.tolerance)
         history, last = history_at_rest(self.joint_of(here.values), here), here.evaluation.predicted_h
         growth = target / here.parameter
         grown = np.concatenate([last[:, :1], growth * last[:, 1:]], axis=1)

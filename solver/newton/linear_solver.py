@@ -59,7 +59,7 @@ _NEUTRAL_SHIFT = 1e-8
 
 @dataclass(frozen=True)
 class DenseFactor:
-    """LU factors and pivots of a Jacobian in some rows (n,) and their first harmonics; the identity elsewhere.
+    """LU factors and pivots of a Jacobian in some rows (n,) and their first coefficients; the identity elsewhere.
 
     exact: whether these are all rows of active pairs and all harmonics.
     """
@@ -79,9 +79,10 @@ class DenseFactor:
         """Solution (n_rel, m), approximate unless `exact`, for a right-hand side (n_rel, m)."""
         found = right.copy()
         if self.rows.size:
-            kept = len(self.factor[1]) // self.rows.size
-            inside = right[self.rows, :kept].ravel()
-            found[self.rows, :kept] = scipy.linalg.lu_solve(self.factor, inside, check_finite=False).reshape(-1, kept)
+            width = len(self.factor[1]) // self.rows.size
+            inside = right[self.rows, :width].ravel()
+            solved = scipy.linalg.lu_solve(self.factor, inside, check_finite=False)
+            found[self.rows, :width] = solved.reshape(-1, width)
         return found
 
 
@@ -92,13 +93,13 @@ Factor = DenseFactor | PeriodFactor
 def build_dense_factor(tangent: Linearisation) -> DenseFactor:
     """Factorisation of a Jacobian. Singular ones give infinities: Newton's method judges by the residual."""
     rows, m = tangent.active_rows, tangent.joint.basis.synthesis.shape[0]
-    kept = min(m, 2 * (LARGEST_DENSE // max(rows.size, 1) // 2) + 1)
-    matrix = tangent.dense(tangent.active, kept)
+    width = min(m, 2 * (LARGEST_DENSE // max(rows.size, 1) // 2) + 1)
+    matrix = tangent.dense(tangent.active, width)
     matrix[np.diag_indices_from(matrix)] += _NEUTRAL_SHIFT
     factor = matrix, np.zeros(0, np.int64)
     if rows.size:
         factor = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)[:2]
-    return DenseFactor(rows, factor, kept == m)
+    return DenseFactor(rows, factor, width == m)
 
 
 def build_factor(tangent: Linearisation) -> Factor:
@@ -186,19 +187,19 @@ class JacobianSolver:
         Where these outliers do not converge, this Jacobian is factorised instead of the kept one, and then densely.
         """
         if self._factor is not None and not self._factor.exact:
-            sign, settled = _judge(self._factor, tangent)
+            sign, settled = _sign_by_eigenvalues(self._factor, tangent)
             if settled:
                 return sign
         factor = build_factor(tangent)
         self._factor, self._corrections = factor, ()
-        sign, settled = (factor.sign, True) if factor.exact else _judge(factor, tangent)
+        sign, settled = (factor.sign, True) if factor.exact else _sign_by_eigenvalues(factor, tangent)
         if settled:
             return sign
         whole = build_dense_factor(tangent)
         return whole.sign if whole.exact else sign
 
 
-def _judge(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
+def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
     """Sign of the determinant from outlying eigenvalues of J P^-1, and whether these eigenvalues have converged."""
     shape = tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]
 

@@ -157,13 +157,13 @@ def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> Floa
                     state_t[n, 3 * pair + 1 + i] = left
             if n_rows > 0:
                 matrix = swept[2 * n_pairs * begin : 2 * n_pairs * end].reshape(n_rows, 2 * n_pairs)
-                held = np.dot(matrix, before)
+                by_history = np.dot(matrix, before)
                 for place in range(n_rows):
                     pair, i = row[begin + place] // 3, row[begin + place] % 3
                     total = 0.0
                     for k in range(3):
                         total += own[n, pair, i, k] * right_t[n, 3 * pair + k]
-                    pushed[place] = total - held[place]
+                    pushed[place] = total - by_history[place]
                 small = inverse[system : system + n_rows**2].reshape(n_rows, n_rows)
                 system += n_rows**2
                 change = np.dot(small, pushed[:n_rows])

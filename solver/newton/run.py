@@ -28,7 +28,7 @@ FULL_STEPS = 6
 SHORTEST_STEP = 1.0 / 128.0
 """Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate
 state. Also the shortest natural step over the range to the target (where a shorter one is needed, the branch is assumed
-to fold), and the shortest relaxation step in periods."""
+to fold), the shortest Euler step on the slow time over the wanted one, and the shortest relaxation step in periods."""
 
 
 class _HasResidual(Protocol):
@@ -211,7 +211,7 @@ class Run:
         """A part of the computation whose results do not depend on the factorisation kept so far."""
         return Run(self.tolerance, self.budget)
 
-    def to(self, tolerance: float) -> Run:
+    def with_tolerance(self, tolerance: float) -> Run:
         """The same run with another tolerance."""
         return replace(self, tolerance=tolerance)
 

@@ -148,7 +148,7 @@ def unstable_at_end(setup: WearingJoint, state: WearState) -> Failure | None:
     return find_instability(case, joint, state.at, setup.run, True)
 
 
-def why_endless(setup: WearingJoint, state: WearState, course: Course, final_share: float) -> Failure | None:
+def end_of_wear(setup: WearingJoint, state: WearState, course: Course, final_share: float) -> Failure | None:
     """Why a history to the end of wear ends: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
     largest = state.largest_rates[:-1]
     if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():

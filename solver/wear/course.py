@@ -64,7 +64,7 @@ class Course:
 
     @cached_property
     def counts(self) -> FloatArray:
-        """Counts (n_node,) at the nodes; `depths`, m, `rates`, m per count, (n_node, k), `volumes`, m3, as well."""
+        """Counts (n_node,) at the nodes, of cycles or missions."""
         return np.array([node.count for node in self.nodes])
 
     @cached_property

@@ -108,11 +108,11 @@ def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rto
     return Solutions(own, adaptive, integrations.reference(asked, guide, compared, spent))
 
 
-def _counts(asked: SlowTime, fine: Solution) -> FloatArray:
+def _counts(asked: SlowTime, own: Solution) -> FloatArray:
     """Counts (n_output,) at which a history is read."""
     if not isinstance(asked.cycles, ToTheEnd):
         return asked.cycles
-    return np.zeros(asked.cycles.n_outputs) if fine.state is None else fine.course.even_counts(asked.cycles.n_outputs)
+    return np.zeros(asked.cycles.n_outputs) if own.state is None else own.course.even_counts(asked.cycles.n_outputs)
 
 
 def compare(
@@ -136,8 +136,8 @@ def compare(
     return both, history_error(both, steps, area)
 
 
-def _compare(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
-    """A history beside what it is compared with at ascending counts, and its errors there."""
+def _compare_own(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
+    """A history of any steps beside what it is compared with at ascending counts, and its errors there."""
     own, reference = solutions.own.course, solutions.reference
     adaptive = own if solutions.adaptive.state is None else solutions.adaptive.course
     both, error = compare(counts, adaptive, None if reference is None else reference.course, own.area, follows=follows)
@@ -149,29 +149,29 @@ def _compare(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tupl
 
 def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, solutions: Solutions) -> WearHistory:
     """The result, not judged yet."""
-    fine, area, counts = solutions.own, model.contact.area, _counts(asked, solutions.own)
+    own, area, counts = solutions.own, model.contact.area, _counts(asked, solutions.own)
     failure = solutions.failure
-    both, error = _compare(solutions, counts, follows=asked.follow is not None)
-    own, target = both.fine, fine.course.reached
+    both, error = _compare_own(solutions, counts, follows=asked.follow is not None)
+    found, target = both.fine, own.course.reached
     ends_at_target = target <= asked.end
     return WearHistory(
-        **{name: value for name, value in own.items() if name in _REPORTED}
+        **{name: value for name, value in found.items() if name in _REPORTED}
         | {f"{name}_error": values for name, values in vars(error).items()}
-        | ({} if fine.state is None else _of_state(fine.state, asked.end)),
+        | ({} if own.state is None else _of_state(own.state, asked.end)),
         outcome=failure.outcome,
         message=failure.message,
         cycles=counts,
-        worn_volume=own["wear_depth"] @ area,
+        worn_volume=found["wear_depth"] @ area,
         reference_volume=both.other("wear_depth") @ area,
         error_estimate=math.nan,
         newton_iterations=start.newton_iterations + sum(each.iterations for each in solutions.all),
         run_time=start.run_time + sum(each.seconds for each in solutions.all),
-        last_cycle=math.nan if fine.state is None else min(fine.course.ends[-1], float(counts[-1])),
+        last_cycle=math.nan if own.state is None else min(own.course.ends[-1], float(counts[-1])),
         branch=start.branch,
         fold_frequency=start.fold_frequency,
         cycles_to_target=target if ends_at_target else math.nan,
         cycles_to_target_error=_target_error(solutions, asked) if ends_at_target else math.nan,
-        cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
+        cut_off_cycle=first_cut_off(model.contact, counts, found["mean_pressure"], found["wear_depth"]),
     )
 
 
@@ -195,6 +195,6 @@ def _target_error(solutions: Solutions, asked: SlowTime) -> float:
     if other is None or until is None:
         return math.inf
     at, by_interpolation = course.reach(until)
-    both, error = _compare(solutions, np.array([0.0, at]), follows=asked.follow is not None)
+    both, error = _compare_own(solutions, np.array([0.0, at]), follows=asked.follow is not None)
     of_other = other.course.reach(until)[0]
     return error_of_target(until, at, of_other, both.fine, course.nodes[-1].rate, error, course.area) + by_interpolation

@@ -30,7 +30,7 @@ from solver.packing import in_rows
 from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, FollowedFrequency, Resolution, SolverSettings, ToTheEnd, WearTarget
 from solver.structure.joint import Case
-from solver.wear.check import full_check, report_only, unstable_at_end, why_endless
+from solver.wear.check import end_of_wear, full_check, report_only, unstable_at_end
 from solver.wear.course import Course, Node
 from solver.wear.slow_time import AS_ASKED, RTOL_RATIO, Guide, Integrator, Solution
 from solver.wear.step import Adaptive, Steps, WearLine
@@ -130,7 +130,7 @@ class WearProblem:
         if still or not math.isnan(course.reached) or course.ends[-1] >= self.end * (1.0 - 1e-12):
             found = AS_ASKED
         elif isinstance(cycles, ToTheEnd) and self.end == math.inf:
-            found = why_endless(self.setup, state, course, cycles.final_share)
+            found = end_of_wear(self.setup, state, course, cycles.final_share)
         if found is None and state.wears and self.budget.iterations > most:
             found = Failure(Outcome.MARCH_FAILED)
         if found is AS_ASKED and self.stable_end:
@@ -192,7 +192,7 @@ class Integrations:
         compared (n,): ascending counts at which it is read, the first 0. spent: as for `history`.
         """
         setup = self._joint(asked)
-        setup.run = setup.run.to(self._case.settings.rough_tolerance)
+        setup.run = setup.run.with_tolerance(self._case.settings.rough_tolerance)
         resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in guide.resolutions)
         problem = WearProblem(setup, asked, float(compared[-1]), replace(guide, resolutions=resolutions))
         course = Course(setup.area, compared)

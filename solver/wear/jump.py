@@ -31,7 +31,7 @@ from solver.wear.wearing_joint import WearingJoint, WearState
 
 
 def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
-    """A stable state of depths (n_contact,), m, behind the end of a branch: with a hold, or of another branch."""
+    """A stable state of depths (n_contact,), m, beyond the end of a branch: with a hold, or of another branch."""
     setup.run.budget.limit = setup.run.budget.iterations + SEARCH_ITERATIONS
     reached = _held(setup, state, worn) or _on_another_branch(setup, state, worn)
     if isinstance(reached, Failure) and reached.outcome is Outcome.ADRIFT:

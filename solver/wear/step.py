@@ -13,7 +13,7 @@
     P = W_n + (1 + w) h_n g_n - w^2 (W_n - W_(n-1)),      e = c / (c + c_P) (W_(n+1) - P),
     c = (1 + w)^2 / (6 w (1 + 2 w)),      c_P = (1 + 1 / w) / 6.
 
-  The first step, also behind a jump, is an implicit Euler step. Its error is the difference to the trapezoidal rule.
+  The first step, also after a jump, is an implicit Euler step. Its error is the difference to the trapezoidal rule.
 
 The wear of other pairs changes the force of a pair, which slides a little in each cycle at its friction limit. Where it
 ends depends on the path of the force. One slide for the whole path is an error of first order in the step (dovetail, 16
@@ -62,7 +62,7 @@ FIRST_STEP, FIRST_DEPTH = 0.05, 0.01
 largest wear, as a fraction of the largest relative motion."""
 
 SHORTEST_SLOW_STEP = 1e-4
-"""Shortest adaptive step at the begin, as a fraction of the first step."""
+"""Shortest adaptive step at the start, as a fraction of the first step."""
 
 DOUBLINGS_ACROSS = 4
 """Most doublings of the shortest step to go across corners. Dovetail, mesh 2, nodal diameter 3, 213.5 Hz: four steps
@@ -71,7 +71,7 @@ across, by 3, 2, 2 and 4 doublings, errors 0.1 to 2.7 times the allowed ones; el
 
 @dataclass(frozen=True)
 class Given:
-    """Euler steps of `length` cycles, which end at its multiples also behind a shorter step: equal steps in `k_w h` of
+    """Euler steps of `length` cycles, which end at its multiples also after a shorter step: equal steps in `k_w h` of
     histories that differ in k_w only. To the end of wear, each step wears about as much as the first one.
 
     depth: in place of the length, wear of the fastest pair at the rate of the start of a step, m, Eq. (22).
@@ -177,7 +177,7 @@ class WearLine:
             return attempt_step(self.setup, state, length, "adaptive")
         return self._euler_step(state, length, self.steps.scheme)
 
-    def judge(self, state: WearState, step: Step, length: float) -> float:
+    def ratio(self, state: WearState, step: Step, length: float) -> float:
         """As in Line: an Euler step counts whatever its error, the shortest adaptive step where the vibration changes
         little: at a corner of the wear rate.
         """
@@ -198,11 +198,11 @@ class WearLine:
         worn = state.depth + length * setup.rate(state.at)
         if (failure := self._refused(state, worn, length)) is not None:
             return failure
-        behind = jump(setup, state, worn, state.cycle + length)
-        if isinstance(behind, Failure):
-            return setup.lost(state, behind)
-        behind = setup.at_followed(behind)
-        return behind if isinstance(behind, Failure) else Step(behind)
+        beyond = jump(setup, state, worn, state.cycle + length)
+        if isinstance(beyond, Failure):
+            return setup.lost(state, beyond)
+        beyond = setup.at_followed(beyond)
+        return beyond if isinstance(beyond, Failure) else Step(beyond)
 
     def _euler_step(self, state: WearState, length: float, scheme: Scheme) -> Step | None:
         """An Euler step to a stable state, or None. A followed resonance may be unstable at constant frequency."""

@@ -239,7 +239,7 @@ class WearingJoint:
         return found or self.lost(state, Failure(Outcome.RESONANCE_LOST))
 
     def lost(self, state: WearState, failure: Failure) -> Failure:
-        """The end of a history where a search behind its last state has failed."""
+        """The end of a history where a search beyond its last state has failed."""
         if self.follow is None:
             return failure
         at = f"at cycle {in_digits(state.cycle)} and {state.omega / (2.0 * math.pi):.6g} Hz"

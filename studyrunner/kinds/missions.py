@@ -6,21 +6,23 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, replace
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from solver.contact.wear_law import WearLaw
+from solver.missions import mission as of_solver
+from solver.missions.mission import Begin, Passage
 from solver.packing import Packed
-from solver.settings import WearTarget
+from solver.settings import Direction, WearTarget
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
 from studyrunner.kinds.task import (
     Identity,
     Index,
     Joint,
     Keep,
+    LastProgress,
     PointResult,
-    Reached,
     Task,
     TaskPlan,
     described,
@@ -56,31 +58,30 @@ _NO_JOINT = Joint(0, None)
 class PlannedBlock:
     """A block of a mission.
 
-    frequency: Hz; where it starts for a passage. passage: where the frequency stops, Hz, and its rate, Hz/s; None for
-    steady vibration. excitation_amplitude: N. cycles: in one mission. begin: "ramp", "up", "down" or "continue".
+    frequency: Hz, or a passage. excitation_amplitude: N. cycles: in one mission, also of a passage. begin: as in the
+    `Block` of the solver.
     """
 
     name: str
     joint: Joint
-    frequency: float
-    passage: tuple[float, float] | None
+    frequency: float | Passage
     excitation_amplitude: float
     cycles: float
-    begin: str
+    begin: Begin
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mission(Task):
     """A mission history: blocks of vibration, one after the other, many times. It has one result.
 
-    begin: how the first mission begins where its first block continues; "" elsewhere.
+    first: how the first mission begins where its first block continues; "" elsewhere.
     missions: numbers of missions of the output. until: wear at which the history ends before the last of them.
     """
 
     blocks: tuple[PlannedBlock, ...]
     law: WearLaw
     wear_coefficient: float
-    begin: str
+    first: str
     missions: tuple[float, ...]
     until: WearTarget | None
 
@@ -103,30 +104,28 @@ class Mission(Task):
         """Hash of the history: of all blocks with their scenes."""
         blocks = [(identity.joint(block.joint), astuple(replace(block, joint=_NO_JOINT))) for block in self.blocks]
         until = None if self.until is None else astuple(self.until)
-        wear = (self.wear_coefficient, asdict(self.law), self.begin, described(self.settings))
+        wear = (self.wear_coefficient, asdict(self.law), self.first, described(self.settings))
         return (digest("mission", blocks, wear, self.missions, until, identity.record),)
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """The history."""
-        from solver.missions import mission as of_solver
+        # numba is loaded where a task runs, so that --plan and --help do without it
         from solver.missions.history import integrate_missions
 
         of_joints = {block.joint: block.joint.model(models) for block in self.blocks}
         blocks = tuple(
             of_solver.Block(
                 model=of_joints[block.joint],
-                frequency=block.frequency
-                if block.passage is None
-                else of_solver.Passage(block.frequency, *block.passage),
+                frequency=block.frequency,
                 excitation_amplitude=block.excitation_amplitude,
                 friction_coefficient=block.joint.friction_coefficient,
-                cycles=block.cycles if block.passage is None else None,
-                begin=cast("Literal['ramp', 'up', 'down', 'continue']", block.begin),
+                cycles=None if isinstance(block.frequency, Passage) else block.cycles,
+                begin=block.begin,
                 name=block.name,
             )
             for block in self.blocks
         )
-        reached, n_computed = Reached(self, keep), itertools.count(1)
+        reached, n_computed = LastProgress(self, keep), itertools.count(1)
         # as many again for the reference solution
         n_planned = 2 * max(1, missions_computed(self.missions[-1]))
 
@@ -137,8 +136,8 @@ class Mission(Task):
         kept = {int(number) for number in self.missions}
         # with those before, for the wear of one
         read = tuple(sorted({0, 1} | kept | {max(number - 1, 0) for number in kept}))
-        begin = cast("Literal['up', 'down', 'ramp']", self.begin)
-        mission = of_solver.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, begin)
+        first = cast("Direction", self.first)
+        mission = of_solver.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
         history = integrate_missions(mission, note, self.resume)
         raise_fault(history.outcome, history.message)
         yield PointResult(self.points(0), _values(self, history), progress=reached.after(history.outcome))
@@ -174,14 +173,14 @@ def _blocks(
             getattr(study.axes, name)[0 if given.gives(name) else at[name]]
             for name in ("excitation_amplitude", "frequency")
         )
-        passage, begin = None, str(given.begin)
+        begin: str = part.axes.sweep[at["sweep"]] if given.begin == "sweep" else given.begin
         if isinstance(given.frequency, dict):
-            frequency, stop = given.frequency["start"], given.frequency["stop"]
-            passage, begin = (stop, given.frequency["rate"]), "up" if stop > frequency else "down"
-        elif begin == "sweep":
-            begin = part.axes.sweep[at["sweep"]]
+            frequency = Passage(**given.frequency)
+            begin, cycles = frequency.sweep, frequency.cycles
+        else:
+            cycles = given.cycles_at(frequency)
         joint = joint_of(study, scene, contact)
-        yield PlannedBlock(given.name, joint, frequency, passage, amplitude, given.cycles_at(frequency), begin)
+        yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))
 
 
 def _task(
@@ -195,7 +194,10 @@ def _task(
     settings = settings_at(study, at)
     n_unknowns = max(n_unknowns_of(number, settings.harmonics) for number in n_displacements)
     ways = [
-        (block.begin, abs(math.log2(block.passage[0] / block.frequency)) if block.passage else 0.0) for block in blocks
+        (block.begin, abs(math.log2(block.frequency.stop / block.frequency.start)))
+        if isinstance(block.frequency, Passage)
+        else (block.begin, 0.0)
+        for block in blocks
     ]
     one_pair = n_displacements[0] <= _OF_ONE_PAIR
     return Mission(
@@ -205,8 +207,7 @@ def _task(
         blocks=blocks,
         law=part.study.wear.as_law,
         wear_coefficient=part.study.axes.wear_coefficient[at["wear_coefficient"]],
-        # only a first block that continues begins by it
-        begin=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",
+        first=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",
         missions=study.cycles_kept,
         variables=tuple(study.recorded),
         until=study.until,

@@ -48,8 +48,8 @@ class ScaledHistory:
 class Integrated:
     """A history that is integrated, and the histories of other points that are read from it.
 
-    scheme, largest_depth: as in `SlowTime`. histories: one result each. The first is integrated; it needs the most
-    cycles. unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles.
+    scheme, largest_depth: as for `steps_of` of the solver. histories: one result each. The first is integrated; it
+    needs the most cycles. unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles.
     """
 
     scheme: str

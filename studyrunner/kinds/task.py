@@ -274,8 +274,8 @@ def raise_fault(outcome: Outcome, message: str) -> None:
         raise MachineFaultError(message)
 
 
-class Reached:
-    """Hands the progress of a task on, and remembers the last. last: None where there is none."""
+class LastProgress:
+    """Passes the progress of a task on to `keep`, and has the last of it; None where there is none."""
 
     def __init__(self, task: Task, keep: Keep) -> None:
         self.last = task.resume

@@ -22,8 +22,8 @@ from studyrunner.kinds.task import (
     Index,
     JointTask,
     Keep,
+    LastProgress,
     PointResult,
-    Reached,
     StartResult,
     described,
     digest,
@@ -51,7 +51,7 @@ _digest_once = lru_cache(maxsize=16)(digest)
 
 @dataclass(frozen=True, kw_only=True)
 class _FromRest(JointTask):
-    """A task that needs start states.
+    """A task with start states: it gives them, or begins from one.
 
     excitation_amplitude: N. direction: "up", "down" or "ramp". follow: what the frequency follows; None where given.
     """
@@ -223,12 +223,11 @@ class History(_FromRest):
 
         if self.start is None:
             raise TypeError(f"task without a start state: {self}")
-        reached, progress = Reached(self, keep), None
+        reached, progress = LastProgress(self, keep), None
         needed: dict[Integrated, list[int]] = {}
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
         model, friction = self.joint.model(models), self.joint.friction_coefficient
-        # at all counts at which one of the others is read
         asked, start = [self._asked(each) for each in needed], unpack(self.start)
         histories = integrate_together(model, friction, self.settings, start, asked, reached, self.resume)
         for (each, places), history in zip(needed.items(), histories, strict=True):

@@ -96,7 +96,7 @@ def _end_of_shared(
 def _of_target(
     task: History, history: WearHistory, known: NDArray[np.intp], target: float, error: float, *, whole: bool
 ) -> str:
-    """That the target of a history was not reached, or that the counts behind it are not computed; else empty.
+    """That the target of a history was not reached, or that the counts after it are not computed; else empty.
 
     known: its rows that were reached. error: of the count `target`. whole: whether these are all.
     """

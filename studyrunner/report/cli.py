@@ -151,15 +151,15 @@ def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Resul
 
     given: dict[str, Any] = {"path": options.result, "folder": folder, "point": options.point}
     asked = {"loops": options.loops, "natural_frequencies": options.natural_frequencies}
-    again, why = compute_worn_joint(**given, **asked) if any(asked.values()) else {}, ""
+    recomputed, why = compute_worn_joint(**given, **asked) if any(asked.values()) else {}, ""
     if not options.no_compute and has_worn_response(result):
         print("study-report: computing the response of the worn joint (--no-compute leaves it out)", file=sys.stderr)
         try:
-            again |= compute_worn_joint(**given, response=True)
+            recomputed |= compute_worn_joint(**given, response=True)
         except UserError as error:
             # a report of what there is, where the scene is gone or the file has no depths
             why = str(error)
-    return replace(result, again=again, no_worn_response=why)
+    return replace(result, recomputed=recomputed, no_worn_response=why)
 
 
 def _make_folder(folder: Path) -> None:

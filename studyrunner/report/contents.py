@@ -95,7 +95,7 @@ class Entry:
         return Drawing(self.name, title, caption, figure, lambda: cast("Any", self._drawn(shown, COLUMN_WIDTH))[0])
 
     def _drawn(self, result: Result, width: float) -> Drawn:
-        # the style is that of the whole process: it is not left on while the caller has the word
+        # the style is that of the whole process: the caller does not run with it
         with style(width):
             drawn = self.draw(result)
             if isinstance(drawn, tuple) and not drawn[0].legends:

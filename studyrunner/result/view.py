@@ -55,8 +55,8 @@ class Result:
     dataset: read lazily; a variable that was read as a whole stays in memory. fixed: axes of which this holds one value
     of several, and how many the file has. blocks: of missions what belongs to single blocks; in `dataset` missions then
     have the name of cycles. chosen: values of axes of the point that figures of a single point show. measured: a worn
-    profile to compare with. again: what was computed anew of the worn joint of the shown point, see
-    `studyrunner.worn_joint`. no_worn_response: why its response curve is not among them.
+    profile to compare with. recomputed: of the worn joint of the shown point, by `studyrunner.worn_joint`.
+    no_worn_response: why its response curve is not among them.
     """
 
     path: Path
@@ -65,7 +65,7 @@ class Result:
     blocks: xr.Dataset | None = None
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None
-    again: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    recomputed: Mapping[str, xr.Dataset] = field(default_factory=dict)
     no_worn_response: str = ""
 
     @property
@@ -262,7 +262,7 @@ class Result:
         return own if ascend else numbers
 
     def last_reached(self, point: Point) -> int:
-        """Index of the last cycle count at which a point holds values: one at its target has none behind it."""
+        """Index of the last cycle count at which a point holds values: one at its target has none after it."""
         counts = self.counts(point)
         last = self.last_cycle[tuple(point[name] for name in self.axes)]
         reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))

@@ -133,7 +133,7 @@ def test_nodes_of_a_mode_are_solved_to_the_tolerance_of_results():
     amplitudes = np.geomspace(rest.first_amplitude, 2e-5, 20)
     states = (rest.raised(amplitudes[0], run),)
     for amplitude in amplitudes[1:]:
-        states = (*states[-1:], rest.mode.solve(states, amplitude, run.to(FIXED.rough_tolerance)))
+        states = (*states[-1:], rest.mode.solve(states, amplitude, run.with_tolerance(FIXED.rough_tolerance)))
         assert states[-1].evaluation.scaled_residual() <= FIXED.tolerance
 
 

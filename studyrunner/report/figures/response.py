@@ -38,30 +38,30 @@ _Curves = dict[int, tuple[FloatArray, FloatArray]]
 
 def draw_responses(result: Result) -> Drawn:
     """Amplitude of the first harmonic over frequency, a panel a response: of the new and of the shown worn joint."""
-    course, again = find_course(result, "frequency"), result.again.get("response")
-    if course is None and again is None:
+    course, curves = find_course(result, "frequency"), result.recomputed.get("response")
+    if course is None and curves is None:
         said = "The study has one frequency: give several under [axes] frequency"
         return f"{result.no_worn_response or said}."
     if course is not None and result.cycles[0] != 0.0:
         return "The file holds no new joint: add 0 to slow_time.outputs."
-    if again is not None:
-        again = again.sel(response=list(result.responses))
+    if curves is not None:
+        curves = curves.sel(response=list(result.responses))
     n_panels = min(len(result.responses), _MOST_RESPONSES)
     figure, panels = plot.new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
     unit = str(result.dataset["response_amplitude"].attrs.get("units", "m"))
-    sizes = [each["response_amplitude"].isel(cycle=0).values for each in (result.dataset, again) if each is not None]
+    sizes = [each["response_amplitude"].isel(cycle=0).values for each in (result.dataset, curves) if each is not None]
     scale, peaks, left_out = scale_for(unit, *sizes), list[str](), ("", "")
     for number, panel in reversed(list(enumerate(panels[:, 0]))):
         new, left_out = _draw_new(result, panel, course, scale, number) if course else ([], left_out)
-        peaks = new + (_draw_again(panel, again, scale, number) if again is not None else [])
+        peaks = new + (_draw_recomputed(panel, curves, scale, number) if curves is not None else [])
         plot.set_from_zero(panel)
         panel.set_ylabel(scale.label(f"amplitude of {result.responses[number]}"))
     panels[-1, 0].set_xlabel("excitation frequency (Hz)")
     return (
         figure,
         f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(filter(None, peaks))}",
-        f"One joint, {again.attrs['title']}: its response curve at that wear, without further wear" if again else "",
-        f"{again.attrs['how']}" if again else "",
+        f"One joint, {curves.attrs['title']}: its response curve at that wear, without further wear" if curves else "",
+        f"{curves.attrs['how']}" if curves else "",
         f"Without the curve of the worn joint: {result.no_worn_response}" if result.no_worn_response else "",
         "More responses are in the file" if len(result.responses) > n_panels else "",
         *left_out,
@@ -101,14 +101,14 @@ def _draw_new(
     return peaks, (plot.mark_failed(panel, course.values, np.isnan(lines)), choice.sentence)
 
 
-def _draw_again(panel: Axes, again: xr.Dataset, scale: Scale, number: int) -> list[str]:
+def _draw_recomputed(panel: Axes, curves: xr.Dataset, scale: Scale, number: int) -> list[str]:
     """Lines of a response computed again, of the worn joint and where it is there of the new one; their peaks."""
-    frequency, peaks = again["frequency"].values, []
-    for cycle in range(again.sizes["cycle"]):
-        is_new = again.sizes["cycle"] > 1 and cycle == 0
-        values = again["response_amplitude"].isel(cycle=cycle, response=number).values
-        label, look = ("new joint", plot.line_style(0)) if is_new else (str(again.attrs["title"]), _WORN)
-        error = again["response_error"].isel(cycle=cycle).values * values
+    frequency, peaks = curves["frequency"].values, []
+    for cycle in range(curves.sizes["cycle"]):
+        is_new = curves.sizes["cycle"] > 1 and cycle == 0
+        values = curves["response_amplitude"].isel(cycle=cycle, response=number).values
+        label, look = ("new joint", plot.line_style(0)) if is_new else (str(curves.attrs["title"]), _WORN)
+        error = curves["response_error"].isel(cycle=cycle).values * values
         plot.add_line(panel, frequency, scale(values), scale(error), label=label, **look)
         peaks.append(_show_peak(scale, values, frequency, label))
     return peaks
@@ -234,7 +234,7 @@ def find_loops(result: Result, point: Point) -> list[int]:
 
 def _read_loops(result: Result) -> dict[int, xr.Dataset]:
     """Loops of the most worn pairs at the first and last count: those computed again, or those of the file."""
-    point, source = result.shown_point(), result.again.get("loops")
+    point, source = result.shown_point(), result.recomputed.get("loops")
     if source is None and find_loops(result, point):
         source = result.dataset[["loop_displacement", "loop_force"]].isel(point)
     if source is None:
@@ -276,8 +276,8 @@ def _describe_drift(result: Result, loops: Mapping[int, xr.Dataset], words: Mapp
 
 def _how_made(result: Result, loops: Mapping[int, xr.Dataset]) -> str:
     """How loops of a worn joint were computed again, or which of the file are not shown."""
-    if "loops" in result.again:
-        return str(result.again["loops"].attrs["how"])
+    if "loops" in result.recomputed:
+        return str(result.recomputed["loops"].attrs["how"])
     others = ", ".join(str(pair) for pair in find_loops(result, result.shown_point()) if pair not in loops)
     return f"The file also holds loops of the pairs {textwrap.shorten(others, 40)}" if others else ""
 

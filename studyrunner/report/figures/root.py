@@ -122,7 +122,7 @@ def draw_disk(result: Result) -> Drawn:
 
 def draw_sector(result: Result) -> Drawn:
     """The natural frequencies over the nodal diameter, and the mesh beside them where the file holds one."""
-    if not result.has("natural_frequency") and "natural_frequencies" not in result.again:
+    if not result.has("natural_frequency") and "natural_frequencies" not in result.recomputed:
         return "Use study-report --natural-frequencies, or add natural_frequency to [outputs] variables."
     has_mesh = result.has(*MESH)
     ratios = [1.0, 1.7] if has_mesh else [1.0]
@@ -139,7 +139,7 @@ def draw_sector(result: Result) -> Drawn:
 
 def _draw_frequencies(result: Result, panel: Axes) -> str:
     """Frequencies (nodal_diameter, mode) over the nodal diameter, one line a mode; what is seen."""
-    source = result.again.get("natural_frequencies", result.dataset)
+    source = result.recomputed.get("natural_frequencies", result.dataset)
     frequencies = source["natural_frequency"].transpose("nodal_diameter", "mode").values
     for number, mode in enumerate(frequencies.T):
         style = {"linewidth": 0.8, "markersize": 3.5, "marker": plot.line_style(number)["marker"], "color": "0.35"}

@@ -95,7 +95,7 @@ def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: Choice, sc
 
 
 def _mark_events(result: Result, panel: Axes, point: Point, cycles: Scale, scale: Scale, colour: str) -> None:
-    """Where a branch was lost, where a history ended early, and the exact answer behind it."""
+    """Where a branch was lost, where a history ended early, and the exact answer under both."""
     worn, counts = result.at("worn_volume", point).values, result.counts(point)
     jump = float(result.at("jump_cycle", point).values) if result.has("jump_cycle") else np.nan
     reached = np.flatnonzero(np.isfinite(worn))
@@ -271,7 +271,7 @@ def draw_shares(result: Result) -> Drawn:
 
 
 def draw_block_responses(result: Result) -> Drawn:
-    """Amplitude of the first response over the missions, at the begin of each block and at its end."""
+    """Amplitude of the first response over the missions, at the start of each block and at its end."""
     if len(result.cycles) == 1:
         return None
     blocks = _read_blocks(result)
