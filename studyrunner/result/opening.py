@@ -43,8 +43,8 @@ _MOST_VALUES = 2**27  # of a variable without contact pairs, which may be read a
 _MOST_NAMES = 2**20  # values along any dimension
 _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
-_INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", *CERTIFICATE)
-"""Ends of the names of variables that may be infinite: errors that are not known, what comes after any cycle."""
+_INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", "sweep_rate", *CERTIFICATE)
+"""Ends of the names of variables that may be infinite: errors not known, after any cycle, rates without damping."""
 _LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
 _LONGEST = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanings": 50 * _LONGEST_SENTENCE}
 _ATTRIBUTES = (*_LONGEST, "sentences", "flag_values")  # of variables, for the report

@@ -54,6 +54,13 @@ def test_the_report_has_blocks_and_counts_missions(results):
     assert [row[:3] for row in found["blocks"].rows] == rows
 
 
+def test_a_passage_of_a_joint_without_damping_has_an_infinite_rate(results, tmp_path):
+    with xr.open_dataset(results / "one.nc") as dataset:
+        without = dataset.load().assign(sweep_rate=dataset.sweep_rate + [np.inf, 0.0, 0.0])
+    without.to_netcdf(tmp_path / "without.nc")
+    assert [row[-1] for row in items(tmp_path / "without.nc")["blocks"].rows] == ["inf", "-", "-"]
+
+
 def test_figures_of_blocks_have_the_numbers_of_the_file(results):
     found = items(results / "one.nc")
     with xr.open_dataset(results / "one.nc") as dataset:
