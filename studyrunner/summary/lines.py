@@ -144,7 +144,7 @@ def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
 
 
 def _life(life: Life, summary: Summary) -> str:
-    units = {"wear_depth": "m", "worn_volume": "m3", "frequency_shift": "Hz"}.get(life.quantity, "1")
+    units = {"wear_depth": "m", "worn_volume": "m3"}.get(life.quantity, "1")
     target = f"{life.quantity.replace('_', ' ')} {_show(life.target, units)}"
     unsure = f"; the life of {count(life.n_unsure, 'point')} is not known" if life.n_unsure else ""
     if math.isnan(life.count.value):
