@@ -172,9 +172,8 @@ def settings_of(result: Result, place: tuple[int, ...]) -> Used:
     schemes, sweeps = (
         tuple(map(str, dataset[name].values)) if name in result.axes else () for name in ("scheme", "sweep")
     )
-    if result.has_modes:
-        # a mode has no ramp to advise
-        sweeps = (*sweeps, "ramp")
+    # the modal amplitude of a mode is raised or lowered only
+    sweeps += ("ramp",) if result.has_modes else ()
     return Used(
         scheme=str(of["scheme"]),
         sweep=str(of["sweep"]),

@@ -194,7 +194,7 @@ def check_study_model(study: Study, picture: Path, progress: Callable[[str], Non
         what = f"{study.scene.model} is none"
         if study.scene.group:
             what = f"the result holds the reduced scene of {study.scene.model}"
-        remedy = f"give a study of a finite-element model: {what}; --plan tells what is computed"
+        remedy = f"give a study of a finite-element model: {what}; --plan shows what is computed"
         raise UserError("command line", "--check", study.source, remedy)
     # what reads and reduces it is loaded where there is one
     from studies.fe_models.from_files.check import describe_model

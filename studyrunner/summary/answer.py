@@ -32,6 +32,7 @@ from studyrunner.summary.wear import (
     vibration_of,
     where_is,
 )
+from studyrunner.system.progress import count
 from studyrunner.units import show_number
 
 SMALL = 0.1
@@ -121,7 +122,7 @@ def summarise(result: Result) -> Summary:
         shortest_life(result),
         compare_meshes(result),
         stuck_frequency=stuck,
-        doubts=tuple(filter(None, (_not_small(result), _in_radians(result, stuck)))),
+        doubts=tuple(filter(None, (_not_small(result), _in_radians(result, stuck), _too_few_counts(result)))),
     )
 
 
@@ -203,3 +204,15 @@ def _in_radians(result: Result, first: float) -> str:
     if not (2.0 * math.pi * values.min() > 2.0 * first and 0.5 * first < values.max() and values.min() < 2.0 * first):
         return ""
     return f"all frequencies are far above the first resonance, {first:.6g} Hz: are they in rad/s?"
+
+
+def _too_few_counts(result: Result) -> str:
+    """Points that reach their target before the first count at which the file could hold wear."""
+    if not result.has("cycles_to_target", "worn_volume") or result.dataset.sizes["cycle"] < 2:
+        return ""
+    at_second = result.over_points("worn_volume", lambda values: values[:, 1])
+    early = result.computed & np.isfinite(result.dataset["cycles_to_target"].values) & np.isnan(at_second)
+    if not early.any():
+        return ""
+    points = count(int(np.count_nonzero(early)), "point")
+    return f"no worn volume is stored for {points}: the target comes before the second of slow_time.outputs: give more"

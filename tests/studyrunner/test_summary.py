@@ -177,11 +177,21 @@ def test_the_shortest_life():
     assert never.n_beyond == 3
 
 
-def test_a_shift_of_the_frequency_is_relative():
-    study = ("axes.frequency=1", "axes.scheme=adaptive", "slow_time.until={frequency_shift=0.002}")
-    made = wearing(*study, cycles_to_target=lambda _: 300.0, cycles_to_target_error=lambda _: 3.0)
+def test_a_target_before_the_second_count_and_one_without_a_unit():
+    volume = np.where(np.arange(21) > 0, math.nan, 0.0)
+    made = wearing(
+        "axes.frequency=1",
+        "axes.scheme=adaptive",
+        "slow_time.until={frequency_shift=0.01}",
+        volume=lambda _: volume,
+        cycles_to_target=lambda _: 300.0,
+        cycles_to_target_error=lambda _: 3.0,
+        error_estimate=lambda _: math.nan,
+    )
     lines = summary_lines(summary(made))
-    assert any(line.startswith("life") and line.endswith("to frequency shift 0.002") for line in lines)
+    assert any("slow_time.outputs: give more" in line for line in lines)
+    assert any(line.endswith("to frequency shift 0.01") for line in lines)
+    assert not summary(made.assign(worn_volume=made["worn_volume"].fillna(0.0))).doubts
 
 
 # --- certainty and failures ---
@@ -214,6 +224,14 @@ def test_points_that_failed_or_were_never_estimated_are_not_known():
         ("sensitive", True, 1),
     ]
     assert "computed up to 5000 cycles" in found.failures[0].reason.replace("\N{NO-BREAK SPACE}", "")
+
+
+def test_a_mode_that_is_not_found_gets_no_advice_that_is_an_error():
+    study = read_study("modes", ("axes.modal_amplitude=1e-4", "axes.sweep=up"))
+    made = made_result(study, outcome=lambda _: int(Outcome.START_FAILED))
+    (failure,) = summary(made).failures
+    assert "down" in failure.advice
+    assert "ramp" not in failure.advice
 
 
 def test_the_summary_is_short_whatever_came_out():
