@@ -21,7 +21,7 @@ from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
 from solver.wear.course import Course, Node
-from solver.wear.integrate import Integrations, SlowTime
+from solver.wear.integrate import Integrations, WearRequest
 from solver.wear.slow_time import ENDS_ALL, Guide, Integrator, Solution, Solutions
 from solver.wear.step import Adaptive
 from solver.wear.wearing_joint import WearState
@@ -34,7 +34,7 @@ def integrate_together(
     friction_coefficient: float | FloatArray | None,
     settings: SolverSettings,
     start: StartState,
-    asked: Sequence[SlowTime],
+    asked: Sequence[WearRequest],
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
 ) -> Iterator[WearHistory]:
@@ -78,7 +78,7 @@ def unknown_course(model: ReducedModel, n_loops: int) -> Course:
     return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
 
 
-def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rtol: float) -> Solutions:
+def _solve(integrations: Integrations, model: ReducedModel, asked: WearRequest, rtol: float) -> Solutions:
     """A history and what it is compared with; without a step the errors of the start state suffice."""
 
     def is_compared(ended: Solution) -> bool:
@@ -108,7 +108,7 @@ def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rto
     return Solutions(own, adaptive, integrations.reference(asked, guide, compared, spent))
 
 
-def _counts(asked: SlowTime, own: Solution) -> FloatArray:
+def _counts(asked: WearRequest, own: Solution) -> FloatArray:
     """Counts (n_output,) at which a history is read."""
     if not isinstance(asked.cycles, ToTheEnd):
         return asked.cycles
@@ -147,7 +147,7 @@ def _compare_own(solutions: Solutions, counts: FloatArray, *, follows: bool) -> 
     return both, error_of_given_steps(both, error, own.area)
 
 
-def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, solutions: Solutions) -> WearHistory:
+def _assembled(model: ReducedModel, start: StartState, asked: WearRequest, solutions: Solutions) -> WearHistory:
     """The result, not judged yet."""
     own, area, counts = solutions.own, model.contact.area, _counts(asked, solutions.own)
     failure = solutions.failure
@@ -188,7 +188,7 @@ def _of_state(state: WearState, end: float) -> dict[str, Any]:
     }
 
 
-def _target_error(solutions: Solutions, asked: SlowTime) -> float:
+def _target_error(solutions: Solutions, asked: WearRequest) -> float:
     """Estimated error, cycles, of the count at which a history has reached its target."""
     course, until = solutions.own.course, asked.until
     other = solutions.reference if solutions.adaptive is solutions.own else solutions.adaptive

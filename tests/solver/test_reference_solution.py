@@ -21,7 +21,7 @@ from solver.packing import Packed
 from solver.settings import SolverSettings
 from solver.wear import integrate
 from solver.wear.history import integrate_together
-from solver.wear.integrate import SlowTime
+from solver.wear.integrate import WearRequest
 from solver.wear.step import Adaptive, Given, WearLine
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import exact_depths_of_motion
@@ -214,7 +214,7 @@ def test_histories_that_are_integrated_together_are_those_alone(monkeypatch):
     """To the last bit, interrupted or not; the adaptive history, which all of them need, is integrated once."""
     monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 20)
     model, found = start()
-    asked = [SlowTime(WEAR, rule, CYCLES) for rule in (Given(4000.0), Adaptive(1e-2), Given(2000.0, "explicit"))]
+    asked = [WearRequest(WEAR, rule, CYCLES) for rule in (Given(4000.0), Adaptive(1e-2), Given(2000.0, "explicit"))]
     saved: list[Packed] = []
     together = list(integrate_together(model, 0.5, GIVEN, found, asked, saved.append))
     alone = [next(integrate_together(model, 0.5, GIVEN, found, (each,))) for each in asked]
