@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED
-from solver.accuracy.history_error import Both, HistoryError, error_of_given_steps, error_of_target, history_error
+from solver.accuracy.history_error import Compared, HistoryError, error_of_given_steps, error_of_target, history_error
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
@@ -123,27 +123,27 @@ def compare(
     part: Callable[[dict[str, Any]], dict[str, Any]] = lambda values: values,
     *,
     follows: bool = False,
-) -> tuple[Both, HistoryError]:
+) -> tuple[Compared, HistoryError]:
     """An adaptive history beside its reference solution at ascending counts (n,), and its errors there.
 
     part: what is compared of the values of both. follows: whether the frequency of the excitation is followed.
     """
     known = reference if reference is not None and reference.nodes else None
     both, steps = (
-        Both(at, part(fine.read(at)), {} if known is None else part(known.read(at)), follows)
+        Compared(at, part(fine.read(at)), {} if known is None else part(known.read(at)), follows)
         for at in (counts, fine.counts)
     )
     return both, history_error(both, steps, area)
 
 
-def _compare_own(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
+def _compare_own(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Compared, HistoryError]:
     """A history of any steps beside what it is compared with at ascending counts, and its errors there."""
     own, reference = solutions.own.course, solutions.reference
     adaptive = own if solutions.adaptive.state is None else solutions.adaptive.course
     both, error = compare(counts, adaptive, None if reference is None else reference.course, own.area, follows=follows)
     if adaptive is own:
         return both, error
-    both = Both(counts, own.read(counts), adaptive.read(counts), follows)
+    both = Compared(counts, own.read(counts), adaptive.read(counts), follows)
     return both, error_of_given_steps(both, error, own.area)
 
 
