@@ -30,7 +30,7 @@ from solver.settings import (
 )
 from solver.structure.joint import friction_of_pairs
 from solver.wear.history import integrate_together
-from solver.wear.integrate import SlowTime
+from solver.wear.integrate import WearRequest
 from solver.wear.step import steps_of
 
 
@@ -114,7 +114,7 @@ def march_wear(
     _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     steps = steps_of(scheme, length, settings.rtol)
-    asked = SlowTime(per_pressure, steps, read_at, law=law, until=until, follow=follow)
+    asked = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
     return next(integrate_together(model, friction, settings, start, (asked,)))
 
 
@@ -164,8 +164,8 @@ def integrate_mission(
     - missions: ascending whole numbers of missions at which the history is reported, or the last number alone. A
       missing 0 is added.
     - wear_coefficient, settings, law: as for `march_wear`.
-    - until: wear depth or worn volume at which the history ends before; `missions_to_target` of the history is its
-      number.
+    - until: wear depth or worn volume at which the history ends before the last of `missions`; `missions_to_target`
+      of the history is its number.
     - sweep: way to the state of the first mission, where its first block continues the last one of the mission before.
     - largest_step: most missions that are computed at once; 1: every mission by itself. By default the error decides.
 

@@ -12,7 +12,7 @@ from solver.model import FloatArray, IntArray, ReducedModel
 from studies.scene_error import SceneError
 
 N_MODES = 6
-"""Natural frequencies that are told of each nodal diameter."""
+"""Number of natural frequencies that are given for each nodal diameter."""
 
 
 @dataclass(frozen=True)

@@ -83,11 +83,11 @@ def format_plan(
 def _followed(study: Study) -> str:
     assert study.follow is not None
     what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"
-    return what if study.cycles_kept[-1] == 0.0 else f"{what} and followed while the joint wears"
+    return what if study.output_counts[-1] == 0.0 else f"{what} and followed while the joint wears"
 
 
 def _slow_time(study: Study) -> Iterator[tuple[str, str]]:
-    n_kept = len(study.cycles_kept)
+    n_kept = len(study.output_counts)
     if study.mission:
         yield "missions", f"{study.slow_time.missions}, of which {count(n_kept, 'number is', 'numbers are')} kept"
         for block, own in zip(study.mission, study.block_studies, strict=True):
@@ -96,7 +96,7 @@ def _slow_time(study: Study) -> Iterator[tuple[str, str]]:
         until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"
         yield "cycles", f"{until}; {n_kept} states are kept, spaced evenly in worn volume and cycles"
     else:
-        yield "cycles", f"{study.cycles_kept[-1]:g}, of which {count(n_kept, 'count is', 'counts are')} kept"
+        yield "cycles", f"{study.output_counts[-1]:g}, of which {count(n_kept, 'count is', 'counts are')} kept"
 
 
 def _solver(study: Study, facts: SceneFacts) -> str:

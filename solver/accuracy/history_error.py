@@ -42,7 +42,7 @@ class HistoryError:
 
 
 @dataclass(frozen=True)
-class Both:
+class Compared:
     """Values of a history and of its reference solution at equal counts.
 
     counts (n,): ascending. fine, reference: values as of `Course.read`, none where there is no reference solution.
@@ -59,7 +59,7 @@ class Both:
         return self.reference.get(name, np.full_like(self.fine[name], np.nan))
 
 
-def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
+def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> HistoryError:
     """Errors of an adaptive history, from its difference to the reference solution.
 
     outputs, steps: both solutions at the counts to report, the first 0, and at the ends of the steps.
@@ -70,7 +70,7 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     def crossing(differences: FloatArray) -> FloatArray:
         return HISTORY_SAFETY * largest_before(steps.counts, differences, outputs.counts)
 
-    def largest(change: Callable[[Both], FloatArray]) -> FloatArray:
+    def largest(change: Callable[[Compared], FloatArray]) -> FloatArray:
         return np.fmax(HISTORY_SAFETY * change(outputs), crossing(change(steps)))
 
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
@@ -96,7 +96,7 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     return _known(outputs, HistoryError(error, of_pairs, response, largest(_rate_change), frequency), unknown, area)
 
 
-def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray) -> HistoryError:
+def error_of_given_steps(outputs: Compared, adaptive: HistoryError, area: FloatArray) -> HistoryError:
     """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter.
 
     outputs: the history, and the adaptive one in place of the reference solution. adaptive: errors of the latter.
@@ -113,7 +113,7 @@ def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray
     return _known(outputs, found, ~np.isfinite(found.worn_volume), area)
 
 
-def _known(outputs: Both, found: HistoryError, unknown: BoolArray, area: FloatArray) -> HistoryError:
+def _known(outputs: Compared, found: HistoryError, unknown: BoolArray, area: FloatArray) -> HistoryError:
     """Errors whose worn volume, m3, becomes relative: inf where unknown (n,), NaN beyond the end of the history."""
     fine, depth = outputs.fine, outputs.fine["wear_depth"]
     volume = depth @ area
@@ -163,7 +163,7 @@ def error_of_target(
     return max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0)
 
 
-def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> FloatArray:
+def _frequency_error(both: Compared, safety: float, known: FloatArray | float) -> FloatArray:
     """Error (n,), Hz, of the frequency of the excitation: its difference times `safety`, and the error of the other."""
     name = "excitation_frequency"
     own = both.fine.get("excitation_frequency_error", np.zeros(len(both.counts)))
@@ -185,7 +185,7 @@ def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArr
     return np.array([differences[one:other].max(axis=0, initial=0.0) for one, other in zip(first, last, strict=True)])
 
 
-def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: FloatArray) -> FloatArray:
+def _change_within(volume: FloatArray, error: FloatArray, steps: Compared, area: FloatArray) -> FloatArray:
     """Relative change (n,) of the response while the worn volume (n,), m3, passes the values within its error (n,), m3:
     a state is not known better than the depths with which it vibrates. steps: the history at the ends of its steps.
     """
@@ -209,12 +209,12 @@ def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: Flo
     return found
 
 
-def _depth_change(both: Both) -> FloatArray:
+def _depth_change(both: Compared) -> FloatArray:
     """Difference (n, n_contact) of the depths, m."""
     return np.asarray(np.abs(both.fine["wear_depth"] - both.other("wear_depth")))
 
 
-def _response_change(both: Both) -> FloatArray:
+def _response_change(both: Compared) -> FloatArray:
     """Relative difference (n,) of the responses: the larger one of first harmonic and peak."""
     one, other = (
         _over(np.linalg.norm(both.fine[name] - both.other(name), axis=1), np.linalg.norm(both.fine[name], axis=1))
@@ -223,7 +223,7 @@ def _response_change(both: Both) -> FloatArray:
     return np.fmax(one, other)
 
 
-def _rate_change(both: Both) -> FloatArray:
+def _rate_change(both: Compared) -> FloatArray:
     """Relative difference (n,) of the wear rates."""
     return _over(np.abs(both.fine["wear_rate"] - both.other("wear_rate")), both.fine["wear_rate"])
 

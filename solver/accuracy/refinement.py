@@ -28,9 +28,10 @@ from solver.accuracy.harmonic_levels import (
 )
 from solver.accuracy.resolved_state import FAINT_SHARE, ResolvedState
 from solver.harmonic_balance.state import State
-from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, SMALL_JOINT
+from solver.newton.linear_solver import SMALL_JOINT
 from solver.newton.run import Run
 from solver.settings import FINE_SAMPLES, Resolution
+from solver.stability.disturbances import EXPENSIVE_UNKNOWNS
 from solver.structure.joint import Case, Joint
 
 TWO_LEVELS_SAFETY = 1.5

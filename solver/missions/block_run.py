@@ -28,7 +28,7 @@ from solver.results.verdict import first_cut_off
 from solver.settings import Direction, Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
-from solver.wear.integrate import Integrations, SlowTime
+from solver.wear.integrate import Integrations, WearRequest
 from solver.wear.rate_slope import rate_slope
 from solver.wear.slow_time import Guide
 from solver.wear.step import Adaptive
@@ -169,7 +169,7 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     (setup, _), cycles = case.begin(start), case.block.steady[1]
     counts = np.array([0.0, cycles])
     steps, solve = Adaptive(case.mission.settings.rtol), Integrations(setup.case, start)
-    asked = SlowTime(setup.wear_coefficient, steps, counts, law=setup.law, ends_at_last=True)
+    asked = WearRequest(setup.wear_coefficient, steps, counts, law=setup.law, ends_at_last=True)
     if case.guide is None:
         ended = solve.history(asked, stable_end=case.every)
     else:
@@ -226,7 +226,7 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
     """The state with which a block begins, or why there is none; and what the block of the next mission takes over."""
     if case.carried is not None:
         return _continued(case, case.carried), None
-    if case.begun is not None and (again := _again(case, case.begun)) is not None:
+    if case.begun is not None and (again := _by_earlier_sweep(case, case.begun)) is not None:
         return again, case.begun
     way = case.block.way
     line = case.line(case.mission.first if way == "continue" else way)
@@ -238,7 +238,7 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
     return start, Begun(passed, start, nodes.state.nodes.resolution)
 
 
-def _again(case: BlockCase, begun: Begun) -> StartState | None:
+def _by_earlier_sweep(case: BlockCase, begun: Begun) -> StartState | None:
     """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None: where the way
     has jumped over a fold, there is no stable state, or the way may lead to another branch.
 

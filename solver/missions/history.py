@@ -26,7 +26,7 @@ from solver.wear.course import Course, Node
 from solver.wear.history import compare
 from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Guide, Integrator, Solution, Solutions, guarded
 
-STEP_ERROR = 0.5
+STEP_ERROR_FRACTION = 0.5
 """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
 Missions of a slider: estimated over true error at least 1.7. With 0.25 two cases of the tests compute 21.5 and 33 of
 2000 missions, with 0.5 fewer than 20 and 30."""
@@ -109,7 +109,7 @@ class MissionProblem:
         """As in Line. The last mission of the step is computed."""
         rtol = self.mission.settings.rtol * (1.0 if self.fine is None else RTOL_RATIO)
         run = partial(self._mission, state, int(state.nodes[-1].count + length))
-        found = attempt_step(state.nodes, int(length), self.mission.area, run, STEP_ERROR * rtol)
+        found = attempt_step(state.nodes, int(length), self.mission.area, run, STEP_ERROR_FRACTION * rtol)
         if isinstance(found, Step):
             return found
         self._failure = found

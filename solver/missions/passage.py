@@ -103,7 +103,7 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
     states = ascending[:: 1 if passage.sweep == "up" else -1]
     starts, parts = [state.start for state in ascending], parts_of(ascending)
     volume = float(parts.sum(axis=0) @ area)
-    growth, slope = in_order(states, (_slope_of(case, state) for state in states))
+    growth, slope = wear_in_order(states, (_slope_of(case, state) for state in states))
     sweep_rate, lag = delay_of(case, ascending)
     error = swept.error + float((parts @ area) @ [start.wear_rate_error for start in starts])
     error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
@@ -134,7 +134,7 @@ def _slope_of(case: BlockCase, state: SweptState) -> FloatArray:
     return np.asarray(slope * state.frequency / case.block.passage.rate)
 
 
-def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
+def wear_in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Wear (n_contact,), m, of a passage through states in this order, and its derivative by the depth before, from the
     derivatives `slopes` (n_contact, n_contact) of their densities by the depth, 1/Hz.
     """

@@ -44,10 +44,6 @@ DENSE_UNKNOWNS = 200
 LARGEST_DENSE = 3000
 """Largest number of unknowns of a factorisation: 72 MB and 0.6 s. Above, the highest harmonics are left out."""
 
-EXPENSIVE_UNKNOWNS = 1000
-"""Unknowns of an expensive dense solve: above, no odd harmonics above 79, no 3 N + 2 samples to compare, and
-no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
-
 SMALL_JOINT = 40
 """Relative displacements up to which a joint is small and its Jacobian is factorised: impacts couple most harmonics,
 and products with any other factorisation are in vain (three pairs with 115 harmonics in the tests)."""

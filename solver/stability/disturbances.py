@@ -24,7 +24,6 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.sampled_law import SampledLaw, sampled_law
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel
-from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS
 from solver.structure.condensation import relative_indices
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
@@ -33,6 +32,10 @@ _SAMPLES_AT_ONCE = 64  # of the contact law: bounds the memory of large joints
 
 HILL_SAMPLES = 4096
 """Samples of the contact law for Hill's equation: impacts change the multipliers by what lies between two samples."""
+
+EXPENSIVE_UNKNOWNS = 1000
+"""Unknowns of an expensive dense solve: above, no odd harmonics above 79, no 3 N + 2 samples to compare, and
+no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
 
 # Real part over omega from which an exponent is infinite, that of a displacement without mass made finite by round-off:
 # in random scenes from 8e10 on, those of the joint -88 to 0.

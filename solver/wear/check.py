@@ -47,7 +47,7 @@ def full_check(
     setup: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
 ) -> Checked | Failure:
     """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
-    anew, certified = chosen_for_another(setup, state), partial(_certified, setup, loops, with_resonance=with_resonance)
+    anew, certified = needs_new_choice(setup, state), partial(_certified, setup, loops, with_resonance=with_resonance)
     checked = certified(choose_anew(setup, state) if anew else state)
     if isinstance(checked, Failure) and not anew and state.accurate and setup.case.settings.automatic:
         # more harmonics or samples may suffice
@@ -101,7 +101,7 @@ def report_only(
     return state, report_state(setup.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=with_resonance)
 
 
-def chosen_for_another(setup: WearingJoint, state: WearState) -> bool:
+def needs_new_choice(setup: WearingJoint, state: WearState) -> bool:
     """Whether harmonics and samples have to be chosen again: where the part of the contact force in harmonics that are
     left out, which grows with the error, is so large that the error may be above rtol, or so small that fewer may do.
     """

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED
-from solver.accuracy.history_error import Both, HistoryError, error_of_given_steps, error_of_target, history_error
+from solver.accuracy.history_error import Compared, HistoryError, error_of_given_steps, error_of_target, history_error
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
@@ -21,7 +21,7 @@ from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
 from solver.wear.course import Course, Node
-from solver.wear.integrate import Integrations, SlowTime
+from solver.wear.integrate import Integrations, WearRequest
 from solver.wear.slow_time import ENDS_ALL, Guide, Integrator, Solution, Solutions
 from solver.wear.step import Adaptive
 from solver.wear.wearing_joint import WearState
@@ -34,7 +34,7 @@ def integrate_together(
     friction_coefficient: float | FloatArray | None,
     settings: SolverSettings,
     start: StartState,
-    asked: Sequence[SlowTime],
+    asked: Sequence[WearRequest],
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
 ) -> Iterator[WearHistory]:
@@ -78,7 +78,7 @@ def unknown_course(model: ReducedModel, n_loops: int) -> Course:
     return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
 
 
-def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rtol: float) -> Solutions:
+def _solve(integrations: Integrations, model: ReducedModel, asked: WearRequest, rtol: float) -> Solutions:
     """A history and what it is compared with; without a step the errors of the start state suffice."""
 
     def is_compared(ended: Solution) -> bool:
@@ -108,7 +108,7 @@ def _solve(integrations: Integrations, model: ReducedModel, asked: SlowTime, rto
     return Solutions(own, adaptive, integrations.reference(asked, guide, compared, spent))
 
 
-def _counts(asked: SlowTime, own: Solution) -> FloatArray:
+def _counts(asked: WearRequest, own: Solution) -> FloatArray:
     """Counts (n_output,) at which a history is read."""
     if not isinstance(asked.cycles, ToTheEnd):
         return asked.cycles
@@ -123,31 +123,31 @@ def compare(
     part: Callable[[dict[str, Any]], dict[str, Any]] = lambda values: values,
     *,
     follows: bool = False,
-) -> tuple[Both, HistoryError]:
+) -> tuple[Compared, HistoryError]:
     """An adaptive history beside its reference solution at ascending counts (n,), and its errors there.
 
     part: what is compared of the values of both. follows: whether the frequency of the excitation is followed.
     """
     known = reference if reference is not None and reference.nodes else None
     both, steps = (
-        Both(at, part(fine.read(at)), {} if known is None else part(known.read(at)), follows)
+        Compared(at, part(fine.read(at)), {} if known is None else part(known.read(at)), follows)
         for at in (counts, fine.counts)
     )
     return both, history_error(both, steps, area)
 
 
-def _compare_own(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
+def _compare_own(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Compared, HistoryError]:
     """A history of any steps beside what it is compared with at ascending counts, and its errors there."""
     own, reference = solutions.own.course, solutions.reference
     adaptive = own if solutions.adaptive.state is None else solutions.adaptive.course
     both, error = compare(counts, adaptive, None if reference is None else reference.course, own.area, follows=follows)
     if adaptive is own:
         return both, error
-    both = Both(counts, own.read(counts), adaptive.read(counts), follows)
+    both = Compared(counts, own.read(counts), adaptive.read(counts), follows)
     return both, error_of_given_steps(both, error, own.area)
 
 
-def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, solutions: Solutions) -> WearHistory:
+def _assembled(model: ReducedModel, start: StartState, asked: WearRequest, solutions: Solutions) -> WearHistory:
     """The result, not judged yet."""
     own, area, counts = solutions.own, model.contact.area, _counts(asked, solutions.own)
     failure = solutions.failure
@@ -188,7 +188,7 @@ def _of_state(state: WearState, end: float) -> dict[str, Any]:
     }
 
 
-def _target_error(solutions: Solutions, asked: SlowTime) -> float:
+def _target_error(solutions: Solutions, asked: WearRequest) -> float:
     """Estimated error, cycles, of the count at which a history has reached its target."""
     course, until = solutions.own.course, asked.until
     other = solutions.reference if solutions.adaptive is solutions.own else solutions.adaptive

@@ -46,7 +46,7 @@ the last bit: 1 s of 48 pairs, 17 s of 336. The cost of one more factorisation i
 
 
 @dataclass(frozen=True)
-class SlowTime:
+class WearRequest:
     """What a wear history is asked for, Eqs. (20) to (26).
 
     wear_coefficient: k_w, 1/Pa. law: part of the slip work that wears.
@@ -92,7 +92,7 @@ class WearProblem:
     """
 
     setup: WearingJoint
-    asked: SlowTime
+    asked: WearRequest
     end: float
     guide: Guide | None = None
     stable_end: bool = False
@@ -179,14 +179,14 @@ class Integrations:
         self._case, self._start = case, start
         self._integrator = integrator or Integrator(case.settings.time_limit)
 
-    def history(self, asked: SlowTime, spent: float = 0.0, *, stable_end: bool = True) -> Solution:
+    def history(self, asked: WearRequest, spent: float = 0.0, *, stable_end: bool = True) -> Solution:
         """Integrate a history. spent: CPU seconds of its time limit so far. stable_end: as in WearProblem."""
         outputs = np.zeros(0) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
         problem = WearProblem(self._joint(asked), asked, asked.end, stable_end=stable_end)
         course = Course(problem.setup.area, outputs, asked.until)
         return self._integrator.integrate(asked.name, problem, course, spent)
 
-    def reference(self, asked: SlowTime, guide: Guide, compared: FloatArray, spent: float = 0.0) -> Solution:
+    def reference(self, asked: WearRequest, guide: Guide, compared: FloatArray, spent: float = 0.0) -> Solution:
         """Integrate the reference solution of an adaptive history of which the start state may be another one.
 
         compared (n,): ascending counts at which it is read, the first 0. spent: as for `history`.
@@ -198,7 +198,7 @@ class Integrations:
         course = Course(setup.area, compared)
         return self._integrator.integrate(f"{asked.name} reference", problem, course, spent)
 
-    def _joint(self, asked: SlowTime) -> WearingJoint:
+    def _joint(self, asked: WearRequest) -> WearingJoint:
         return WearingJoint(self._case, self._start, asked.wear_coefficient, asked.law, asked.follow)
 
 

@@ -1,7 +1,7 @@
 """A jump: from the end of the branch of the vibration to a stable state a little beyond, while the joint wears.
 
 Where a branch folds, the vibration goes on in a state of another branch. Where the joint begins to slide as a whole,
-its mean position gets a soft hold in the direction without stiffness:
+its mean position gets a soft hold in the direction without stiffness.
 
 Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
 the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the

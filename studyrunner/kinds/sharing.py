@@ -115,7 +115,7 @@ def _group(study: Study, choice: Index) -> tuple[str, Hashable]:
     wear, _, scheme = choice
     value, word = study.axes.wear_coefficient[wear], study.axes.scheme[scheme]
     if study.solver.shortcuts:
-        if study.cycles_kept[-1] == 0.0:
+        if study.output_counts[-1] == 0.0:
             return "cycles", wear
         if value == 0.0:
             return "unworn", wear

@@ -35,7 +35,7 @@ from studyrunner.mpi.dispatch import CostKeys
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.results.history import StartState
-    from solver.wear.integrate import SlowTime
+    from solver.wear.integrate import WearRequest
 
 AT_REST = "history at rest"
 """Most general group of histories in which nothing wears, see `CostModel`."""
@@ -238,8 +238,8 @@ class History(_FromRest):
                 result = build_result(self, each, history, self.results[place][1])
                 yield replace(result, place=place, progress=progress)
 
-    def _asked(self, integrated: Integrated) -> SlowTime:
-        from solver.wear.integrate import SlowTime
+    def _asked(self, integrated: Integrated) -> WearRequest:
+        from solver.wear.integrate import WearRequest
         from solver.wear.step import steps_of
 
         counts: NDArray[np.float64] | ToTheEnd
@@ -249,7 +249,7 @@ class History(_FromRest):
             # a history begins at cycle 0, whether that count is kept or not
             read = (integrated.counts(self.cycles, scaled) for scaled in integrated.histories)
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
-        return SlowTime(
+        return WearRequest(
             integrated.wear_coefficient,
             steps_of(integrated.scheme, integrated.step, self.settings.rtol, integrated.largest_depth),
             counts,

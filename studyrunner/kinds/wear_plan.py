@@ -142,8 +142,8 @@ class _Planner:
         return replace(integrated, histories=tuple(histories))
 
     def _add_history(self, study: Study, sweep: Sweep, position: int, integrated: tuple[Integrated, ...]) -> None:
-        cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.cycles_kept[-1]
-        end = ToTheEnd(len(study.cycles_kept), study.slow_time.final_share) if study.to_the_end else None
+        cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
+        end = ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None
         steps = [(each.scheme, each.step) for each in integrated]
         self.histories.append(
             History(
@@ -157,7 +157,7 @@ class _Planner:
                 direction=sweep.direction,
                 settings=sweep.settings,
                 integrated=integrated,
-                cycles=study.cycles_kept,
+                cycles=study.output_counts,
                 variables=tuple(self._study.recorded),
                 loops=study.outputs.loops,
                 cost=seconds_of(sweep.n_unknowns, iterations_of_histories(steps, cycles)),

@@ -34,9 +34,9 @@ _REFERENCE = (
 )
 _COMMENT = (
     "SI units. A point is one combination of the axes (the dimensions before cycle or mission); outcome says how its"
-    " computation ended, and where that is not 0 the point holds NaN. Relative displacement is that of blade minus disk"
-    " in the frame of the contact pair (normal, tangent 1, tangent 2), its normal component positive when the pair"
-    " closes; contact forces and pressures are positive in compression. A complex amplitude X stands for"
+    " computation ended; values that it did not reach are NaN, or 0 in whole numbers. Relative displacement is that of"
+    " blade minus disk in the frame of the contact pair (normal, tangent 1, tangent 2), its normal component positive"
+    " when the pair closes; contact forces and pressures are positive in compression. A complex amplitude X stands for"
     " x(t) = Re(X exp(i omega t)). Slow time is counted in vibration cycles, or in missions. Give this file to"
     " run-study to compute its study again."
 )

@@ -158,7 +158,7 @@ def _changed(study: Study) -> frozenset[str]:
 def _answers(study: Study) -> dict[str, np.ndarray]:
     axes, changed = study.axes, _changed(study)
     (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
-    counts, given = np.array(study.cycles_kept), np.array(axes.wear_coefficient)
+    counts, given = np.array(study.output_counts), np.array(axes.wear_coefficient)
 
     def answer(frequency: float, amplitude: float) -> ExactAnswer:
         asked = WearQuestion(frequency, amplitude, given, counts, study.wear.as_law, depth, changed)

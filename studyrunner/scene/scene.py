@@ -211,7 +211,7 @@ def _check_outputs(study: Study, model: ReducedModel) -> None:
     if (size := 8.0 * values_of_point(study, facts)) > _LARGEST_HISTORY:
         remedy = f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
         key = "outputs.loops" if loops else "slow_time.outputs"
-        raise UserError(study.source, key, list(loops) if loops else len(study.cycles_kept), remedy)
+        raise UserError(study.source, key, list(loops) if loops else len(study.output_counts), remedy)
     if "natural_frequency" in study.scene_variables and not has_frequencies(study):
         with scene_errors(study.source, None):
             stuck_frequencies(model)

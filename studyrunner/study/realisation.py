@@ -184,7 +184,7 @@ def _with_parameters_of_scene(study: Study, parameters: BaseModel) -> Study:
 
 
 def _with_room_in_blocks(study: Study) -> Study:
-    cycles = study.cycles_kept[-1] * sum(
+    cycles = study.output_counts[-1] * sum(
         block.cycles_at(max(of_block.axes.frequency))
         for block, of_block in zip(study.mission, study.block_studies, strict=True)
     )
@@ -214,7 +214,7 @@ def expected_wear(study: Study) -> ExpectedWear:
         factor *= study.friction_coefficient or 0.0
     if law.table is not None:
         factor *= max(max(row) for row in law.table.factor)
-    cycles = math.inf if study.to_the_end else study.cycles_kept[-1]
+    cycles = math.inf if study.to_the_end else study.output_counts[-1]
     wear = largest("wear_coefficient", max(study.axes.wear_coefficient)) * factor
     return ExpectedWear(
         amplitude=largest("excitation_amplitude", max(study.axes.excitation_amplitude)),

@@ -181,7 +181,7 @@ class Study(Section):
     @property
     def sizes(self) -> Mapping[str, int]:
         """Lengths of the dimensions after the axes that the study gives: slow time, and blocks of missions."""
-        counted = {self.kind.counted: len(self.cycles_kept)} if self.kind.counted else {}
+        counted = {self.kind.counted: len(self.output_counts)} if self.kind.counted else {}
         return {**counted, **({"block": len(self.mission)} if self.mission else {})}
 
     @property
@@ -215,11 +215,11 @@ class Study(Section):
         return self.slow_time.cycles == math.inf
 
     @cached_property
-    def cycles_kept(self) -> tuple[float, ...]:
+    def output_counts(self) -> tuple[float, ...]:
         """Cycle counts, or numbers of missions, of the result, ascending; with `to_the_end` numbers of the outputs."""
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
         if self.mission:
-            return tuple(map(float, self.missions_kept))
+            return tuple(map(float, self.output_missions))
         if isinstance(outputs, tuple):
             return outputs
         if self.to_the_end:
@@ -229,7 +229,7 @@ class Study(Section):
         return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)
 
     @property
-    def missions_kept(self) -> tuple[int, ...]:
+    def output_missions(self) -> tuple[int, ...]:
         """Numbers of missions of the result, ascending; equally spaced, rounded to whole numbers."""
         missions, outputs = self.slow_time.missions or 0, self.slow_time.outputs
         if isinstance(outputs, tuple):

@@ -19,7 +19,7 @@ from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import Case, build_case
 from solver.wear.history import integrate_together
-from solver.wear.integrate import SlowTime
+from solver.wear.integrate import WearRequest
 from solver.wear.step import steps_of
 from studies.scenes import build_scene, scene_parameters
 from tests.random_scenes import COMPONENTS
@@ -191,8 +191,8 @@ def march_wear(
     resume: Packed | None = None,
     **asked: Any,
 ) -> WearHistory:
-    """The history from a start state; asked: what else `SlowTime` has."""
-    wanted = SlowTime(wear_coefficient, steps_of(scheme, step, settings.rtol, largest_depth), cycles, **asked)
+    """The history from a start state; asked: what else `WearRequest` has."""
+    wanted = WearRequest(wear_coefficient, steps_of(scheme, step, settings.rtol, largest_depth), cycles, **asked)
     return next(integrate_together(model, friction_coefficient, settings, start, (wanted,), keep, resume))
 
 

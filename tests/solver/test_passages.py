@@ -16,11 +16,11 @@ from solver.missions.passage import (
     SweptState,
     delay_of,
     find_states,
-    in_order,
     interval_errors,
     parts_of,
     run_passage,
     states_at,
+    wear_in_order,
 )
 from solver.results.history import StartState
 from solver.settings import Resolution
@@ -55,7 +55,7 @@ def test_frequencies_of_a_passage_wear_one_after_the_other(order):
         return np.array([1.0 + f, 2.0 * (1.0 - f)]), -(1.0 + 3.0 * f) * loss
 
     states = [replace(state(f, 0.0), density=rates(f)[0]) for f in at][::order]
-    grown, slope = in_order(states, [rates(of.frequency)[1] for of in states])
+    grown, slope = wear_in_order(states, [rates(of.frequency)[1] for of in states])
     ends = (0.0, 1.0)[::order]
 
     def end(before):

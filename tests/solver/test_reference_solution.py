@@ -9,7 +9,7 @@ import pytest
 from solver.accuracy.history_error import (
     HISTORY_SAFETY,
     PAIR_OVER_VOLUME,
-    Both,
+    Compared,
     HistoryError,
     error_of_given_steps,
     history_error,
@@ -21,7 +21,7 @@ from solver.packing import Packed
 from solver.settings import SolverSettings
 from solver.wear import integrate
 from solver.wear.history import integrate_together
-from solver.wear.integrate import SlowTime
+from solver.wear.integrate import WearRequest
 from solver.wear.step import Adaptive, Given, WearLine
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import exact_depths_of_motion
@@ -159,7 +159,7 @@ def at_step(value, n_pairs=2):
 def error_of(fine, reference, steps=None, area=AREA):
     """The errors at `COUNTS`; steps: both solutions at the ends of steps, none by default."""
     nowhere = {name: value[:0] for name, value in at_step(0.0, area.size).items()}
-    return history_error(Both(COUNTS, fine, reference), steps or Both(np.zeros(0), nowhere, nowhere), area)
+    return history_error(Compared(COUNTS, fine, reference), steps or Compared(np.zeros(0), nowhere, nowhere), area)
 
 
 def test_an_error_adds_up_what_differs_at_each_pair():
@@ -182,7 +182,7 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing():
     assert found.worn_volume == pytest.approx([0.0, 0.1, 0.1])
     assert found.wear_depth == pytest.approx(LESS_KNOWN * 0.1 * np.array(DEPTH))
     # between the outputs, at a step, all values of the reference solution differ; at the outputs they agree
-    steps = Both(np.array([1.5]), at_step(2.0), at_step(2.5) | {"wear_depth": np.array([[2.5, 2.0]])})
+    steps = Compared(np.array([1.5]), at_step(2.0), at_step(2.5) | {"wear_depth": np.array([[2.5, 2.0]])})
     crossing, safety = error_of(fine, read(DEPTH), steps), HISTORY_SAFETY
     assert crossing.worn_volume == pytest.approx([0.0, 0.1, safety * 0.5 / 6.0])
     assert crossing.wear_depth[2] == pytest.approx([safety * 0.5, LESS_KNOWN * safety * 0.5 / 6.0 * 2.0])
@@ -201,7 +201,7 @@ def test_one_pair_is_known_as_the_volume_and_one_of_many_half_as_well(worn, less
 def test_given_steps_are_wrong_by_what_they_differ_and_by_what_the_adaptive_history_is_wrong():
     other = [[0.0, 0.0], [1.2, 0.9], [2.4, np.nan]]
     known = HistoryError(np.array([0.0, 0.1, 0.1]), 0.1 * np.array(other), *np.full((2, 3), 1e-2), np.zeros(3))
-    found = error_of_given_steps(Both(COUNTS, read(DEPTH), read(other)), known, AREA)
+    found = error_of_given_steps(Compared(COUNTS, read(DEPTH), read(other)), known, AREA)
     assert found.worn_volume == pytest.approx([0.0, (0.4 + 0.1 * 3.0) / 3.0, np.inf])
     assert found.wear_depth[1] == pytest.approx([0.2 + 0.12, 0.1 + 0.09])
     assert np.isinf(found.wear_depth[2]).all()
@@ -214,7 +214,7 @@ def test_histories_that_are_integrated_together_are_those_alone(monkeypatch):
     """To the last bit, interrupted or not; the adaptive history, which all of them need, is integrated once."""
     monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 20)
     model, found = start()
-    asked = [SlowTime(WEAR, rule, CYCLES) for rule in (Given(4000.0), Adaptive(1e-2), Given(2000.0, "explicit"))]
+    asked = [WearRequest(WEAR, rule, CYCLES) for rule in (Given(4000.0), Adaptive(1e-2), Given(2000.0, "explicit"))]
     saved: list[Packed] = []
     together = list(integrate_together(model, 0.5, GIVEN, found, asked, saved.append))
     alone = [next(integrate_together(model, 0.5, GIVEN, found, (each,))) for each in asked]
@@ -246,7 +246,7 @@ def test_a_response_is_not_known_better_than_the_worn_volume():
     # both solutions vibrate alike at each count, with other volumes; the response rises by 0.5 from 3 to 6 m3
     along = [[1.0], [1.0], [1.5]]
     fine, other = read(DEPTH, response=along), read([[0.0, 0.0], [0.8, 0.9], [1.6, 1.8]], response=along)
-    found = error_of(fine, other, Both(COUNTS, fine, other))
+    found = error_of(fine, other, Compared(COUNTS, fine, other))
     wrong = found.worn_volume[1:] * [3.0, 6.0]
     assert wrong[0] > 0.0
     assert found.response[1:] == pytest.approx(wrong * 0.5 / 3.0 / [1.0, 1.5])

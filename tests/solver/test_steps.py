@@ -18,7 +18,7 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear import step as control
-from solver.wear.check import chosen_for_another
+from solver.wear.check import needs_new_choice
 from solver.wear.rate_slope import moved_fraction, rate_slope
 from solver.wear.step import Adaptive, Given, Step, WearLine
 from solver.wear.wearing_joint import WearingJoint
@@ -162,7 +162,7 @@ def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(harmonics, sha
     now = left_out(state.resolution.orders, state.point.evaluation)
     assert 1e-4 < now < 0.5
     state = replace(state, left_out=share * now, estimate=Estimate(error, error), accurate=True)
-    assert chosen_for_another(work, state) is anew
+    assert needs_new_choice(work, state) is anew
 
 
 # --- limits ---

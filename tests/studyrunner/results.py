@@ -291,7 +291,7 @@ def made_result(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Inde
         if values.dtype.kind == "f":
             values[...] = np.nan if name in UNKNOWN else 0.0
         if name in ("last_cycle", "last_mission"):
-            values[...] = study.cycles_kept[-1]
+            values[...] = study.output_counts[-1]
         for point in np.ndindex(dataset["outcome"].shape) if name in given else ():
             values[point] = given[name](point)
     return dataset

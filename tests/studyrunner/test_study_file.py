@@ -44,7 +44,7 @@ def test_every_default_is_filled_in():
     }
     assert [getattr(study.solver, key) for key in SOLVER_AXES] == [("auto",), ("auto",), (1e-8,), (1e-2,)]
     assert (study.solver.time_limit, study.solver.shortcuts) == (None, True)
-    assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
+    assert study.output_counts == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5
     assert (study.outputs.variables, study.outputs.loops) == (USUAL, ())
     more = read_study("dovetail", ["outputs.variables=['natural_frequency', 'default']"])

@@ -29,7 +29,7 @@ def at(point):
 def wearing(*overrides, volume=lambda _: 1e-9, name="sdof_slider", facts=FACTS, **given):
     """A result whose points wear these volumes, m3, in equal parts up to the last count."""
     study = read_study(name, overrides)
-    share = np.linspace(0.0, 1.0, len(study.cycles_kept))
+    share = np.linspace(0.0, 1.0, len(study.output_counts))
     return made_result(study, facts, worn_volume=lambda point: volume(point) * share, **given)
 
 
@@ -271,7 +271,7 @@ def meshed(volumes, *overrides):
     given = (*(overrides or MESHES), f"axes.mesh={list(volumes)}", "axes.wear_coefficient=[1e-12, 1e-11]")
     study = read_study("dovetail", given)
     mesh, wear = (list(study.dimensions).index(name) for name in ("mesh", "wear_coefficient"))
-    share = np.linspace(0.0, 1.0, len(study.cycles_kept))
+    share = np.linspace(0.0, 1.0, len(study.output_counts))
     worn = list(volumes.values())
     return compare_meshes(result_of(made_result(study, worn_volume=lambda p: 1e-9 * worn[p[mesh]][p[wear]] * share)))
 

@@ -54,7 +54,7 @@ def draw_history(result: Result) -> Drawn:
     panel.set_xlim(0.0, panel.dataLim.xmax)
     panel.set_ylabel(scale.label("worn volume"))
     plot.set_from_zero(panel, highest if wears else 0.0)
-    said = f"Worn {_at_the_end(result)}: {', '.join(ends)}" if wears else "Nothing is worn at the counts kept"
+    said = f"Worn {_at_the_end(result)}: {', '.join(ends)}" if wears else "Nothing is worn at the stored counts"
     return figure, said, choice.sentence
 
 
