@@ -147,7 +147,8 @@ class Result:
 
         def reduced(part: xr.DataArray) -> NDArray[np.float64]:
             values = np.asarray(part.transpose(*self.axes, ...).values, dtype=float)
-            return reduce(values.reshape(-1, *values.shape[len(self.axes) :]))
+            # a copy: a view would keep the whole part in memory
+            return np.array(reduce(values.reshape(-1, *values.shape[len(self.axes) :])))
 
         # in a function of its own, so that no part is in memory while the next one is read; `map` holds none either
         parts = map(reduced, _in_slabs(self.dataset[name], self.axes))
