@@ -187,7 +187,9 @@ def check_numbers(name: str, given: ArrayLike, *, above: float = -math.inf, leas
         found = np.atleast_1d(np.array(given, np.float64))
     except (TypeError, ValueError):
         raise ValueError(f"{name}: give numbers instead of {given!r}") from None
-    if found.ndim != 1 or not found.size or not np.isfinite(found).all():
+    if found.ndim != 1 or not found.size:
+        raise ValueError(f"{name}: give one number, or a list of numbers, instead of shape {found.shape}")
+    if not np.isfinite(found).all():
         raise ValueError(f"{name}: give finite numbers")
     if (found <= above).any() or (found < least).any():
         limit = f"above {above:g}" if above > -math.inf else f"of at least {least:g}"

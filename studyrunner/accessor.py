@@ -23,7 +23,6 @@ _NOT_COMPUTED = 13  # `Outcome.NOT_COMPUTED` of the solver, which results are re
 _PAIRS = ("contact", "contact_x", "contact_y", "contact_z", "contact_surface")
 
 
-@xr.register_dataset_accessor("fretwear")  # type: ignore[no-untyped-call]
 class FretwearAccessor:
     """`dataset.fretwear` of a result file, whole or a selection from it."""
 
@@ -120,6 +119,11 @@ class FretwearAccessor:
                 return closed.transpose(..., "phase", "component")
         ask = f"ask for it by [outputs] loops = [{contact}], unless its points failed"
         raise ValueError(f"The result holds no loop of contact pair {contact}; {ask}.")
+
+
+# Not registered, as xarray keeps a registered accessor in its dataset: that cycle leaves closing the file to the
+# garbage collector, which may come while the netCDF library opens another one: it then crashes, or finds damage.
+xr.Dataset.fretwear = property(FretwearAccessor)  # type: ignore[attr-defined]
 
 
 def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.Dataset:

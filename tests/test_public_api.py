@@ -336,6 +336,7 @@ def test_what_is_wrong_with_matrices_is_said_in_one_line(change, message):
         ({"frequency": [1.0, 2.0]}, "frequency: give one number"),
         ({"excitation_amplitude": -1.0}, "excitation_amplitude: give values of at least 0 instead of -1"),
         ({"friction_coefficient": np.nan}, "friction_coefficient: give finite numbers"),
+        ({"friction_coefficient": [[0.5]]}, "friction_coefficient: give one number, or a list of numbers"),
         ({"friction_coefficient": [0.5, 0.4]}, "friction_coefficient has shape (2,): give a number or shape (1,)"),
         ({"friction_coefficient": None}, "friction_coefficient is missing"),
         ({"cycles": [0.0, 2.0, 2.0]}, "cycles: give ascending counts"),

@@ -1,5 +1,8 @@
 """The accessor of result files: complex responses, flanks as grids, loops, files joined."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from solver.outcome import Outcome
 from studyrunner.accessor import find_grid, join_results
 from studyrunner.api import open_result
-from tests.studyrunner.results import build_file
+from tests.studyrunner.results import build_file, write_dataset
 
 SURFACES = ("pressure side", "back")
 
@@ -215,3 +218,17 @@ def test_points_of_no_result_are_marked(result):
     assert joined.newton_iterations.values.tolist() == [[1, 0], [0, 1]]
     assert joined.worn_volume.isnull().sum() == 4
     assert Outcome.NOT_COMPUTED in joined.outcome.attrs["flag_values"]
+
+
+def test_a_dataset_that_is_dropped_closes_its_file_at_once(tmp_path):
+    """Closed by the garbage collector, while another file is opened, it would crash the netCDF library."""
+    write_dataset(build_file(), tmp_path / "result.nc")
+    opened = open_result(tmp_path / "result.nc")
+    assert opened.fretwear.surfaces
+    gone = weakref.ref(opened)
+    gc.disable()
+    try:
+        del opened
+        assert gone() is None
+    finally:
+        gc.enable()

@@ -51,7 +51,7 @@ def draw_history(result: Result) -> Drawn:
         if np.isfinite(worn[-1]):
             ends.append(labelled(f"{scale.show(float(worn[-1]), 4)}{_with_error(result, point)}", label))
         _mark_events(result, panel, point, cycles, scale, plot.line_style(number)["color"])
-    panel.set_xlim(0.0, panel.dataLim.xmax)
+    panel.set_xlim(0.0, panel.dataLim.xmax or None)  # 0: a target before the second count
     panel.set_ylabel(scale.label("worn volume"))
     plot.set_from_zero(panel, highest if wears else 0.0)
     said = f"Worn {_at_the_end(result)}: {', '.join(ends)}" if wears else "Nothing is worn at the stored counts"

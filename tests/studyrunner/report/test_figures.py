@@ -3,6 +3,7 @@
 The numbers are those of the table (CSV) that is written beside each figure from what its artists hold.
 """
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -333,3 +334,12 @@ def test_variables_are_read_no_more_than_needed(tmp_path):
         # values of the pairs are read for the points shown; what is small is kept
         assert not dataset["wear_depth"].variable._in_memory
         assert not dataset["mean_pressure"].variable._in_memory
+
+
+def test_a_history_with_values_at_its_first_count_only_is_drawn_without_a_warning():
+    """As of a point that is at its target before the second count."""
+    result = make_result(frequency=[200.0], scheme=["implicit"])
+    volume = result.dataset["worn_volume"]
+    early = volume.where(result.dataset["cycle"] == result.dataset["cycle"][0])
+    with warnings.catch_warnings(action="error"):
+        draw_figure(Result(result.path, result.dataset.assign(worn_volume=early)), "worn_volume")
