@@ -69,7 +69,8 @@ def certainty_of(result: Result, *, wore: bool = True) -> Certainty | None:
     if result.wears and has_errors and (wore or not responses):
         return _certainty(result, "worn volume", result.errors)
     if responses:
-        return _certainty(result, "response", result.over_points("response_error", lambda values: values[:, -1]))
+        last = result.dataset["response_error"].isel(cycle=-1).transpose(*result.axes).values
+        return _certainty(result, "response", last)
     return None
 
 

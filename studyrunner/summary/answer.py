@@ -210,7 +210,7 @@ def _too_few_counts(result: Result) -> str:
     """Points that reach their target before the first count at which the file could hold wear."""
     if not result.has("cycles_to_target", "worn_volume") or result.dataset.sizes["cycle"] < 2:
         return ""
-    at_second = result.over_points("worn_volume", lambda values: values[:, 1])
+    at_second = result.dataset["worn_volume"].isel(cycle=1).transpose(*result.axes).values
     early = result.computed & np.isfinite(result.dataset["cycles_to_target"].values) & np.isnan(at_second)
     if not early.any():
         return ""
