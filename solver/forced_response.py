@@ -158,7 +158,11 @@ def worn_model(model: ReducedModel, wear_depth: ArrayLike | None) -> ReducedMode
 
 
 def check_friction(model: ReducedModel, given: ArrayLike | None) -> float | FloatArray | None:
-    """One number, one for each pair (n_contact,), or None for those of the model. Raises ValueError where none fits."""
+    """One number, one for each pair (n_contact,), or None for those of the model. Raises ValueError where none fits, or
+    where the model is none.
+    """
+    if not isinstance(model, ReducedModel):
+        raise ValueError(f"model: give what build_scene, read_scene or build_model gives, instead of {model!r}")
     friction: float | FloatArray | None = None
     if given is not None:
         numbers = check_numbers("friction_coefficient", given, least=0.0)

@@ -332,6 +332,7 @@ def test_what_is_wrong_with_matrices_is_said_in_one_line(change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        ({"model": "sdof_slider"}, "model: give what build_scene, read_scene or build_model gives"),
         ({"frequency": 0.0}, "frequency: give values above 0 instead of 0"),
         ({"frequency": [1.0, 2.0]}, "frequency: give one number"),
         ({"excitation_amplitude": -1.0}, "excitation_amplitude: give values of at least 0 instead of -1"),
@@ -347,7 +348,7 @@ def test_what_is_wrong_with_matrices_is_said_in_one_line(change, message):
     ],
 )
 def test_what_is_wrong_with_a_march_is_said_in_one_line(change, message):
-    right = {"frequency": 150.0, "excitation_amplitude": 10.0, "friction_coefficient": 0.5}
+    right = {"model": slider(), "frequency": 150.0, "excitation_amplitude": 10.0, "friction_coefficient": 0.5}
     right |= {"wear_coefficient": 1e-11, "cycles": 1e4}
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
-        march_wear(slider(), **(right | change))
+        march_wear(**(right | change))
