@@ -166,7 +166,6 @@ def test_outside_its_range_a_resonance_ends_the_history(between, n_known, said):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_stable_states_whose_samples_are_few_do_not_end_the_sweep():
     """128 samples find a stable state of many pairs that slip and open, at 273.81 Hz, unstable."""
     damper = build_scene("underplatform_damper", scene_parameters("underplatform_damper")(nodal_diameter=2), 20)

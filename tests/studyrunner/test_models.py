@@ -1,7 +1,6 @@
 """Studies of models of other programs, from their files to a result; files are written after the manuals."""
 
 import hashlib
-import importlib.util
 import shutil
 from functools import partial
 from pathlib import Path
@@ -132,7 +131,6 @@ def test_a_deck_is_reduced_once_for_all_contact_stiffnesses(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
 def test_gmsh():
     Path("lap.msh").write_text(Plates().gmsh())
     check_same(scene_of("lap.toml", "scene.model=lap.msh"), scene_of("lap.toml"))

@@ -11,7 +11,6 @@ from studies.fe_models.meshes import read_mesh_file
 from studies.scene_error import SceneError
 
 needs_ansys = pytest.mark.skipif(importlib.util.find_spec("ansys") is None, reason="ansys-mapdl-reader is not there")
-needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
 
 
 def write(folder, text, name="mesh.msh"):
@@ -58,7 +57,6 @@ $EndElements
 """
 
 
-@needs_meshio
 def test_gmsh_41(tmp_path):
     deck = read_mesh_file(write(tmp_path, GMSH_41))
     assert [(block.kind, block.nodes.tolist()) for block in deck.blocks] == [("C3D4", [[1, 2, 3, 4], [2, 3, 4, 5]])]
@@ -142,7 +140,6 @@ ORDERS = {
 }
 
 
-@needs_meshio
 @pytest.mark.parametrize("kind", ORDERS)
 def test_order_of_mid_side_nodes(tmp_path, kind):
     number, corners, edges, expected = ORDERS[kind]
