@@ -11,6 +11,7 @@ from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import half_wave_symmetric, lacks_even
 from solver.continuation.natural import ratchets, shake_down
+from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import State, largest_responses, transfer
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
@@ -24,6 +25,11 @@ contact need not be resolved."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
+
+
+def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
+    """First harmonic of the responses (n_response,), m, of a state."""
+    return to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
 
 
 @dataclass(frozen=True)
@@ -75,8 +81,7 @@ class ResolvedState:
 
     def response(self) -> ComplexArray:
         """First harmonic of the responses (n_response,), m."""
-        structure = self.joint.structure
-        return to_complex(structure.response_h(self.joint.to_relative(self.point.evaluation.displacement_h)))[:, 0]
+        return first_response(self.joint, self.point.evaluation)
 
     @cached_property
     def peaks(self) -> FloatArray:

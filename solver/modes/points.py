@@ -16,6 +16,7 @@ import numpy as np
 from solver.accuracy.certificate import certify
 from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.refinement import refine
+from solver.accuracy.resolved_state import first_response
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.continuation.natural import LARGEST_STEP_RATIO
@@ -28,7 +29,6 @@ from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_res
 from solver.newton.run import Budget, OutOfTimeError, Run
 from solver.outcome import Outcome, describe_error, known_to
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
-from solver.structure.fourier import to_complex
 
 Direction = Literal["up", "down"]
 
@@ -259,7 +259,7 @@ def _judged(
         damping_ratio=found.damping_ratio,
         frequency_error=float(errors[0]) / (2.0 * np.pi),
         damping_error=float(errors[1]),
-        response=to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0],
+        response=first_response(joint, at),
         shape=found.shape,
         slip_fraction=_slips(at).mean(axis=1),
         open_fraction=(at.status_t == SEPARATED).mean(axis=1),
