@@ -197,7 +197,7 @@ def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency
         response[index], peak[index] = first_response(joint, at), largest_responses(joint, at)
         if errors:
             # NaN where no state with other harmonics is found
-            estimate = refine(case, joint.omega, joint.excitation_amplitude, point, run).estimate.response
+            estimate = refine(case, joint, point, run).estimate.response
             error[index] = estimate if np.isfinite(estimate) else np.inf
         found.append(find_multipliers(case, joint, at, run))
         stability.append(found[-1].stability(odd=not run.fresh().is_stable(balance, at)))
