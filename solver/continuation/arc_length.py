@@ -1,7 +1,7 @@
 """Pseudo-arc-length continuation of a branch through its folds.
 
-The parameter is the further unknown of a bordered system (`solver.newton.run`), and the further equation says
-that the point lies in a plane across the tangent of the branch.
+The parameter is the further unknown of a bordered system, whose further equation puts the point in a plane across the
+tangent of the branch.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ SHORTEST_ARC = CORNER_ARC / 10.0
 ARC_WANDER = 2.0
 """Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
 the branch of `tests/solver/test_whole_response.py` is left for another one."""
-
 
 FOLD_HALVINGS = 10
 """Halvings of a step with a fold; the parameter at the fold is off by the square of the length."""

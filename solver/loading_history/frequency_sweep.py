@@ -1,6 +1,6 @@
 """The sweep along the frequencies of a study: where it begins, nodes common to many points, the state at each point.
 
-A machine passes other frequencies before the point, and the joint keeps their history. So a sweep begins well away from
+The joint keeps the history of the frequencies that a machine passes before a point. So a sweep begins well away from
 the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85 times. All points of a
 cell, a quarter octave, have one first frequency: the one at which the vibration loads the stuck joint least, so that no
 sweep begins at a resonance. It depends on the scene and on the cell, not on the other points of a study.
@@ -18,9 +18,8 @@ from solver.accuracy.certificate import certify
 from solver.accuracy.refinement import Refined, refine
 from solver.accuracy.resolved_state import NOTHING, UNKNOWN, Estimate, ResolvedState
 from solver.continuation.first_state import solve_first_state
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State, carried_history, history_at_rest
-from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, stable_state
+from solver.harmonic_balance.state import State
+from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep, SweepState
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
@@ -34,15 +33,14 @@ from solver.structure.condensation import build_structure
 from solver.structure.joint import Case, build_case
 
 FIRST_ITERATIONS = SWEEP_ITERATIONS // 8
-"""Most Newton iterations to begin a sweep, or to find a state where the sweep is lost; tens to hundreds suffice where
-some pairs stick."""
+"""Most Newton iterations to begin a sweep, or to find a state where the sweep is lost. Tens to hundreds suffice."""
 
 OTHER_START = Resolution((1,), 64)
 """Harmonics and samples of a further attempt to find a first state: four of 54 random scenes need it."""
 
 BEGIN_AWAY = 0.3
-"""Least distance from the start of a sweep to the point, as a fraction of the frequency of the point. With 0.22 and
-0.38 the dovetail has the same state within 2e-3."""
+"""Least distance from the start of a sweep to the point over its frequency. With 0.22 and 0.38 the dovetail has the
+same state within 2e-3."""
 
 CELLS_PER_OCTAVE = 4
 """Cells in an octave. The first frequency of the dovetail is 105 Hz, half the resonance."""
@@ -224,7 +222,7 @@ class FrequencySweep:
             return self.without_state(Outcome.CERTIFICATE_FAILED, "", resolution, estimate)
         if unstable := find_instability(found.case, joint, at, self.run, self.every):
             return self.without_state(unstable.outcome, unstable.message, resolution, estimate)
-        reference = self._reference(nodes, found)
+        reference = nodes.reference(replace(nodes.path, case=found.case), found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
         return replace(
@@ -232,16 +230,6 @@ class FrequencySweep:
             state=periodic_state(joint, found.point),
             reference=None if reference is None else periodic_state(joint, reference),
         )
-
-    def _reference(self, nodes: Sweep[State], found: Refined) -> State | None:
-        """The state with the tangential history that the reference sweep leaves; None where there is none."""
-        if nodes.here is None or nodes.reference is None:
-            return None
-        (path, states), point = nodes.reference, found.point
-        node = states[-1]
-        at = replace(node.evaluation, history=history_at_rest(path.joint_of(node), node))
-        balance = Balance(found.joint, carried_history(path.case, found.joint, at), point.evaluation.wear_depth)
-        return stable_state(balance, point.evaluation.predicted_h, point.parameter, self.run.fresh())
 
 
 def why_lost(nodes: Sweep[State], failure: Outcome) -> Outcome:

@@ -8,11 +8,10 @@ from typing import ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import left_out, nothing_happens
-from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
-from solver.accuracy.resolved_state import Estimate
+from solver.accuracy.harmonic_levels import nothing_happens
+from solver.accuracy.refinement import VIBRATION_RECHECK, refine
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
+from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
@@ -24,24 +23,26 @@ from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
-"""Fraction of the parameter: length at which a step that finds no state is left to `Path.rescue`, which goes on in
-steps of this length. Also the load factor at which a ramp begins, and for a nonlinear mode its first amplitude, as
-vibrating contact forces over the friction limits (with ten times the value and with a tenth the damping of the dovetail
-changes by 7e-5 and 1e-3)."""
+"""Fraction of the parameter: length at which a step that finds no state is left to `Path.rescue`, and of its steps.
+Also the load factor at which a ramp begins, and the first amplitude of a mode, as vibrating contact forces over the
+friction limits (with ten times the value and with a tenth the damping of the dovetail changes by 7e-5 and 1e-3)."""
 
 LONGEST_STEP = 0.1
 """Longest step, as a fraction of the parameter."""
 
 SHORTEST_STEP = 2e-5
-"""Shortest step, as a fraction of the parameter, whatever the change of the vibration is. An undamped slider passes its
-resonance in such steps."""
+"""Shortest step, as a fraction of the parameter. An undamped slider passes its resonance in such steps."""
 
 CHANGE_PER_RTOL = 20.0
 """Largest relative change of the vibration in a step, over rtol."""
 
 CHANGE_LIMITS = (0.05, 0.2)
-"""Limits of this change. Dovetail of 48 pairs, 211 to 212.5 Hz, compared with steps twenty times as short: errors of
-the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05."""
+"""Limits of this change. Dovetail of 48 pairs, 211 to 212.5 Hz: errors of the motion up to 0.8 % with 0.2, up to 0.1 %
+with 0.05."""
+
+LINEAR_CHANGE = 1.0
+"""Largest change over a step between two states in which no pair slips or opens. The reversal of phase at a linear
+resonance is a change of 2."""
 
 SMALL_VIBRATION = 0.3
 """Fraction of the friction limits to which changes of a smaller vibration are relative. With 1 the error of the motion
@@ -52,7 +53,7 @@ LEAST_SLIP = 1e-3
 
 SAMPLES_OF_SIGN = 4
 """Samples over those of a node that is unstable with fewer. Underplatform damper of nodal diameter 2, 30 stable states
-from 273.7 Hz on: 128 samples find three unstable with 13 harmonics, four with 9 harmonics; 512 samples none."""
+from 273.7 Hz on: 128 samples find four unstable, 512 samples none."""
 
 S = TypeVar("S", bound=State)
 
@@ -114,8 +115,8 @@ class Path(ABC, Generic[S]):
         """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
         return False
 
-    def suits(self, checked: S, _: float, state: S) -> bool:
-        """Whether the harmonics chosen for an earlier state, with an estimated error, are about those of a state."""
+    def suits(self, checked: S, state: S) -> bool:
+        """Whether the harmonics chosen for an earlier state are about those of a state."""
         return self.differs(checked, state) <= VIBRATION_RECHECK
 
     def at(self, resolution: Resolution) -> Self:
@@ -127,8 +128,12 @@ class Path(ABC, Generic[S]):
         """The state with the harmonics and samples of another path; None where not found."""
 
     @abstractmethod
-    def choose(self, state: S, run: Run) -> tuple[Self, S, Estimate]:
-        """Path and state with the harmonics that the state needs, or the most allowed, and its estimated error."""
+    def again(self, state: S, history: FloatArray, run: Run) -> S | None:
+        """The state with another tangential history (n_contact, 2), m; None where not found."""
+
+    @abstractmethod
+    def choose(self, state: S, run: Run) -> tuple[Self, S, float]:
+        """Path and state with the harmonics that the state needs, and the relative error of its response."""
 
     @abstractmethod
     def describe(self, state: S) -> str:
@@ -229,33 +234,27 @@ class LoadingPath(Path[State]):
         moved = np.abs(at.displacement_h[:, 1:, 1:]).sum(axis=(1, 2))
         return bool((opens | (slip > LEAST_SLIP * moved)).all())
 
-    def suits(self, checked: State, error: float, state: State) -> bool:
-        """As in Path: the error grows and falls with the part of the contact force in harmonics that are left out.
-
-        Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice.
-        """
-        settings, resolution = self.case.settings, self.case.resolution
-        fewest = resolution == first_resolution(settings)
-        if super().suits(checked, error, state) or (fewest and self.rests(state)):
+    def suits(self, checked: State, state: State) -> bool:
+        """As in Path; any harmonics where all pairs slip and none opens: such a node only serves to begin the next."""
+        if super().suits(checked, state):
             return True
-        if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
-            return True
-        before, now = (left_out(resolution.orders, at.evaluation) for at in (checked, state))
-        if self.rests(state) or not (0.0 < error < np.inf and before > 0.0):
-            return False
-        foreseen = error * now / before
-        enough = fewest or foreseen >= KEPT_FRACTION**2 * settings.rtol
-        # where the error is above rtol already, there are no more harmonics
-        return enough and (foreseen <= settings.rtol or error > settings.rtol)
+        if self.rests(state):
+            return self.case.resolution == first_resolution(self.case.settings)
+        return self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any()
 
     def move(self, state: State, other: Self, run: Run) -> State | None:
         """As in Path."""
         return run.move(self.case, other.joint_of(state), state)
 
-    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:
+    def again(self, state: State, history: FloatArray, run: Run) -> State | None:
+        """As in Path."""
+        balance = self.balance_at(state.parameter, history)
+        return stable_state(balance, state.evaluation.predicted_h, state.parameter, run)
+
+    def choose(self, state: State, run: Run) -> tuple[Self, State, float]:
         """As in Path."""
         found = refine(self.case, self.joint_of(state), state, run, node=True)
-        return replace(self, case=found.case), found.point, found.estimate
+        return replace(self, case=found.case), found.point, found.estimate.response
 
     def describe(self, state: State) -> str:
         """As in Path, with the number of pairs that slip or open."""

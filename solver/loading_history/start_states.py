@@ -1,14 +1,11 @@
 """Unworn periodic states at the frequencies of a study, each with the loading history that leads to the state.
 
-- "up", "down": the excitation frequency is swept slowly, as in the run-up or run-down of a machine. On a branch that
-  bends over, the two directions find different states.
-- "ramp": the excitation is raised slowly at the frequency of the point, as at the onset of flutter or of a flow
-  disturbance at constant speed. Every point is independent of all others.
+The excitation frequency is swept slowly "up" or "down", as in the run-up or run-down of a machine; on a branch that
+bends over, both find different states. In a "ramp" the excitation is raised slowly at the frequency of the point.
 
-A history with followed frequency begins at the resonance that the sweep "up" or "down" meets first in a range: between
-two nodes, where the phase lag passes pi/2. A resonance that the sweep jumps over, from a fold to a branch beyond, is
-none of its states. The largest amplitude is sought from there, and the sweep then leads to its frequency: along the
-sweep the amplitude has small maxima where pairs begin to slip, far from any resonance.
+A history with followed frequency begins at the resonance that the sweep meets first in a range: between two nodes,
+where the phase lag passes pi/2. A resonance that the sweep jumps over at a fold is none of its states. The largest
+amplitude is sought from there, as it has small maxima where pairs begin to slip, far from any resonance.
 """
 
 from __future__ import annotations
@@ -48,8 +45,7 @@ def follow_branch(
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at given frequencies, one by one, in the order of the sweep: index and state.
 
-    A state depends on its own frequency only. Where the branch ends, the structure settles in time from the last state,
-    as in a slow sweep of the machine. The last attempt starts from the static state.
+    A state depends on its own frequency only.
 
     friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
     frequencies: Hz, ascending. Or what is sought in a range of frequencies: the first resonance that the sweep meets.

@@ -5,11 +5,10 @@ and these depend on all vibration before. So a sweep has nodes of its own, whose
 the vibration. A state between two nodes is solved from the node before and leaves the sweep unchanged.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
-slip, up to one step too early. A reference sweep has a node in the middle of every third step, and harmonics one level
-lower where these are automatic. The difference of both sweeps is at least half the error of the finer one; with common
-nodes both might keep the same history too early. There is no reference as long as nothing slips or opens, and where
-each pair slips or opens within the period: such a state follows from its parameter alone. Behind a fold the reference
-begins anew: the place of a jump is no measure of the error by steps.
+slip, up to one step too early. A reference sweep has a node in the middle of every third step, as with common nodes
+both might keep one history too early, and harmonics one level lower where these are automatic. The difference of both
+is at least half the error of the finer one. The reference begins where pairs slip or open, and anew behind a fold and
+where each pair slips or opens within the period: such a state follows from its parameter alone.
 """
 
 from __future__ import annotations
@@ -20,9 +19,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic
 
 from solver.accuracy.harmonic_levels import fewer
-from solver.accuracy.resolved_state import NOTHING
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, carried_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
@@ -30,8 +28,8 @@ from solver.packing import in_rows, packable
 from solver.settings import Resolution
 
 KEPT_NODES = 3
-"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them. With two, and a straight line,
-the nodes of the slider take 7 % more iterations."""
+"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them. With a straight line the nodes
+of the slider take 7 % more iterations."""
 
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
@@ -43,8 +41,7 @@ NODE_ITERATIONS = 5 * SWEEP_ITERATIONS // 16
 """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
 
 ITERATIONS_PER_SAVE = 100
-"""Newton iterations after which a sweep is saved at its next node, and its factorisation dropped, so that a resumed
-sweep is equal to the last bit: 1 s of 48 pairs, 17 s of 336."""
+"""Newton iterations after which a sweep is saved at its next node: 1 s of 48 pairs, 17 s of 336."""
 
 STEPS_OF_REFERENCE = 3
 """Steps of a sweep in one step of its reference. With two, the difference of both may be a quarter of the error
@@ -71,7 +68,7 @@ class SweepState:
 
     failure: why there is no state, at the start or behind the last node; None where there is one.
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
-    checked, error: the node at which the harmonics were chosen, and its largest estimated error.
+    checked: the node at which the harmonics were chosen.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
     reference: last nodes of the reference sweep, None for none; skipped: parameters of the nodes since then.
     """
@@ -81,7 +78,6 @@ class SweepState:
     length: float = 0.0
     rate: float = 0.0
     checked: Any = None
-    error: float = 0.0
     branch: int = 0
     fold: float = math.nan
     iterations: int = 0
@@ -132,11 +128,14 @@ class Sweep(Generic[S]):
         """The current node, None where there is no state."""
         return self.last if self.state.failure is None else None
 
-    @property
-    def reference(self) -> tuple[Path[S], tuple[S, ...]] | None:
-        """Path and last nodes of the reference sweep; None where the state does not depend on steps."""
-        found = self.state.reference
-        return None if found is None else (self.path.at(found.resolution), found.states)
+    def reference(self, path: Path[S], state: S, run: Run) -> S | None:
+        """A state of a path with the tangential history that the reference sweep leaves; None where there is none."""
+        nodes = self.state.reference
+        if self.here is None or nodes is None:
+            return None
+        of, node = self.path.at(nodes.resolution), nodes.states[-1]
+        at = replace(node.evaluation, history=history_at_rest(of.joint_of(node), node))
+        return path.again(state, carried_history(of.case, path.joint_of(state), at), run.fresh())
 
     def begin(self, path: Path[S], state: S) -> bool:
         """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
@@ -221,7 +220,7 @@ class Sweep(Generic[S]):
         )
         if self.with_reference:
             self._lead_reference(before, step)
-        if not self.path.suits(self.state.checked, self.state.error, step.state):
+        if not self.path.suits(self.state.checked, step.state):
             self._choose_resolution()
         saved = 0 if self.saved is None else self.saved.iterations
         if self.budget.iterations >= saved + ITERATIONS_PER_SAVE:
@@ -259,7 +258,7 @@ class Sweep(Generic[S]):
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
-        nodes, error = self.state.nodes, NOTHING
+        nodes, error = self.state.nodes, 0.0
         here = nodes.states[-1]
         if self.path.case.settings.automatic:
             path, here, error = self.path.choose(here, self.run)
@@ -267,8 +266,8 @@ class Sweep(Generic[S]):
                 nodes = replace(nodes, states=(*nodes.states[:-1], here))
             else:
                 nodes, self.path, self.run = Nodes(path.case.resolution, (here,)), path, self.run.fresh()
-        self.state = replace(self.state, nodes=nodes, checked=here, error=error.largest)
-        return error.response
+        self.state = replace(self.state, nodes=nodes, checked=here)
+        return error
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""
