@@ -1,12 +1,9 @@
 """What decides about harmonics and samples: levels of harmonics, and the events in the period of a state.
 
-"One level up" means the next entry of `HARMONIC_LEVELS`. Two effects hide an error from a comparison with only a few
-more harmonics:
-
-- a contact that is shorter than the period of the highest harmonic: its force is nearly equal in all harmonics;
-- a structure that answers the higher harmonics otherwise than the penalty E does. With the compliance G of a pair, the
-  harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n` (`solver.structure.penalty`). They
-  need not decrease: the modal mass of a slider on a beam falls from mode to mode.
+"One level up" is the next entry of `HARMONIC_LEVELS`. Two effects hide an error from a comparison with only a few more
+harmonics: a contact that is shorter than the period of the highest harmonic, whose force is nearly equal in all of
+them; and a structure that answers higher harmonics otherwise than the penalty E does. With the compliance G of a pair,
+the harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n`, which need not decrease.
 """
 
 from __future__ import annotations
@@ -21,8 +18,8 @@ from solver.structure.condensation import relative_indices
 from solver.structure.penalty import build_penalty, compliance_at
 
 HARMONIC_LEVELS = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
-"""Highest harmonics between which "auto" chooses. The last two serve for comparison only. Without 7: on the dovetail at
-212 Hz the errors of the worn volume with 5, 7 and 9 are 1.9, 1.2 and 0.1 %, so that 5 and 7 agree by chance."""
+"""Highest harmonics between which "auto" chooses; the last two for comparison only. Without 7: for the dovetail at 212
+Hz 5 and 7 agree by chance (errors of the worn volume with 5, 7, 9: 1.9, 1.2, 0.1 %)."""
 
 STIFFNESS_MISMATCH = 0.25
 """Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
@@ -51,17 +48,11 @@ def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
     return Resolution(orders, samples)
 
 
-def levels_to(resolution: Resolution, highest: float) -> int:
-    """Levels up, at least two, to the first level with the harmonic `highest`."""
-    above = [level for level in HARMONIC_LEVELS if level > resolution.highest]
-    return max(2, min(sum(level < highest for level in above) + 1, len(above)))
-
-
 def reach(model: ReducedModel, omega: float, highest: int) -> int:
     """Lowest harmonic of the levels, not below `highest`, beyond which |1 - E G| is small for all pairs.
 
     G is evaluated at real rates (growth instead of vibration), where the structure has no resonances. omega: rad/s.
-    The last level where |1 - E G| is small beyond none.
+    The last level where there is none.
     """
     _, component_index = relative_indices(model.contact)
     pair, tangent = component_index // 3, np.minimum(component_index % 3, 1)
@@ -108,8 +99,8 @@ def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
 def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:
     """Duration of the shortest contact of all pairs that open, as a fraction of the period; 1 where no pair opens.
 
-    status_t, normal_force_t (n_contact, N): states of the pairs at the samples, and N. felt: fraction of the largest
-    normal force; pairs whose force is lower all period long are left out.
+    status_t, normal_force_t (n_contact, N): at the samples; N. felt: pairs are left out whose normal force stays below
+    this fraction of the largest one.
     """
     n_samples = status_t.shape[1]
     shortest = n_samples

@@ -71,10 +71,6 @@ class Arc:
             if reached is None:
                 return
             back = state is self.start and (reached.parameter - state.parameter) * toward < 0.0
-            if back and 0.25 * length > SHORTEST_ARC:
-                # the start lies so near to a fold that the first step passes the fold
-                length *= 0.25
-                continue
             ahead = self.tangent(reached.parameter, reached.evaluation, self.place(reached) - self.place(state))
             turns = ahead is not None and ahead[-1] * tangent[-1] < 0.0
             yield state, reached, state if back else self._fold(state, tangent, reached) if turns else None
