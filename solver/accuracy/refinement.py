@@ -12,15 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import (
+from solver.accuracy.resolved_state import (
+    FAINT_SHARE,
     HARMONIC_LEVELS,
+    NOTHING,
+    UNKNOWN,
+    Estimate,
+    ResolvedState,
     fewer,
     nothing_happens,
     reach,
     shifted,
     shortest_contact,
 )
-from solver.accuracy.resolved_state import FAINT_SHARE, NOTHING, UNKNOWN, Estimate, ResolvedState
 from solver.harmonic_balance.state import State
 from solver.newton.linear_solver import SMALL_JOINT
 from solver.newton.run import Run

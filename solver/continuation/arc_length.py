@@ -154,7 +154,7 @@ class Arc:
 
 @dataclass(frozen=True)
 class _Plane:
-    """A branch, and the plane across its tangent at a length from a base, both scaled (n + 1,)."""
+    """As BorderedProblem: a branch, and the plane across its tangent at a length from a base, both scaled (n + 1,)."""
 
     arc: Arc
     base: FloatArray
@@ -162,21 +162,17 @@ class _Plane:
     length: float
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        """As in BorderedProblem; the value is parameter / span."""
         balance = self.arc.balance_at(float(values[0] * self.arc.span), self.arc.start.history)
         moved = np.append(predicted_h.ravel() / self.arc.size, values) - self.base
         ahead = float(self.tangent @ moved) - self.length
         return Bordered(balance, balance.evaluate(predicted_h), values, np.array([ahead]), extra=moved)
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
-        """As in BorderedProblem."""
         return [self.arc.slope(float(here.values[0] * self.arc.span), here.at)], self.tangent[-1:, None]
 
     def by_step(self, _: Bordered, __: Linearisation, step: FloatArray) -> FloatArray:
-        """As in BorderedProblem."""
         return np.array([self.tangent[:-1] @ step.ravel() / self.arc.size])
 
     def fraction(self, here: Bordered, _: FloatArray, __: FloatArray) -> float:
-        """NaN where the corrector has gone too far."""
         far = np.linalg.norm(here.extra) > ARC_WANDER * abs(self.length)
         return np.nan if far else 1.0

@@ -20,7 +20,7 @@ import numpy as np
 from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
 from solver.continuation.transient import RUNAWAY, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import Failure, State
 from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -45,7 +45,7 @@ Other fractions lead to other states that friction allows: 5 % for a mass that r
 
 def solve_first_state(
     case: Case, omega: float, excitation_amplitude: float, wear_depth: FloatArray, run: Run
-) -> State | Outcome:
+) -> State | Failure:
     """First periodic state. These ways are tried in turn until one leads to a stable state:
 
     1. The excitation is raised from zero.
@@ -54,10 +54,10 @@ def solve_first_state(
     3. The vibration builds up in time under the whole excitation (`transient`).
 
     omega, excitation_amplitude: rad/s, N. wear_depth (n_contact,): m.
-    Returns the state, or START_FAILED, UNSTABLE, UNSETTLED, ADRIFT or an outcome of `solve_static_state`.
+    Returns the state, or START_FAILED, UNSTABLE, UNSETTLED, ADRIFT or the failure of `solve_static_state`.
     """
     rest = state_at_rest(case, omega, wear_depth, run)
-    if isinstance(rest, Outcome):
+    if isinstance(rest, Failure):
         return rest
     quiet, unstable = case.joint(omega, 0.0), False
 
@@ -74,24 +74,24 @@ def solve_first_state(
             return raised
         unstable |= arrived
     settled = relax_to_periodic(case, case.joint(omega, excitation_amplitude), wear_depth, rest, quiet, run)
-    return Outcome.UNSTABLE if unstable and isinstance(settled, Outcome) else settled
+    return Failure(Outcome.UNSTABLE) if unstable and isinstance(settled, Failure) else settled
 
 
-def state_at_rest(case: Case, omega: float, wear_depth: FloatArray, run: Run) -> State | Outcome:
+def state_at_rest(case: Case, omega: float, wear_depth: FloatArray, run: Run) -> State | Failure:
     """The static state with the harmonics of a case, none of which vibrates, and with the parameter 0.
 
-    Arguments as in `solve_first_state`. Returns the state, START_FAILED or an outcome of `solve_static_state`.
+    Arguments as in `solve_first_state`. Returns the state, START_FAILED or the failure of `solve_static_state`.
     """
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, wear_depth, run)
-    if isinstance(static, Outcome):
+    if isinstance(static, Failure):
         return static
     balance, parts = (
         Balance(quiet, static.history, wear_depth),
         (static.evaluation.displacement_h, static.evaluation.force_h),
     )
     start = balance.predict(*(change_orders(part, (), case.resolution.orders) for part in parts))
-    return run.state(balance, start, 0.0) or Outcome.START_FAILED
+    return run.state(balance, start, 0.0) or Failure(Outcome.START_FAILED)
 
 
 def relieved_history(joint: Joint, rest: State, fraction: float) -> FloatArray:
@@ -99,7 +99,7 @@ def relieved_history(joint: Joint, rest: State, fraction: float) -> FloatArray:
     return rest.history + fraction * rest.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
 
 
-def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Outcome:
+def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Failure:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
     Without gaps, wear and given normal forces all states of a rising load are proportional, and one step is enough.
@@ -120,7 +120,7 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State 
         found, used = run.state(balance, start), run.budget.iterations
         if found is None:
             settled = _settle(balance, state.evaluation, run)
-            if isinstance(settled, Outcome):
+            if isinstance(settled, Failure):
                 return settled
             # every search needs a static state, whose steps have a limit of their own
             run.budget.limit += run.budget.iterations - used
@@ -129,7 +129,7 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State 
     return state
 
 
-def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
+def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Failure:
     """Static state to which viscous pairs come from the state `before`, or why there is none."""
     viscosity, begun = 1.0, before.displacement_h
     far, moved = float((balance.joint.contact.gap + balance.wear_depth).max()), np.zeros_like(begun)
@@ -152,7 +152,7 @@ def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
             break
         viscosity *= VISCOSITY_CUT
     if np.abs(moved).max() <= far:
-        return Outcome.STATIC_FAILED
+        return Failure(Outcome.STATIC_FAILED)
     # a motion without end
     opened, slid = -moved[:, 0].min(initial=0.0), np.linalg.norm(moved[:, 1:], axis=1).max(initial=0.0)
-    return Outcome.STATIC_OPEN if opened > slid else Outcome.STATIC_SLIDING
+    return Failure(Outcome.STATIC_OPEN if opened > slid else Outcome.STATIC_SLIDING)

@@ -57,11 +57,10 @@ def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
 
 
 @dataclass(frozen=True)
-class AtLag:
-    """The problem: a balance, with fixed or with growing wear depths, whose frequency follows from its lag.
+class _AtLag:
+    """As BorderedProblem: a balance, with fixed or growing wear depths, whose frequency, rad/s, follows from its lag.
 
-    balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced`: change of the lag with the frequency
-    along the states, s/rad.
+    balance: at some frequency. lag: rad, between 0 and pi.
     """
 
     case: Case
@@ -69,7 +68,6 @@ class AtLag:
     lag: float
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        """As in BorderedProblem; the value is the frequency, rad/s."""
         joint = self.case.joint(float(values[0]), self.balance.joint.excitation_amplitude)
         balance = replace(self.balance, joint=joint)
         at = balance.evaluate(predicted_h)
@@ -77,16 +75,14 @@ class AtLag:
         return Bordered(balance, at, values, self._errors(product, product), extra=product)
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
-        """As in BorderedProblem."""
         by_frequency = frequency_derivative(here.balance, here.at)
         return [by_frequency.force], self._errors(by_frequency.product, here.extra)[:, None]
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
-        """As in BorderedProblem: of the equation times |F^H x|, whose derivative is linear in the motion."""
+        # of the equation times |F^H x|, whose derivative is linear in the motion
         return self._errors(_changes(here.balance.joint, tangent.transmit(step)[0])[0], here.extra)
 
     def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
-        """The frequency changes by a small fraction of itself at most."""
         return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
 
     def _errors(self, part: complex, product: complex) -> FloatArray:
@@ -97,11 +93,12 @@ class AtLag:
 def solve_at_lag(
     case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
 ) -> Bordered | None:
-    """The state with a lag, rad, of `AtLag` from a first predicted force (n_rel, 2H+1), N; None where it is not found.
+    """The state of a balance, with fixed or with growing wear depths, at a phase lag, rad; None where it is not found.
 
-    most: iterations.
+    start (n_rel, 2H+1): first predicted force, N, at the frequency of the balance. most: iterations. `Bordered.reduced`
+    of the state: change of the lag with the frequency along the states, s/rad.
     """
-    return run.solve_bordered(AtLag(case, balance, lag), start, np.array([balance.joint.omega]), most)
+    return run.solve_bordered(_AtLag(case, balance, lag), start, np.array([balance.joint.omega]), most)
 
 
 def solve_at_peak(

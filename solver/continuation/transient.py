@@ -22,7 +22,7 @@ import numpy as np
 
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import State, final_history
+from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
@@ -121,7 +121,7 @@ class Transient:
 
 def relax_to_periodic(
     case: Case, joint: Joint, wear_depth: FloatArray, start: State, start_joint: Joint, run: Run
-) -> State | Outcome:
+) -> State | Failure:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
     case: model and settings of both joints, which have equal pairs and harmonics; frequency and load may differ.
@@ -153,7 +153,7 @@ def relax_to_periodic(
         # a step over more than the time in which a motion grows would damp this motion
         damped = grows and result.converged and not run.is_stable(balance, result.evaluation)
         if damped and result.iterations == 0:
-            return Outcome.UNSTABLE
+            return Failure(Outcome.UNSTABLE)
         if not result.converged or too_far or damped:
             length *= TRANSIENT_CUT
             continue
@@ -162,7 +162,7 @@ def relax_to_periodic(
         moved = np.abs(result.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > RUNAWAY * size:
-            return Outcome.ADRIFT
+            return Failure(Outcome.ADRIFT)
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < 0.5 * tried or length >= longest
         if change < RELAXED_CHANGE and renewed:
@@ -181,7 +181,7 @@ def relax_to_periodic(
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(SMOOTH_CHANGE / max(change, 1e-300), 0.5, 2.0))
         length = min(max(length * growth, 1.0), longest)
-    return Outcome.UNSETTLED
+    return Failure(Outcome.UNSETTLED)
 
 
 def _change(before: Motion, after: Motion) -> float:

@@ -120,10 +120,10 @@ class FrequencySweep:
         target = 2.0 * np.pi * frequency if self.omega is None else 1.0
         nodes.advance_to(target)
         path, reached = nodes.path, nodes.state_at(target, run.fresh())
-        if isinstance(reached, Outcome):
+        if isinstance(reached, Failure):
             run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
             first = self._first(path, target, run)
-            if isinstance(first, Outcome):
+            if isinstance(first, Failure):
                 return lost(nodes, first)
             path, reached = first[0], Step(first[1])
         refined = self._at_known(path, reached.state) if self.known else None
@@ -159,7 +159,7 @@ class FrequencySweep:
         place = 2.0 * np.pi * first_frequency(self.model, cell, self.sweep) if ramp is None else FREE_STEP
         nodes.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
         first = self._first(nodes.path, place, nodes.run)
-        if isinstance(first, Outcome):
+        if isinstance(first, Failure):
             nodes.failure = first
         else:
             nodes.begin(*first)
@@ -175,20 +175,20 @@ class FrequencySweep:
         self.nodes = Sweep(path, direction, budget, with_reference=not self.known, save=self.save)
         return self.nodes
 
-    def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Outcome:
+    def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Failure:
         """A state from the static one at a value of the parameter, and its path, with the harmonics of a path, or else
         with one; or the reason of the first attempt.
         """
         others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
         omega, load = (place, 1.0) if self.omega is None else (self.omega, place)
-        unworn, why = np.zeros(self.model.contact.n_contact), list[Outcome]()
+        unworn, why = np.zeros(self.model.contact.n_contact), list[Failure]()
         for resolution in (path.case.resolution, *others):
             at = path.at(resolution)
             found = solve_first_state(at.case, omega, load * self.excitation_amplitude, unworn, run.fresh())
             if isinstance(found, State):
                 return at, replace(found, parameter=place)
             why.append(found)
-            if found.static or run.budget.exhausted:
+            if found.outcome.static or run.budget.exhausted:
                 break
         return why[0]
 
@@ -228,11 +228,11 @@ class FrequencySweep:
         )
 
 
-def lost(nodes: Sweep[State], failure: Outcome) -> Failure:
+def lost(nodes: Sweep[State], failure: Failure) -> Failure:
     """Why a sweep has no state, and where its states end. failure: of the last search."""
     if nodes.last is None:
-        return Failure(failure)
-    reason = Outcome.BRANCH_LOST if failure is Outcome.START_FAILED else failure
+        return failure
+    reason = Outcome.BRANCH_LOST if failure.outcome is Outcome.START_FAILED else failure.outcome
     return Failure(reason, f"stable states end {nodes.path.describe(nodes.last)}")
 
 

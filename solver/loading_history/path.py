@@ -8,13 +8,13 @@ from typing import ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import nothing_happens
 from solver.accuracy.refinement import VIBRATION_RECHECK, refine
+from solver.accuracy.resolved_state import nothing_happens
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
+from solver.harmonic_balance.state import Failure, State, history_at_rest, transfer, vibration_change, vibration_size
 from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -89,9 +89,9 @@ class Path(ABC, Generic[S]):
     def solve(self, states: tuple[S, ...], target: float, run: Run) -> S | None:
         """Stable state at a target near the last of some states, which leaves its history to it; None if not found."""
 
-    def rescue(self, _: S, __: float, ___: Run) -> Step[S] | Outcome:
+    def rescue(self, _: S, __: float, ___: Run) -> Step[S] | Failure:
         """State at a target that `solve` does not find, or why there is none: by default no path that turns back."""
-        return Outcome.BRANCH_LOST
+        return Failure(Outcome.BRANCH_LOST)
 
     @abstractmethod
     def change(self, before: S, after: S) -> float:
@@ -124,12 +124,15 @@ class Path(ABC, Generic[S]):
         return replace(self, case=self.case.at(resolution))
 
     @abstractmethod
+    def near(self, state: S, predicted_h: FloatArray, history: FloatArray, run: Run) -> S | None:
+        """Stable state at the parameter of a state, from a first predicted force (n_rel, m), N, and with a tangential
+        history (n_contact, 2), m; None where not found.
+        """
+
     def move(self, state: S, other: Self, run: Run) -> S | None:
         """The state with the harmonics and samples of another path; None where not found."""
-
-    @abstractmethod
-    def again(self, state: S, history: FloatArray, run: Run) -> S | None:
-        """The state with another tangential history (n_contact, 2), m; None where not found."""
+        balance, start = transfer(self.case, other.joint_of(state), state.evaluation)
+        return other.near(state, start, balance.history, run.fresh())
 
     @abstractmethod
     def choose(self, state: S, run: Run) -> tuple[Self, S, float]:
@@ -173,14 +176,30 @@ class LoadingPath(Path[State]):
     def solve(self, states: tuple[State, ...], target: float, run: Run) -> State | None:
         """As in Path, by Newton's method alone, from the polynomial through the states."""
         start, at = states[-1], np.array([state.parameter for state in states])
-        balance = self.balance_at(target, history_at_rest(self.joint_at(target), start))
         begin = np.zeros_like(start.evaluation.predicted_h)
         for place, state in enumerate(states):
             others = np.delete(at, place)
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
-        return stable_state(balance, begin, target, run)
+        history = history_at_rest(self.joint_at(target), start)
+        return self.near(replace(start, parameter=target), begin, history, run)
 
-    def rescue(self, start: State, target: float, run: Run) -> Step[State] | Outcome:
+    def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:
+        """As in Path. Too few samples may turn the sign of the determinant where many pairs slip and open: a state is
+        unstable where it is so with more.
+        """
+        balance = self.balance_at(state.parameter, history)
+        found = run.state(balance, predicted_h, state.parameter, NEAR_ITERATIONS)
+        if found is None or run.is_stable(balance, found.evaluation):
+            return found
+        joint, basis = balance.joint, balance.joint.basis
+        # the predicted force of masses on rigid ground depends on the length of a sample
+        if joint.law.rate_dependent:
+            return None
+        fine = replace(joint, basis=build_basis(basis.orders, SAMPLES_OF_SIGN * basis.n_samples))
+        finer = replace(balance, joint=fine)
+        return found if run.fresh().is_stable(finer, finer.evaluate(found.evaluation.predicted_h)) else None
+
+    def rescue(self, start: State, target: float, run: Run) -> Step[State] | Failure:
         """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the
         machine; both in turns until the target.
         """
@@ -196,7 +215,7 @@ class LoadingPath(Path[State]):
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
             joints = self.joint_at(beyond), self.joint_of(end)
             settled = relax_to_periodic(self.case, joints[0], balance.wear_depth, end, joints[1], run)
-            if isinstance(settled, Outcome):
+            if isinstance(settled, Failure):
                 return settled
             # a fold with a smaller change is a corner of the branch
             if vibration_change(end.evaluation, settled.evaluation) > SMOOTH_CHANGE:
@@ -204,7 +223,7 @@ class LoadingPath(Path[State]):
             state = replace(settled, parameter=beyond)
             if beyond == target:
                 return Step(state, tuple(folds))
-        return Outcome.BRANCH_LOST
+        return Failure(Outcome.BRANCH_LOST)
 
     def change(self, before: State, after: State) -> float:
         """As in Path."""
@@ -242,15 +261,6 @@ class LoadingPath(Path[State]):
             return self.case.resolution == first_resolution(self.case.settings)
         return self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any()
 
-    def move(self, state: State, other: Self, run: Run) -> State | None:
-        """As in Path."""
-        return run.move(self.case, other.joint_of(state), state)
-
-    def again(self, state: State, history: FloatArray, run: Run) -> State | None:
-        """As in Path."""
-        balance = self.balance_at(state.parameter, history)
-        return stable_state(balance, state.evaluation.predicted_h, state.parameter, run)
-
     def choose(self, state: State, run: Run) -> tuple[Self, State, float]:
         """As in Path."""
         found = refine(self.case, self.joint_of(state), state, run, node=True)
@@ -261,21 +271,3 @@ class LoadingPath(Path[State]):
         at = f"{state.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {state.parameter:.3g}"
         moving = int(np.count_nonzero((state.evaluation.status_t != STICK).any(axis=1)))
         return f"at {at}, {moving} of {len(state.evaluation.status_t)} pairs slip or open"
-
-
-def stable_state(balance: Balance, begin: FloatArray, target: float, run: Run) -> State | None:
-    """Stable state of a balance near a predicted force (n_rel, m), N; None where none is found.
-
-    Too few samples may turn the sign of the determinant where many pairs slip and open: a node is unstable where it is
-    so with more.
-    """
-    found = run.state(balance, begin, target, NEAR_ITERATIONS)
-    if found is None or run.is_stable(balance, found.evaluation):
-        return found
-    joint, basis = balance.joint, balance.joint.basis
-    # the predicted force of masses on rigid ground depends on the length of a sample
-    if joint.law.rate_dependent:
-        return None
-    fine = replace(joint, basis=build_basis(basis.orders, SAMPLES_OF_SIGN * basis.n_samples))
-    finer = replace(balance, joint=fine)
-    return found if run.fresh().is_stable(finer, finer.evaluate(found.evaluation.predicted_h)) else None

@@ -100,7 +100,7 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float | F
                 break
             nodes.advance_to(float(np.nextafter(end, nodes.direction * math.inf)))
         else:
-            return lost(nodes, nodes.failure or Outcome.BRANCH_LOST)
+            return lost(nodes, nodes.failure or Failure(Outcome.BRANCH_LOST))
     within = f"between {follow.low:g} and {follow.high:g} Hz: give another range"
     return Failure(Outcome.RESONANCE_LOST, f"the sweep {line.sweep} meets no {follow.of} {within}")
 

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Generic
 
-from solver.accuracy.harmonic_levels import fewer
+from solver.accuracy.resolved_state import fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure, carried_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, Path, S, Step
@@ -92,7 +92,7 @@ class Sweep(Generic[S]):
         self.nodes = Nodes(path.case.resolution)
         self.ahead: Step[S] | None = None
         self.passed: list[float] = []
-        self.failure: Outcome | None = Outcome.START_FAILED
+        self.failure: Failure | None = Failure(Outcome.START_FAILED)
         self.length, self.rate = path.longest, 0.0
         self.checked: S | None = None
         self.branch, self.fold = 0, math.nan
@@ -124,7 +124,8 @@ class Sweep(Generic[S]):
             return None
         of, node = self.path.at(self.reference.resolution), self.reference.states[-1]
         at = replace(node.evaluation, history=history_at_rest(of.joint_of(node), node))
-        return path.again(state, carried_history(of.case, path.joint_of(state), at), run.fresh())
+        history = carried_history(of.case, path.joint_of(state), at)
+        return path.near(state, state.evaluation.predicted_h, history, run.fresh())
 
     def begin(self, path: Path[S], state: S) -> bool:
         """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
@@ -134,7 +135,7 @@ class Sweep(Generic[S]):
         """
         self.path, self.passed, self.nodes = path, [state.parameter], Nodes(path.case.resolution, (state,))
         if self._choose_resolution() > SENSITIVE_ERROR:
-            self.nodes, self.failure = Nodes(self.path.case.resolution), Outcome.UNSETTLED
+            self.nodes, self.failure = Nodes(self.path.case.resolution), Failure(Outcome.UNSETTLED)
             return False
         self.failure = None
         self._save()
@@ -150,13 +151,13 @@ class Sweep(Generic[S]):
             else:
                 self._advance(here, self.ahead)
 
-    def state_at(self, parameter: float, run: Run) -> Step[S] | Outcome:
+    def state_at(self, parameter: float, run: Run) -> Step[S] | Failure:
         """State at a parameter between the current and the next node, or why there is none.
 
         run: of its own; the sweep must not depend on it.
         """
         if self.here is None or self.ahead is None:
-            return self.failure or Outcome.BRANCH_LOST
+            return self.failure or Failure(Outcome.BRANCH_LOST)
         before, path = self.nodes.states[:-1], self.path
         near = before if self.ahead.folds else (*before[-1:], self.ahead.state)
         found = path.solve((*near, self.here), parameter, run)
@@ -176,8 +177,7 @@ class Sweep(Generic[S]):
 
     def rescue(self, here: S, length: float) -> Step[S] | Failure:
         """As in Line."""
-        found = self.path.rescue(here, self.path.ahead(here.parameter, self.direction * length), self.run)
-        return Failure(found) if isinstance(found, Outcome) else found
+        return self.path.rescue(here, self.path.ahead(here.parameter, self.direction * length), self.run)
 
     def _look_ahead(self, here: S) -> None:
         """Find the next node, or lose the sweep."""
@@ -188,7 +188,7 @@ class Sweep(Generic[S]):
         if budget.iterations <= SWEEP_ITERATIONS:
             taken = take_step(self, here, self.length, Lengths(1, AIMED_CHANGE, path.shortest, FREE_STEP))
         if isinstance(taken, Failure):
-            self.failure = taken.outcome
+            self.failure = taken
             return
         self.ahead, length = taken
         # the change will grow as in the last step: towards a resonance every third step would be refused

@@ -274,7 +274,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
         return None
     coarse, (first, *nodes) = path.at(begun.resolution), begun.nodes[::stride]
     joint, unworn = coarse.joint_at(first), np.zeros(path.case.model.contact.n_contact)
-    found: State | Outcome | None = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
+    found: State | Failure | None = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
     if not isinstance(found, State):
         return None
     states: tuple[State, ...] = (replace(found, parameter=first),)

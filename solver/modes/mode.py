@@ -21,7 +21,7 @@ from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest, transfer
+from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
@@ -148,14 +148,9 @@ class NonlinearMode(Path[ModeState]):
         one, other = (state.evaluation.predicted_h[:, 1:] / state.parameter for state in (before, after))
         return float(np.linalg.norm(other - one)) / max(float(np.linalg.norm(one)), 1e-300)
 
-    def move(self, state: ModeState, other: Self, run: Run) -> ModeState | None:
+    def near(self, state: ModeState, predicted_h: FloatArray, history: FloatArray, run: Run) -> ModeState | None:
         """As in Path."""
-        balance, start = transfer(self.case, other.joint_of(state), state.evaluation)
-        return other.find(state.parameter, (start, state.values), balance.history, run.fresh())
-
-    def again(self, state: ModeState, history: FloatArray, run: Run) -> ModeState | None:
-        """As in Path."""
-        return self.find(state.parameter, (state.evaluation.predicted_h, state.values), history, run)
+        return self.find(state.parameter, (predicted_h, state.values), history, run)
 
     def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, float]:
         """As in Path."""
@@ -172,14 +167,15 @@ class NonlinearMode(Path[ModeState]):
 
 @dataclass(frozen=True)
 class _AtAmplitude:
-    """The equations at an amplitude, m sqrt(kg), over the amplitude, with a tangential history (n_contact, 2), m."""
+    """As BorderedProblem: the equations at an amplitude, m sqrt(kg), over the amplitude, with a tangential history
+    (n_contact, 2), m. Values: frequency, damping ratio and drive. Extra: x_1 (n,), m.
+    """
 
     mode: NonlinearMode
     amplitude: float
     history: FloatArray
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        """As in BorderedProblem; values: frequency, damping ratio and drive. extra: x_1 (n,), m."""
         balance = Balance(self.mode.joint_with(values), self.history, np.zeros(len(self.history)))
         at = balance.evaluate(predicted_h)
         shape = _shape(balance.joint, at.displacement_h, float(values[2]))
@@ -194,7 +190,6 @@ class _AtAmplitude:
         return np.array([coordinate.real, coordinate.imag, np.vdot(x, moved).real / self.amplitude])
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
-        """As in BorderedProblem, by differences."""
         slopes, errors = [], []
         lengths = DIFFERENCE * np.array([here.values[0], 1.0, self.amplitude])
         for step, length in zip(np.diag(lengths), lengths, strict=True):
@@ -204,11 +199,9 @@ class _AtAmplitude:
         return slopes, np.stack(errors, axis=1)
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
-        """As in BorderedProblem."""
         return self._products(here.extra, _shape(here.balance.joint, tangent.transmit(step)[0], 0.0))
 
     def fraction(self, _: Bordered, __: FloatArray, ___: FloatArray) -> float:
-        """As in BorderedProblem."""
         return 1.0
 
 
@@ -294,8 +287,8 @@ def find_rest(
         # without the spring on the modal coordinate the held structure is singular at its own frequency
         case = build_case(modal_model(model, linear, 0.0), friction_coefficient, omega or linear.omega, settings)
         rest = state_at_rest(case, linear.omega, unworn, run)
-        if isinstance(rest, Outcome):
-            return Failure(rest)
+        if isinstance(rest, Failure):
+            return rest
         if omega is not None:
             return Rest(NonlinearMode(case, model, linear), glued is not None, rest)
         closed, omega = rest.evaluation.status_t[:, 0] != SEPARATED, linear.omega

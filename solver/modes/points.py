@@ -15,9 +15,8 @@ from typing import Literal
 import numpy as np
 
 from solver.accuracy.certificate import certify
-from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import first_response
+from solver.accuracy.resolved_state import first_response, shifted
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import fewer, shifted
+from solver.accuracy.resolved_state import fewer, shifted
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance
