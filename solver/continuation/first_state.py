@@ -86,11 +86,8 @@ def state_at_rest(case: Case, omega: float, wear_depth: FloatArray, run: Run) ->
     static = solve_static_state(quiet, wear_depth, run)
     if isinstance(static, Failure):
         return static
-    balance, parts = (
-        Balance(quiet, static.history, wear_depth),
-        (static.evaluation.displacement_h, static.evaluation.force_h),
-    )
-    start = balance.predict(*(change_orders(part, (), case.resolution.orders) for part in parts))
+    balance, at, orders = Balance(quiet, static.history, wear_depth), static.evaluation, case.resolution.orders
+    start = balance.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
     return run.state(balance, start, 0.0) or Failure(Outcome.START_FAILED)
 
 
@@ -117,14 +114,13 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State 
         balance = Balance(static_joint(joint, step / n_steps), state.history, wear_depth)
         before = state.evaluation.predicted_h
         start = balance.joint.structure.force_h() if step == 1 else before * (step / (step - 1.0))
-        found, used = run.state(balance, start), run.budget.iterations
+        found: State | Failure | None = run.state(balance, start)
         if found is None:
-            settled = _settle(balance, state.evaluation, run)
-            if isinstance(settled, Failure):
-                return settled
+            used, found = run.budget.iterations, _settle(balance, state.evaluation, run)
             # every search needs a static state, whose steps have a limit of their own
             run.budget.limit += run.budget.iterations - used
-            found = settled
+        if isinstance(found, Failure):
+            return found
         state = found
     return state
 

@@ -1,7 +1,7 @@
 """The points of a nonlinear mode at given amplitudes, each with its errors, or the reason where there is none.
 
 The errors of frequency and damping are, as those of a start state, the change with more harmonics and samples, times a
-safety factor, and the difference to the reference sweep, whose steps in amplitude are three times as long.
+safety factor, and the change with the tangential history that the reference sweep leaves.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from solver.settings import ROUND_OFF, Resolution, SolverSettings
 Direction = Literal["up", "down"]
 
 ERROR_OVER_CHANGE = 1.5
-"""Error of frequency and damping over their change with more harmonics and samples. Estimated over true errors of both:
-mass on a rigid slider at least 1.2, oscillator with a wall 1.4, pressed foot that begins to slip 0.5, dovetail 2."""
+"""Error of frequency and damping over their change with more harmonics and samples. Estimated over true errors: mass on
+a rigid slider at least 1.2, oscillator with a wall 1.4, pressed foot that begins to slip 0.5, dovetail 2."""
 
 _NO_FIRST = Failure(Outcome.START_FAILED, "the mode was not found at its first amplitude")
 
