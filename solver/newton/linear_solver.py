@@ -14,11 +14,11 @@ import scipy.linalg
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.newton.krylov import Correction, Product, build_correction, ritz_values, solve_gmres
+from solver.newton.krylov import Correction, build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
 
 FORCING = 1e-3
-"""Relative residual of a Newton direction (dovetail with half and twice this value: equal to 1e-6)."""
+"""Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
 
 KEPT_PRODUCTS = 25
 """Most products of a solve with a kept factorisation, before a new one is built, which takes as long as 20 products
@@ -26,13 +26,13 @@ with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 
 
 MOST_CORRECTED = 60
 """Most directions in which a factorisation is corrected. With 0, 60, 120: 17.4, 12.0, 11.4 products of a solve and 52,
-42, 42 CPU s with 160 pairs, 13.0, 9.5, 9.1 products and 6.3, 6.0, 6.0 s with 48. With 336 pairs 44 and 38 s."""
+42, 42 CPU s with 160 pairs; 6.3, 6.0, 6.0 s with 48."""
 
 FEWEST_CORRECTED = 3
 """Fewest products of a solve that a correction is made of."""
 
 MOST_PRODUCTS = 80
-"""Most products of a GMRES cycle, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32."""
+"""Most products of a solve, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32."""
 
 SETTLED = 0.1
 """Residual over modulus of an eigenvalue below which its sign is known, and real part above which an eigenvalue is
@@ -83,7 +83,6 @@ class DenseFactor:
 
 
 Factor = DenseFactor | PeriodFactor
-"""A factorisation of a Jacobian or of a matrix near the Jacobian, with the sign of its determinant."""
 
 
 def build_dense_factor(tangent: Linearisation) -> DenseFactor:
@@ -137,44 +136,42 @@ class JacobianSolver:
 
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
         """Solution in the rows of the active pairs, with the kept factorisation while products are few."""
-
-        def cleared(values: FloatArray) -> FloatArray:
-            # the steps of these rows do not act on the rows of the active pairs
-            values[tangent.passive_rows] = 0.0
-            return values
-
-        def iterate(factor: Factor, products: int, cycles: float) -> tuple[FloatArray, bool]:
-            # preconditioned from the right: the residual of GMRES is the true one
-            corrections = self._corrections
-
-            def solved(vector: FloatArray) -> FloatArray:
-                for correction in reversed(corrections):
-                    vector = correction.apply(vector)
-                return factor.solve(vector.reshape(right.shape))
-
-            def product(apply: Product) -> Product:
-                return lambda vector: cleared(apply(solved(vector))).ravel()
-
-            operators = product(tangent.apply_roughly), product(tangent.apply)
-            solution, found, *space = solve_gmres(*operators, cleared(right.copy()).ravel(), rtol, products, cycles)
-            self._correct(*space)
-            return solved(solution), found
-
         if self._factor is not None:
-            solution, found = iterate(self._factor, KEPT_PRODUCTS, 1)
+            solution, found = self._iterate(self._factor, tangent, right, rtol, KEPT_PRODUCTS)
             if found:
                 return solution
         self._factor, self._corrections = build_factor(tangent), ()
         # convergence is not required: Newton's method judges by the true residual
-        return iterate(self._factor, MOST_PRODUCTS, np.inf)[0]
+        return self._iterate(self._factor, tangent, right, rtol, MOST_PRODUCTS)[0]
 
-    def _correct(self, basis: FloatArray, hessenberg: FloatArray) -> None:
-        """Correct the factorisation by the space of a solve; all corrections are dropped where they become too many."""
-        known, k = sum(len(each.images) for each in self._corrections), hessenberg.shape[1]
-        if k < FEWEST_CORRECTED:
-            return
-        correction = build_correction(basis, hessenberg) if known + k <= MOST_CORRECTED else None
-        self._corrections = () if correction is None else (*self._corrections, correction)
+    def _iterate(
+        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, most: int
+    ) -> tuple[FloatArray, bool]:
+        """Solution by GMRES, and whether it has converged; corrects the factorisation by the space of the solve."""
+        corrections, passive = self._corrections, tangent.passive_rows
+
+        def solved(vector: FloatArray) -> FloatArray:
+            for correction in reversed(corrections):
+                vector = correction.apply(vector)
+            return factor.solve(vector.reshape(right.shape))
+
+        def active(values: FloatArray) -> FloatArray:
+            # the steps of passive rows do not act on the rows of the active pairs
+            values[passive] = 0.0
+            return values.ravel()
+
+        def product(vector: FloatArray) -> FloatArray:
+            # preconditioned from the right: the residual of GMRES is the true one
+            return active(tangent.apply_roughly(solved(vector)))
+
+        solution, found, basis, hessenberg = solve_gmres(product, active(right.copy()), rtol, most)
+        n_new = hessenberg.shape[1]
+        if n_new >= FEWEST_CORRECTED:
+            n_corrected = n_new + sum(len(each.images) for each in corrections)
+            own = build_correction(basis, hessenberg) if n_corrected <= MOST_CORRECTED else None
+            # where the directions become too many all are dropped
+            self._corrections = () if own is None else (*corrections, own)
+        return solved(solution), found
 
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
@@ -186,13 +183,12 @@ class JacobianSolver:
             sign, settled = _sign_by_eigenvalues(self._factor, tangent)
             if settled:
                 return sign
-        factor = build_factor(tangent)
-        self._factor, self._corrections = factor, ()
-        sign, settled = (factor.sign, True) if factor.exact else _sign_by_eigenvalues(factor, tangent)
-        if settled:
-            return sign
-        whole = build_dense_factor(tangent)
-        return whole.sign if whole.exact else sign
+        self._factor, self._corrections = build_factor(tangent), ()
+        if self._factor.exact:
+            return self._factor.sign
+        sign, settled = _sign_by_eigenvalues(self._factor, tangent)
+        whole = None if settled else build_dense_factor(tangent)
+        return sign if whole is None or not whole.exact else whole.sign
 
 
 def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:

@@ -11,9 +11,9 @@ with the derivatives A and B of the contact law at a sample (`sampled_law`), in 
     dx(t) = B(t) dx(t - 1) + [1 + A(t) (Z / eps - 1)]^-1 A(t) [r(t) - (Z / eps - 1) B(t) dx(t - 1)]
 
 is a march with one small system at each sample, in the rows of pairs that slip or are open (A is zero where a pair
-sticks), and `dp = r - (Z / eps - 1) dx` follows in all harmonics at once. Resonances of the structure and the
-truncation of the series are left to GMRES. CPU s of a history of the dovetail with the march, and with a factorisation
-of the most important directions in its place: 48 pairs 4.8 and 10.5, 336 pairs 35 and 59.
+sticks), and `dp = r - (Z / eps - 1) dx` follows. Resonances of the structure and the truncation of the series are left
+to GMRES. CPU s of a history of the dovetail, and with a factorisation of the most important directions instead: 48
+pairs 4.8 and 10.5, 336 pairs 35 and 59.
 """
 
 from __future__ import annotations

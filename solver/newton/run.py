@@ -20,15 +20,15 @@ from solver.newton.linear_solver import FORCING, JacobianSolver
 from solver.structure.joint import Case, Joint
 
 MOST_ITERATIONS = 30
-"""Most iterations of one solve. Prototypes took 2 to 5 from a warm start, up to 40 from a cold one near a resonance."""
+"""Most iterations of one solve: 2 to 5 are needed from a near state."""
 
 FULL_STEPS = 6
 """Full steps in a row without a new lowest residual before steps are halved. Half and twice as many: equal states."""
 
 SHORTEST_STEP = 1.0 / 128.0
 """Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate
-state. Also the shortest natural step over the range to the target (where a shorter one is needed, the branch is assumed
-to fold), the shortest Euler step on the slow time over the wanted one, and the shortest relaxation step in periods."""
+state. Also the shortest natural step over the range to the target, the shortest Euler step on the slow time over the
+wanted one, and the shortest relaxation step in periods."""
 
 
 class _HasResidual(Protocol):
@@ -60,9 +60,9 @@ def solve_newton(
 ) -> NewtonResult[EvaluationT]:
     """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
 
-    The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution, while a line
-    search takes very short steps at every kink. So full steps come first, as long as the lowest norm is improved once
-    in `FULL_STEPS` iterations. Then the iteration returns to the best point and halves its steps until the norm falls.
+    The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution. So full
+    steps come first, as long as the lowest norm is improved once in `FULL_STEPS` iterations. Then the iteration returns
+    to the best point and halves its steps until the norm falls.
     """
     unknown, current = start, evaluate(start)
     best, best_norm, since_best = (unknown, current), np.inf, 0
@@ -141,8 +141,7 @@ def bordered_step(
 ) -> tuple[FloatArray, FloatArray]:
     """Newton step of all unknowns (n_rel m + k,), and the derivative `reduced` (k, k) as in `Bordered`.
 
-    With the Jacobian J = dR/dp, the steps a and B of p for the residual and for each of the further unknowns, J a = -R
-    and J B = -dR/dq, leave k equations for the change of q (Govaerts, Numerical Methods for Bifurcations of Dynamical
+    With the Jacobian J = dR/dp, J a = -R and J B = -dR/dq (Govaerts, Numerical Methods for Bifurcations of Dynamical
     Equilibria, 2000, section 3.6):
 
         (de/dq + de/dp B) dq = -e - de/dp a,      dp = a + B dq.
@@ -167,7 +166,7 @@ def bordered_step(
 
 
 class OutOfTimeError(Exception):
-    """A computation has used up its CPU time; the caller turns this error into an outcome."""
+    """A computation has used up its CPU time."""
 
 
 @dataclass
@@ -199,8 +198,7 @@ class Budget:
 class Run:
     """Solves of one computation, one after the other. Each raises OutOfTimeError after the deadline of the budget.
 
-    tolerance: of the scaled residual. budget: shared by all parts of the computation.
-    solver: keeps a factorisation from solve to solve, which saves time and changes the last bits only.
+    tolerance: of the scaled residual. budget: shared by all parts of the computation. solver: keeps a factorisation.
     """
 
     tolerance: float

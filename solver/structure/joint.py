@@ -19,10 +19,7 @@ from solver.structure.penalty import Penalty, build_penalty
 
 @dataclass(frozen=True)
 class Joint:
-    """All data that are constant while a periodic state is sought.
-
-    model: before condensation. omega, excitation_amplitude: rad/s, N. friction_coefficient (n_contact,).
-    """
+    """A joint at one frequency omega, rad/s, and excitation amplitude, N. friction_coefficient: (n_contact,)."""
 
     model: ReducedModel
     omega: float
@@ -77,11 +74,9 @@ class Joint:
 @packable
 @dataclass(frozen=True)
 class Hold:
-    """A soft spring on the mean position of a joint along a direction in which the joint can slide freely.
+    """A soft spring, N/m, on the mean position of a joint along a direction in which the joint can slide freely.
 
-    - direction (n_rel,): of norm 1.
-    - stiffness: N/m.
-    - position: mean position along the direction at which the spring has no force, m.
+    direction (n_rel,): of norm 1. position: along the direction, at which the spring has no force, m.
     """
 
     direction: FloatArray
@@ -95,11 +90,10 @@ class Hold:
 
 @dataclass(frozen=True)
 class Case:
-    """Data that all states of one computation share. `joint` gives the joint at a frequency and amplitude.
+    """What all states of one computation share. friction_coefficient: (n_contact,).
 
-    - friction_coefficient (n_contact,): for each pair.
-    - penalty_omega: angular frequency for which the penalty is built, rad/s.
-    - hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.
+    penalty_omega: angular frequency for which the penalty is built, rad/s.
+    hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.
     """
 
     model: ReducedModel
@@ -109,7 +103,6 @@ class Case:
     settings: SolverSettings
     resolution: Resolution
     hold: Hold | None = None
-    # a small cache: a wear history uses two structures at one frequency in turns
     _structures: dict[tuple[float, float, tuple[int, ...]], CondensedStructure] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -158,8 +151,8 @@ def build_case(
 ) -> Case:
     """Case of a scene; errors as of `friction_of_pairs`.
 
-    - omega: angular frequency for which the penalty is built, rad/s; equal for states that are compared.
-    - resolution: first harmonics and samples; by default from the settings.
+    omega: angular frequency for which the penalty is built, rad/s; equal for states that are compared.
+    resolution: by default from the settings.
     """
     chosen = resolution or first_resolution(settings)
     penalty = build_penalty(model, omega, chosen.highest)
