@@ -168,15 +168,10 @@ class Linearisation:
         rest, motion = self._untransmitted(step)
         return self.joint.to_pairs(motion), self.joint.to_pairs(step - rest)
 
-    def apply(self, step: FloatArray) -> FloatArray:
-        """Jacobian times a step (n_rel, m), N."""
+    def apply(self, step: FloatArray, *, roughly: bool = False) -> FloatArray:
+        """Jacobian times a step (n_rel, m), N; roughly: to at least three digits."""
         rest, motion = self._untransmitted(step)
-        return self.joint.structure.apply(motion) + step - rest
-
-    def apply_roughly(self, step: FloatArray) -> FloatArray:
-        """As `apply`, to at least three digits."""
-        rest, motion = self._untransmitted(step)
-        return self.joint.structure.apply_roughly(motion) + step - rest
+        return self.joint.structure.apply(motion, roughly=roughly) + step - rest
 
     def _untransmitted(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -60,32 +59,20 @@ def solve_gmres(
     return np.linalg.lstsq(hessenberg, along, rcond=least)[0] @ basis[:-1], found, basis, hessenberg
 
 
-@dataclass(frozen=True)
-class Correction:
-    """Exact inverse of an operator A on the space where GMRES has been, the identity at right angles to this space.
+def build_correction(basis: FloatArray, hessenberg: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """A correction `1 + (U - Y) Y^T` of vectors; returns the rows of Y and of U - Y (k, n).
 
-    Arnoldi's method gives `A V = W H`. With H = Q R, the orthonormal columns of Y = W Q are the images of `U = V R^-1`:
-    the correction is `1 + (U - Y) Y^T` (Parks et al., Recycling Krylov Subspaces, SIAM J. Sci. Comput. 28, 2006).
-
-    images, changes (k, n): rows of Y and of U - Y.
+    Of the operator it is the exact inverse on the space where GMRES has been, and the identity at right angles to this
+    space. Arnoldi's method gives `A V = W H`, with W (k + 1, n) and H (k + 1, k). With H = Q R, the orthonormal columns
+    of Y = W Q are the images of `U = V R^-1` (Parks et al., Recycling Krylov Subspaces, SIAM J. Sci. Comput. 28, 2006).
+    None where the operator is nearly singular.
     """
-
-    images: FloatArray
-    changes: FloatArray
-
-    def apply(self, vector: FloatArray) -> FloatArray:
-        """Corrected vector (n,)."""
-        return np.asarray(vector + (self.images @ vector) @ self.changes)
-
-
-def build_correction(basis: FloatArray, hessenberg: FloatArray) -> Correction | None:
-    """Correction from W (k + 1, n) and H (k + 1, k) of Arnoldi's method; None where the operator is nearly singular."""
     left, right = np.linalg.qr(hessenberg)
     sizes = np.abs(np.diag(right))
     if not sizes.min() > NEGLIGIBLE * sizes.max():
         return None
     images = left.T @ basis
-    return Correction(images, scipy.linalg.solve_triangular(right, basis[:-1], trans="T") - images)
+    return images, scipy.linalg.solve_triangular(right, basis[:-1], trans="T") - images
 
 
 def ritz_values(

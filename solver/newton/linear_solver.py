@@ -14,7 +14,7 @@ import scipy.linalg
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.newton.krylov import Correction, build_correction, ritz_values, solve_gmres
+from solver.newton.krylov import build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
 
 FORCING = 1e-3
@@ -108,7 +108,7 @@ class JacobianSolver:
     """Solver of systems with a `Linearisation` that keeps one factorisation, corrected, between its calls."""
 
     _factor: Factor | None = None
-    _corrections: tuple[Correction, ...] = ()
+    _corrections: tuple[tuple[FloatArray, FloatArray], ...] = ()
 
     def solve(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
@@ -131,7 +131,7 @@ class JacobianSolver:
                 step[rows] = self._solve_kept(tangent, right, rtol)[rows]
         for step, right in zip(steps, rights, strict=True) if rest.size else ():
             # the columns of all other unknowns are those of the identity
-            step[rest] = (right - tangent.apply_roughly(step))[rest]
+            step[rest] = (right - tangent.apply(step, roughly=True))[rest]
         return steps
 
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
@@ -151,8 +151,8 @@ class JacobianSolver:
         corrections, passive = self._corrections, tangent.passive_rows
 
         def solved(vector: FloatArray) -> FloatArray:
-            for correction in reversed(corrections):
-                vector = correction.apply(vector)
+            for images, changes in reversed(corrections):
+                vector = vector + (images @ vector) @ changes
             return factor.solve(vector.reshape(right.shape))
 
         def active(values: FloatArray) -> FloatArray:
@@ -162,12 +162,12 @@ class JacobianSolver:
 
         def product(vector: FloatArray) -> FloatArray:
             # preconditioned from the right: the residual of GMRES is the true one
-            return active(tangent.apply_roughly(solved(vector)))
+            return active(tangent.apply(solved(vector), roughly=True))
 
         solution, found, basis, hessenberg = solve_gmres(product, active(right.copy()), rtol, most)
         n_new = hessenberg.shape[1]
         if n_new >= FEWEST_CORRECTED:
-            n_corrected = n_new + sum(len(each.images) for each in corrections)
+            n_corrected = n_new + sum(len(images) for images, _ in corrections)
             own = build_correction(basis, hessenberg) if n_corrected <= MOST_CORRECTED else None
             # where the directions become too many all are dropped
             self._corrections = () if own is None else (*corrections, own)
@@ -196,7 +196,7 @@ def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float,
     shape = tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]
 
     def product(vector: FloatArray) -> FloatArray:
-        return tangent.apply_roughly(factor.solve(vector.reshape(shape))).ravel()
+        return tangent.apply(factor.solve(vector.reshape(shape)), roughly=True).ravel()
 
     def settled(values: ComplexArray, residuals: FloatArray) -> bool:
         doubtful = ~(values.real >= SETTLED)

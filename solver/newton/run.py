@@ -188,11 +188,6 @@ class Budget:
         """Whether the limit is passed and no new step may begin."""
         return self.iterations > self.limit
 
-    def check_time(self) -> None:
-        """Raise OutOfTimeError after the deadline."""
-        if self.deadline < np.inf and computing_time() > self.deadline:
-            raise OutOfTimeError
-
 
 @dataclass
 class Run:
@@ -220,7 +215,7 @@ class Run:
         """
 
         def direction(at: Evaluation, rtol: float) -> FloatArray:
-            return self.step(balance, at, -at.residual, rtol)
+            return np.asarray(self.solver.solve(balance.linearise(at), [-at.residual], rtol)[0])
 
         return self._iterate(balance.evaluate, direction, start, most)
 
@@ -258,7 +253,8 @@ class Run:
         """`solve_newton` within the budget; direction: of an evaluation, and the relative residual of its solve."""
 
         def within_time(at: EvaluationT) -> FloatArray:
-            self.budget.check_time()
+            if self.budget.deadline < np.inf and computing_time() > self.budget.deadline:
+                raise OutOfTimeError
             # no more accurate than the tolerance needs
             return direction(at, max(FORCING, 0.1 * self.tolerance / max(at.scaled_residual(), self.tolerance)))
 

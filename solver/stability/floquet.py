@@ -108,7 +108,7 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: 
         switches and not every and not _bounces(joint, at)
     ):
         return None
-    found = find_multipliers(case, joint, at, run, growing_only=True)
+    found = find_multipliers(case, joint, at, run)
     if not found.grow:
         return None
     largest = found.values[0]
@@ -122,14 +122,14 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: 
     return Failure(Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE, said)
 
 
-def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing_only: bool = False) -> Multipliers:
+def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run) -> Multipliers:
     """Multipliers of a state at a fixed wear depth; none where they are not known:
 
     - in a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
     - for a joint with more than `MOST_ROWS` displacements of switching pairs;
     - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
 
-    growing_only: with one number of time steps where nothing grows, and on any branch. Raises OutOfTimeError.
+    Raises OutOfTimeError.
     """
     switching, stuck = switching_pairs(at)
     if not switching.any():
@@ -142,10 +142,10 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing
     if not travels and 3 * np.count_nonzero(switching) <= MOST_ROWS:
         sharp = _sharper(case, joint, at, run) if bounces else (joint, at)
         # beside folds a solve may change the branch
-        if sharp is not None and (growing_only or _apart(sharp[1], at) <= OTHER_BRANCH):
+        if sharp is not None and _apart(sharp[1], at) <= OTHER_BRANCH:
             if bounces and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
                 return Multipliers(_sorted(values), 0.0)
-            return _integrated(*sharp, growing_only, case.settings.rtol)
+            return _integrated(*sharp, case.settings.rtol)
     return Multipliers(np.empty(0, np.complex128), np.inf)
 
 
@@ -184,24 +184,20 @@ def _sorted(values: ComplexArray) -> ComplexArray:
 # --- by time integration ---
 
 
-def _integrated(joint: Joint, at: Evaluation, growing_only: bool, rtol: float) -> Multipliers:
+def _integrated(joint: Joint, at: Evaluation, rtol: float) -> Multipliers:
     """Multipliers by integration in time; samples are doubled until the first one is known, or its side of 1."""
     small, error = _is_small(joint, at), np.inf
-    n_samples = _samples(joint, at, small) // (1 if growing_only else 2)
-
-    def integrated() -> ComplexArray:
-        return _sorted(multipliers_of(build_monodromy(joint, joint.model.linear[0], at, n_samples), small))
-
-    values = integrated()
-    while values.size and error > rtol and n_samples < 8 * SMALL_SAMPLES:
-        largest = abs(values[0])
-        if abs(largest - 1.0) > 2.0 * error or (growing_only and largest <= 1.0 + SMALLEST_GROWTH):
+    n_samples, values = _samples(joint, at, small) // 2, np.empty(0, np.complex128)
+    while n_samples <= 8 * SMALL_SAMPLES:
+        coarse, monodromy = values[:1], build_monodromy(joint, joint.model.linear[0], at, n_samples)
+        values = _sorted(multipliers_of(monodromy, small))
+        if not values.size:
+            return Multipliers(values, np.inf)
+        # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
+        error = float(abs(abs(values[0]) - abs(coarse[0]))) if coarse.size else np.inf
+        if error <= rtol or abs(abs(values[0]) - 1.0) > 2.0 * error:
             break
-        coarse, n_samples = values[0], 2 * n_samples
-        values, error = integrated(), np.inf
-        if values.size:
-            # of multipliers of equal modulus another one may come first
-            error = float(abs(abs(values[0]) - abs(coarse)) if growing_only else abs(values[0] - coarse))
+        n_samples *= 2
     return Multipliers(values, error)
 
 

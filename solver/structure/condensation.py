@@ -83,14 +83,14 @@ class CondensedStructure:
             amplitudes[:, 0] = self.harmonic_force
         return from_complex(self.static_force, amplitudes)
 
-    def apply(self, displacement_h: FloatArray) -> FloatArray:
-        """`Z_r u` of Eq. (8), N, (n_rel, 2H+1) from u (n_rel, 2H+1), m."""
-        return from_complex(self.static_stiffness @ displacement_h[:, 0], self.moving.apply(displacement_h))
+    def apply(self, displacement_h: FloatArray, *, roughly: bool = False) -> FloatArray:
+        """`Z_r u` of Eq. (8), N, (n_rel, 2H+1) from u (n_rel, 2H+1), m.
 
-    def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
-        """`Z_r u` in single precision, but for the static part: 0.5 to 0.7 of the time of `apply`."""
-        # a joint that slides as a whole moves far
-        return from_complex(self.static_stiffness @ displacement_h[:, 0], self.moving.single.apply(displacement_h))
+        roughly: in single precision, which takes 0.5 to 0.7 of the time, but for the static part: a joint that slides
+        as a whole moves far.
+        """
+        moving = self.moving.single if roughly else self.moving
+        return from_complex(self.static_stiffness @ displacement_h[:, 0], moving.apply(displacement_h))
 
     def response_h(self, displacement_h: FloatArray) -> FloatArray:
         """Responses (n_response, 2H+1), m, from u (n_rel, 2H+1), m."""

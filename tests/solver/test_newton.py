@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,25 +14,13 @@ from solver.contact.coulomb import SLIP
 from solver.harmonic_balance.dlft import Balance
 from solver.newton import linear_solver
 from solver.newton.krylov import STAGNATION_PRODUCTS, build_correction, solve_gmres
-from solver.newton.linear_solver import DENSE_UNKNOWNS, DenseFactor, JacobianSolver, build_dense_factor, build_factor
+from solver.newton.linear_solver import DENSE_UNKNOWNS, DenseFactor, JacobianSolver, build_factor
 from solver.newton.period_preconditioner import build_period_factor, stiffness_of_most
 from solver.newton.run import Bordered, bordered_step, solve_newton
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
 from tests.solver.models import PRELOAD, branch_states, dovetail, march_wear, random_balance, random_model
-
-
-@dataclass(frozen=True)
-class Example:
-    """Evaluation of a plain function."""
-
-    point: np.ndarray
-    residual: np.ndarray
-    scale: tuple[float, float] = (1.0, 1.0)
-
-    def scaled_residual(self, scale=None):
-        return float(np.linalg.norm(self.residual)) / (scale or self.scale)[0]
 
 
 @dataclass
@@ -44,10 +33,11 @@ class Problem:
 
     def evaluate(self, point):
         self.calls.append(point)
-        return Example(point, self.function(point))
+        norm = float(np.linalg.norm(self.function(point)))
+        return SimpleNamespace(point=point, scale=(1.0, 1.0), scaled_residual=lambda _=None: norm)
 
     def direction(self, at):
-        return np.linalg.solve(self.derivative(at.point), -at.residual)
+        return np.linalg.solve(self.derivative(at.point), -self.function(at.point))
 
     def solve(self, start, tolerance=1e-10):
         return solve_newton(self.evaluate, self.direction, np.asarray(start, float), tolerance)
@@ -68,16 +58,14 @@ def test_a_cycle_of_plain_newton_is_broken():
         lambda x: 5 * np.clip(x, -1, 1) + (x - np.clip(x, -1, 1)),
         lambda x: np.diag(np.where(np.abs(x) < 1, 5.0, 1.0)),
     )
-    point = np.linspace(2.0, 3.0, 3)
-    for expected in (-4.0, 4.0, -4.0):
-        point = point + problem.direction(problem.evaluate(point))
-        assert point == pytest.approx(expected * np.ones(3))
     result = problem.solve(np.linspace(2.0, 3.0, 3))
+    for point, expected in zip(problem.calls[1:4], (-4.0, 4.0, -4.0), strict=True):
+        assert point == pytest.approx(expected * np.ones(3))
     assert result.converged
     assert result.unknown == pytest.approx(np.zeros(3), abs=1e-10)
 
 
-def test_no_solution_is_the_best_point_so_far():
+def test_where_there_is_no_solution_the_best_point_is_returned():
     problem = Problem(lambda x: x**2 + 1.0, lambda x: np.diag(2 * x))
     result = problem.solve([1.3])
     assert not result.converged
@@ -89,7 +77,7 @@ def test_a_residual_that_is_not_finite_sends_the_iteration_back():
     # the full step leads to where the logarithm is undefined
     problem = Problem(lambda x: np.log(x) if x[0] > 0 else np.full(1, np.nan), lambda x: np.diag(1 / x))
     result = problem.solve([10.0], 1e-12)
-    assert np.isnan(problem.evaluate(problem.calls[1]).scaled_residual())
+    assert problem.calls[1][0] < 0.0
     assert result.converged
     assert result.unknown[0] == pytest.approx(1.0, rel=1e-10, abs=0.0)
 
@@ -122,9 +110,9 @@ def case(seed, kinds=LARGE, wear=True, pressed=None, highest=3, samples=24):
     """A balance and a predicted force; pairs from `pressed` on stay closed and stuck."""
     resolution = Resolution(all_orders(highest), samples)
     balance, predicted = random_balance(random_model(seed, kinds, 4), SMALL, seed, wear=wear, resolution=resolution)
-    joint = balance.joint
+    component = balance.joint.component_index
     if pressed is not None:
-        predicted[(joint.component_index // 3 >= pressed) & (joint.component_index % 3 == 0), 0] += 1e4 * PRELOAD
+        predicted[(component // 3 >= pressed) & (component % 3 == 0), 0] += 1e4 * PRELOAD
     return balance, predicted
 
 
@@ -177,14 +165,13 @@ def test_a_correction_is_exact_where_gmres_has_been_and_saves_the_next_solve():
     random = np.random.default_rng(3)
     matrix = np.eye(60) + 0.05 * random.normal(size=(60, 60)) - 0.9 * np.outer(*np.eye(60)[:2])
     first, second = random.normal(size=(2, 60))
-    correction = build_correction(*solve_gmres(lambda x: matrix @ x, first, 1e-6, 30)[2:])
-    images = correction.images
-    np.testing.assert_allclose([matrix @ correction.apply(each) for each in images], images, atol=1e-12)
+    images, changes = build_correction(*solve_gmres(lambda x: matrix @ x, first, 1e-6, 30)[2:])
+    correction = np.eye(60) + changes.T @ images
+    np.testing.assert_allclose(matrix @ correction @ images.T, images.T, atol=1e-12)
     across = second - (images @ second) @ images
-    np.testing.assert_allclose(correction.apply(across), across, atol=1e-12)
+    np.testing.assert_allclose(correction @ across, across, atol=1e-12)
     count = gmres(matrix, first + 1e-3 * second, 1e-3, 30)[2]
-    corrected = np.array([matrix @ correction.apply(each) for each in np.eye(60)]).T
-    assert gmres(corrected, first + 1e-3 * second, 1e-3, 30)[2] < 0.5 * count
+    assert gmres(matrix @ correction, first + 1e-3 * second, 1e-3, 30)[2] < 0.5 * count
 
 
 def test_a_singular_operator_gives_what_can_be_had_and_ends():
@@ -207,20 +194,6 @@ def test_a_singular_operator_gives_what_can_be_had_and_ends():
     assert converged
     assert np.linalg.norm(matrix @ found - reached) <= 1e-6 * np.linalg.norm(reached)
     assert not gmres(np.full((5, 5), np.nan), np.ones(5), 1e-3, 5)[1]
-
-
-@pytest.mark.parametrize(("seed", "wear"), [(1, False), (2, True)])
-def test_dense_factors_give_the_solution_and_the_determinant(seed, wear):
-    balance, predicted = case(seed, THREE_STUCK, wear, pressed=9)
-    tangent = tangent_of(balance, predicted)
-    found = build_dense_factor(tangent)
-    assert found.exact
-    right = np.random.default_rng(seed).normal(size=predicted.shape)
-    right[tangent.passive_rows] = 0.0
-    exact = np.linalg.solve(dense_of(tangent), right.ravel()).reshape(right.shape)[tangent.active_rows]
-    # the shift of neutral directions moves the eigenvalues by 1e-8
-    assert np.linalg.norm(found.solve(right)[tangent.active_rows] - exact) < 1e-6 * np.linalg.norm(exact)
-    assert found.sign == np.linalg.slogdet(dense_of(tangent))[0]
 
 
 def test_the_lowest_harmonics_steer_the_iteration(monkeypatch):
