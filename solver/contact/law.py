@@ -118,36 +118,24 @@ class ContactLaw:
         """Exact derivatives by the harmonics of the predicted force of each pair, with the periodicity.
 
         Returns those of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the slip work
-        (n_contact, 3m), m. Tangential displacements that do not exist count as sticking.
+        (n_contact, 3m), m. Entries of displacements that a pair does not have are without meaning.
         """
         contact, basis, inertial = self.contact, self.basis, self.penalty.inertial
-        n_contact, m = contact.n_contact, basis.synthesis.shape[0]
-        tangent, work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
-        stuck, absent, none = at.stuck, contact.dofs < 0, np.zeros(n_contact)
+        n_contact, size, stuck, none = contact.n_contact, 3 * len(basis.synthesis), at.stuck, np.zeros(len(at.periods))
+        tangent, work_tangent = np.zeros((n_contact, size, size)), np.zeros((n_contact, size))
         # an open pair transmits nothing
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
-        slides = switching & ~absent[:, 1:].all(axis=1)
+        slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
         marched = at.predicted_t, self.friction_coefficient, at.start, at.force_t, at.state_t, at.status_t
         period, out = Period(*marched, at.periods, none, none), (tangent, work_tangent)
         march_tangent(np.flatnonzero(slides & ~inertial), period, basis.synthesis, basis.analysis, out)
         if self.rate_dependent:
             series = basis.synthesis, basis.step_mean, basis.analysis
             mass_tangent(np.flatnonzero(slides & inertial), period, self._masses, *series, out)
-        work_tangent /= self.state_stiffness[:, None]
-        # nothing acts along directions that a pair does not have
-        pair, component = np.nonzero(absent)
-        by_component = tangent.reshape(n_contact, 3, m, 3, m)
-        by_component[pair, component] = 0.0
-        by_component[pair, :, :, component] = 0.0
-        work_tangent.reshape(n_contact, 3, m)[pair, component] = 0.0
         closing = np.flatnonzero(contact.has_normal & switching)
         mean_normal_tangent(closing, at.predicted_t, basis.synthesis, basis.analysis, tangent)
-        passes = stuck[:, None] | absent
-        passes[:, 0] = stuck & contact.has_normal
-        pair, component = np.nonzero(passes)
-        own = m * component[:, None] + np.arange(m)
-        tangent[pair[:, None], own, own] = 1.0
-        return tangent, work_tangent
+        tangent[stuck] = np.eye(size)
+        return tangent, work_tangent / self.state_stiffness[:, None]
 
     # --- motion ---
 

@@ -163,10 +163,9 @@ class Linearisation:
         """All other relative displacements."""
         return np.setdiff1d(np.arange(self.joint.component_index.size), self.active_rows, assume_unique=True)
 
-    def transmit(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Changes of motion, m, and contact force, N, both (n_contact, 3, m), with a step (n_rel, m), N."""
-        rest, motion = self._untransmitted(step)
-        return self.joint.to_pairs(motion), self.joint.to_pairs(step - rest)
+    def motion(self, step: FloatArray) -> FloatArray:
+        """Change of the motion (n_contact, 3, m), m, with a step (n_rel, m), N."""
+        return self.joint.to_pairs(self._untransmitted(step)[1])
 
     def apply(self, step: FloatArray, *, roughly: bool = False) -> FloatArray:
         """Jacobian times a step (n_rel, m), N; roughly: to at least three digits."""

@@ -87,7 +87,7 @@ def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool
             both = slice(2 * place + 1, 2 * place + 3)
             force_h[:, both] = force[:, both]
             amplitude = to_complex(force)[:, place]
-            moved = -np.linalg.solve(joint.structure.moving.matrix(int(place)), amplitude)
+            moved = -np.linalg.solve(joint.structure.dynamic_stiffness[place], amplitude)
             motion_h[:, both] = np.stack([moved.real, -moved.imag], axis=1)
     return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
 

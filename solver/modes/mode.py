@@ -228,7 +228,7 @@ class _AtAmplitude:
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         """As in BorderedProblem."""
-        turned = _shape(here.balance.joint, tangent.transmit(step)[0], 0.0)
+        turned = _shape(here.balance.joint, tangent.motion(step), 0.0)
         coordinate = self._coordinate(turned)
         return np.array([coordinate.real, coordinate.imag, self._product(here.extra, turned)])
 

@@ -177,7 +177,7 @@ class JacobianSolver:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
         For a large joint, that of the kept factorisation P times (-1)^k, with k real negative eigenvalues of J P^-1.
-        Where these outliers do not converge, this Jacobian is factorised instead of the kept one, and then densely.
+        Where these outliers do not converge, this Jacobian is factorised instead.
         """
         if self._factor is not None and not self._factor.exact:
             sign, settled = _sign_by_eigenvalues(self._factor, tangent)
@@ -186,9 +186,7 @@ class JacobianSolver:
         self._factor, self._corrections = build_factor(tangent), ()
         if self._factor.exact:
             return self._factor.sign
-        sign, settled = _sign_by_eigenvalues(self._factor, tangent)
-        whole = None if settled else build_dense_factor(tangent)
-        return sign if whole is None or not whole.exact else whole.sign
+        return _sign_by_eigenvalues(self._factor, tangent)[0]
 
 
 def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:

@@ -130,9 +130,8 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
 @lru_cache(maxsize=KEPT_STRUCTURES)
 def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
     """Real stiffness (n_rel, n_rel), N/m: median of all harmonics, which ignores those near a resonance."""
-    moving = (structure.moving.matrix(place).real for place in range(len(structure.dynamic_response)))
-    stacked = np.stack([structure.static_stiffness, *moving])
-    return np.asarray(np.median(stacked, axis=0, overwrite_input=True))
+    every = np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real])
+    return np.asarray(np.median(every, axis=0, overwrite_input=True))
 
 
 @njit(cache=True)

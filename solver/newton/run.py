@@ -31,19 +31,38 @@ state. Also the shortest natural step over the range to the target, the shortest
 wanted one, and the shortest relaxation step in periods."""
 
 
-class _HasResidual(Protocol):
+@dataclass(frozen=True)
+class Bordered:
+    """Evaluation of a balance with further equations.
+
+    balance, at: at the values of the further unknowns (k,). errors (k,): of the further equations, dimensionless.
+    reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
+    extra: what the problem needs again for its derivatives.
+    """
+
+    balance: Balance
+    at: Evaluation
+    values: FloatArray
+    errors: FloatArray
+    reduced: FloatArray | None = None
+    extra: Any = field(default=None, repr=False)
+
     @property
-    def scale(self) -> tuple[float, float]: ...
+    def scale(self) -> tuple[float, float]:
+        """As in Evaluation."""
+        return self.at.scale
 
-    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float: ...
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
+        """Norm of all residuals, dimensionless."""
+        return float(np.hypot(self.at.scaled_residual(scale), np.linalg.norm(self.errors)))
 
 
-EvaluationT = TypeVar("EvaluationT", bound=_HasResidual)
+EvaluationT = TypeVar("EvaluationT", Evaluation, Bordered)
 
 
 @dataclass(frozen=True)
 class NewtonResult(Generic[EvaluationT]):
-    """End of an iteration: its last unknown and evaluation, or those of the lowest norm where it has not converged."""
+    """End of an iteration: its last point, or that of the lowest norm where it has not converged."""
 
     converged: bool
     unknown: FloatArray
@@ -91,33 +110,6 @@ def solve_newton(
             trial = evaluate(unknown + length * step)
         unknown, current = unknown + length * step, trial
     return NewtonResult(False, *best, most)
-
-
-@dataclass(frozen=True)
-class Bordered:
-    """Evaluation of a balance with further equations.
-
-    balance, at: at the values of the further unknowns.
-    values, errors (k,): further unknowns, and residuals of the further equations, dimensionless.
-    reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
-    extra: what the problem needs again for its derivatives.
-    """
-
-    balance: Balance
-    at: Evaluation
-    values: FloatArray
-    errors: FloatArray
-    reduced: FloatArray | None = None
-    extra: Any = field(default=None, repr=False)
-
-    @property
-    def scale(self) -> tuple[float, float]:
-        """As in Evaluation."""
-        return self.at.scale
-
-    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
-        """Norm of all residuals, dimensionless."""
-        return float(np.hypot(self.at.scaled_residual(scale), np.linalg.norm(self.errors)))
 
 
 class BorderedProblem(Protocol):

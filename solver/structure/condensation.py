@@ -39,12 +39,7 @@ def _others(n: int, relative: IntArray) -> IntArray:
 def _block(linear: LinearModel, rates: FloatArray, rows: IntArray, columns: IntArray) -> ComplexArray:
     """Rows and columns of `K + i r C - r^2 M`, (H, n_rows, n_columns), N/m, at the rates r (H,), rad/s."""
     at, rate = np.ix_(rows, columns), rates[:, None, None]
-    mass, damping, stiffness = linear.mass[at], linear.damping[at], linear.stiffness[at]
-    if any(np.iscomplexobj(part) for part in (stiffness, damping, mass)):
-        return cast("ComplexArray", stiffness + 1j * rate * damping - rate**2 * mass)
-    full = np.empty((rates.size, rows.size, columns.size), complex)
-    full.real, full.imag = stiffness - rate**2 * mass, rate * damping
-    return full
+    return cast("ComplexArray", linear.stiffness[at] + 1j * rate * linear.damping[at] - rate**2 * linear.mass[at])
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +97,6 @@ class CondensedStructure:
 
     def input_work(self, displacement_h: FloatArray) -> float:
         """Work of the excitation over a period, N m, from u (n_rel, 2H+1), m."""
-        if not len(self.dynamic_response):
-            return 0.0
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
 
@@ -123,7 +116,7 @@ def build_structure(
     shares = 16 * len(orders) * n_rel**2 > DENSE_BYTES and n <= 2 * n_rel
     real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
     rates, load = omega * np.array(orders, np.float64), excitation_amplitude * first.load_harmonic
-    if shares and first is still and real and not model.nodal_diameter:
+    if shares and real and not model.nodal_diameter:
         moving, force, rows, offset = _condense_shared(still, relative, rates, load)
     else:
         moving, force, rows, offset = _condense_each(model, relative, rates, orders, load)

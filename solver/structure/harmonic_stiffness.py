@@ -18,10 +18,6 @@ class DenseStiffness:
 
     dense: ComplexArray
 
-    def matrix(self, place: int) -> ComplexArray:
-        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
-        return cast("ComplexArray", self.dense[place])
-
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
         moving = np.ascontiguousarray(to_complex(displacement_h).T, self.dense.dtype)[:, :, None]
@@ -66,16 +62,14 @@ class SharedStiffness:
     def dense(self) -> ComplexArray:
         """As in `DenseStiffness`; computed at each call."""
         n_rel = self.relative.size
-        return np.array([self.matrix(place) for place in range(self.rates.size)]).reshape(-1, n_rel, n_rel)
-
-    def matrix(self, place: int) -> ComplexArray:
-        """As in `DenseStiffness`."""
-        n_rel, factors = self.relative.size, self._factors[:, 0, place]
-        columns, back = (
-            sum(factor * part for factor, part in zip(factors, np.split(parts, 3, axis=1), strict=True))
-            for parts in self._parts
-        )
-        return cast("ComplexArray", columns[:n_rel] - back @ (self.held_compliance[place] @ columns[n_rel:]))
+        found = np.empty((self.rates.size, n_rel, n_rel), self.held_compliance.dtype)
+        for place, factors in enumerate(self._factors[:, 0].T):
+            columns, back = (
+                sum(factor * part for factor, part in zip(factors, np.split(parts, 3, axis=1), strict=True))
+                for parts in self._parts
+            )
+            found[place] = columns[:n_rel] - back @ (self.held_compliance[place] @ columns[n_rel:])
+        return found
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """As in `DenseStiffness`."""
