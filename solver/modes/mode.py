@@ -288,7 +288,7 @@ class Rest:
         for attempt in range(SLIDING_STARTS):
             size = amplitude * TOP_BASE**attempt
             joint = self.mode.case.joint(linear.omega, size)
-            amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
+            amplitudes = np.zeros((dofs.size, len(joint.basis.orders)), complex)
             amplitudes[:, 0] = np.where(dofs.ravel() >= 0, size * linear.shape[dofs.ravel()], 0.0)
             motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
             start = self.state.evaluation.predicted_h + joint.to_relative(joint.law.force(motion))

@@ -113,25 +113,16 @@ class JacobianSolver:
     def solve(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
     ) -> FloatArray:
-        """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`.
-
-        A small system is factorised once for all k right-hand sides.
-        """
+        """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
         rows, rest = tangent.active_rows, tangent.passive_rows
         steps = np.zeros((len(rights), *rights[0].shape))
-        if 0 < rows.size * steps.shape[2] <= DENSE_UNKNOWNS:
-            matrix, wanted = tangent.dense(tangent.active), np.stack([right[rows].ravel() for right in rights], axis=1)
-            try:
-                found = np.linalg.solve(matrix, wanted)
-            except np.linalg.LinAlgError:
-                found = np.linalg.lstsq(matrix, wanted)[0]
-            steps[:, rows] = found.T.reshape(len(rights), rows.size, -1)
-        elif rows.size:
-            for step, right in zip(steps, rights, strict=True):
-                step[rows] = self._solve_kept(tangent, right, rtol)[rows]
-        for step, right in zip(steps, rights, strict=True) if rest.size else ():
-            # the columns of all other unknowns are those of the identity
-            step[rest] = (right - tangent.apply(step, roughly=True))[rest]
+        direct = build_dense_factor(tangent) if rows.size * steps.shape[2] <= DENSE_UNKNOWNS else None
+        for step, right in zip(steps, rights, strict=True):
+            if rows.size:
+                step[rows] = (direct.solve(right) if direct else self._solve_kept(tangent, right, rtol))[rows]
+            if rest.size:
+                # the columns of all other unknowns are those of the identity
+                step[rest] = (right - tangent.apply(step, roughly=True))[rest]
         return steps
 
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:

@@ -79,18 +79,13 @@ class Multipliers:
     values: ComplexArray
     error: float
 
-    @property
-    def grow(self) -> bool:
-        """Whether the largest multiplier lies outside the unit circle by more than its error."""
-        return bool(self.values.size) and bool(abs(self.values[0]) - 1.0 > max(self.error, SMALLEST_GROWTH))
-
     def stability(self, odd: bool) -> Stability:
         """Kind of stability; odd: whether Hill's determinant shows an odd number of real multipliers beyond +1."""
         if odd:
             return "fold"
         if not self.values.size:
             return "unknown"
-        if not self.grow:
+        if abs(self.values[0]) - 1.0 <= max(self.error, SMALLEST_GROWTH):
             return "stable"
         if self.values[0].imag != 0.0:
             return "Neimark-Sacker"
@@ -104,48 +99,44 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: 
     Raises OutOfTimeError.
     """
     switches = bool(switching_pairs(at)[0].any())
-    if (not switches and _is_passive(joint.model.harmonic_structure(1))) or (
-        switches and not every and not _bounces(joint, at)
-    ):
+    left_out = switches and not every and not _bounces(joint, at)
+    if left_out or (not switches and _is_passive(joint.model.harmonic_structure(1))):
         return None
-    found = find_multipliers(case, joint, at, run)
-    if not found.grow:
+    found = find_multipliers(case, joint, at, run, growing_only=True)
+    kind = found.stability(odd=False)
+    if kind in ("stable", "unknown"):
         return None
-    largest = found.values[0]
-    doubles = switches and largest.imag == 0.0 and largest.real < 0.0
-    said = f"a small disturbance grows by the factor {abs(largest):.3g} in each period of the excitation"
+    said = f"a small disturbance grows by the factor {abs(found.values[0]):.3g} in each period of the excitation"
     if not switches:
         said = f"{said}, in the linear structure alone"
-    elif largest.imag != 0.0:
-        turn = abs(np.angle(largest)) * joint.omega / (2.0 * np.pi) ** 2
+    elif kind == "Neimark-Sacker":
+        turn = abs(np.angle(found.values[0])) * joint.omega / (2.0 * np.pi) ** 2
         said = f"{said} and brings a second frequency, {turn:.4g} Hz beside that of the excitation"
+    doubles = switches and kind == "period doubling"
     return Failure(Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE, said)
 
 
-def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run) -> Multipliers:
+def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, *, growing_only: bool = False) -> Multipliers:
     """Multipliers of a state at a fixed wear depth; none where they are not known:
 
     - in a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
     - for a joint with more than `MOST_ROWS` displacements of switching pairs;
     - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
 
-    Raises OutOfTimeError.
+    growing_only: without the error of multipliers that do not grow. Raises OutOfTimeError.
     """
     switching, stuck = switching_pairs(at)
     if not switching.any():
-        linear = joint.model.harmonic_structure(1)
-        return Multipliers(
-            _sorted(np.exp(linear_exponents(linear, _moving(joint, stuck)) * 2.0 * np.pi / joint.omega)), 0.0
-        )
+        exponents = linear_exponents(joint.model.harmonic_structure(1), _moving(joint, stuck))
+        return Multipliers(_sorted(np.exp(exponents * 2.0 * np.pi / joint.omega)), 0.0)
     travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
     bounces = _bounces(joint, at)
     if not travels and 3 * np.count_nonzero(switching) <= MOST_ROWS:
         sharp = _sharper(case, joint, at, run) if bounces else (joint, at)
-        # beside folds a solve may change the branch
-        if sharp is not None and _apart(sharp[1], at) <= OTHER_BRANCH:
-            if bounces and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
-                return Multipliers(_sorted(values), 0.0)
-            return _integrated(*sharp, case.settings.rtol)
+        if sharp is not None and bounces and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
+            return Multipliers(_sorted(values), 0.0)
+        if sharp is not None:
+            return _integrated(*sharp, case.settings.rtol, growing_only)
     return Multipliers(np.empty(0, np.complex128), np.inf)
 
 
@@ -160,20 +151,19 @@ def _bounces(joint: Joint, at: Evaluation) -> bool:
 
 
 def _sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint, Evaluation] | None:
-    """The state with at least `OPENING_HARMONICS`; None where no such state is found."""
+    """The state with at least `OPENING_HARMONICS`; None where no such state is found on the same branch."""
     if case.resolution.highest >= OPENING_HARMONICS:
         return joint, at
     samples = max(case.resolution.samples, samples_for(OPENING_HARMONICS))
     sharp = case.at(Resolution(all_orders(OPENING_HARMONICS), samples))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
     moved = run.move(case, finer, State(at, at.history))
-    return None if moved is None else (finer, moved.evaluation)
-
-
-def _apart(finer: Evaluation, at: Evaluation) -> float:
-    """Relative difference of means and first harmonics of two states."""
-    one, other = (state.displacement_h[..., :3] for state in (finer, at))
-    return float(np.linalg.norm(one - other)) / max(float(np.linalg.norm(other)), 1e-300)
+    if moved is None:
+        return None
+    # beside folds a solve may change the branch: means and first harmonics
+    one, other = (state.displacement_h[..., :3] for state in (moved.evaluation, at))
+    same = np.linalg.norm(one - other) <= OTHER_BRANCH * np.linalg.norm(other)
+    return (finer, moved.evaluation) if same else None
 
 
 def _sorted(values: ComplexArray) -> ComplexArray:
@@ -184,18 +174,19 @@ def _sorted(values: ComplexArray) -> ComplexArray:
 # --- by time integration ---
 
 
-def _integrated(joint: Joint, at: Evaluation, rtol: float) -> Multipliers:
+def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -> Multipliers:
     """Multipliers by integration in time; samples are doubled until the first one is known, or its side of 1."""
     small, error = _is_small(joint, at), np.inf
-    n_samples, values = _samples(joint, at, small) // 2, np.empty(0, np.complex128)
+    n_samples, values = _samples(joint, at, small) // (1 if growing_only else 2), np.empty(0, np.complex128)
     while n_samples <= 8 * SMALL_SAMPLES:
         coarse, monodromy = values[:1], build_monodromy(joint, joint.model.linear[0], at, n_samples)
         values = _sorted(multipliers_of(monodromy, small))
         if not values.size:
             return Multipliers(values, np.inf)
         # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
-        error = float(abs(abs(values[0]) - abs(coarse[0]))) if coarse.size else np.inf
-        if error <= rtol or abs(abs(values[0]) - 1.0) > 2.0 * error:
+        largest = float(abs(values[0]))
+        error = abs(largest - float(abs(coarse[0]))) if coarse.size else np.inf
+        if error <= rtol or abs(largest - 1.0) > 2.0 * error or (growing_only and largest <= 1.0 + SMALLEST_GROWTH):
             break
         n_samples *= 2
     return Multipliers(values, error)

@@ -185,8 +185,9 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
         static_force=load_factor * structure.static_force,
         static_offset=load_factor * structure.static_offset,
     )
-    basis, penalty = build_basis((), 1), joint.penalty.static()
-    return replace(joint, excitation_amplitude=0.0, structure=still, basis=basis, penalty=penalty)
+    # without velocities each pair is taken at displacement level
+    penalty = replace(joint.penalty, inertial=np.zeros_like(joint.penalty.inertial))
+    return replace(joint, excitation_amplitude=0.0, structure=still, basis=build_basis((), 1), penalty=penalty)
 
 
 def viscous_joint(joint: Joint, viscosity: float, before: FloatArray) -> Joint:

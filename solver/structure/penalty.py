@@ -11,7 +11,7 @@ with the stiffness Z_n of the structure and the penalty E_n. So E_n has to be ne
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -57,10 +57,6 @@ class Penalty:
     def stiffness(self) -> FloatArray:
         """Penalty (n_contact, 3), N/m, of the three displacements of elastic pairs."""
         return np.stack([self.normal, self.tangential, self.tangential], axis=1)
-
-    def static(self) -> Penalty:
-        """The penalty for a static state, which has no velocity: each pair is taken at displacement level."""
-        return replace(self, inertial=np.zeros_like(self.inertial))
 
     def at_rate(self, rate: float) -> FloatArray:
         """E (n_contact, 2), N/m, normal and tangential, of a motion that grows at a real rate, 1/s."""

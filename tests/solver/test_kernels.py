@@ -227,7 +227,7 @@ def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
     assert np.flatnonzero(joint.penalty.inertial).tolist() == FREE
     # pairs stick, slip and open
     random = np.random.default_rng(2)
-    predicted = random.normal(size=(6, 3, 2 * joint.basis.n_harmonics + 1)) * PRELOAD * 0.6
+    predicted = random.normal(size=(6, 3, len(joint.basis.synthesis))) * PRELOAD * 0.6
     predicted[:, 1:, 0] *= 0.1
     predicted.reshape(18, -1)[np.setdiff1d(np.arange(18), joint.component_index)] = 0.0
     predicted[~joint.contact.has_normal, 0, 1:] = 0.0

@@ -17,10 +17,9 @@ from solver.newton.krylov import STAGNATION_PRODUCTS, build_correction, solve_gm
 from solver.newton.linear_solver import DENSE_UNKNOWNS, DenseFactor, JacobianSolver, build_factor
 from solver.newton.period_preconditioner import build_period_factor, stiffness_of_most
 from solver.newton.run import Bordered, bordered_step, solve_newton
-from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
-from tests.solver.models import PRELOAD, branch_states, dovetail, march_wear, random_balance, random_model
+from tests.solver.models import PRELOAD, random_balance, random_model
 
 
 @dataclass
@@ -199,7 +198,8 @@ def test_a_singular_operator_gives_what_can_be_had_and_ends():
 def test_the_lowest_harmonics_steer_the_iteration(monkeypatch):
     balance, predicted = case(5, THREE_STUCK, pressed=9)
     tangent = tangent_of(balance, predicted)
-    monkeypatch.setattr(linear_solver, "LARGEST_DENSE", 5 * tangent.active_rows.size)
+    for name, value in (("LARGEST_DENSE", 5 * tangent.active_rows.size), ("DENSE_UNKNOWNS", 0)):
+        monkeypatch.setattr(linear_solver, name, value)
     found = build_factor(tangent)
     assert isinstance(found, DenseFactor)
     assert not found.exact
@@ -268,27 +268,3 @@ def test_a_bordered_step_is_that_of_the_whole_jacobian(kinds):
     assert step == pytest.approx(wanted, rel=1e-6, abs=1e-6 * np.abs(wanted).max())
     reduced = problem.own - rows.reshape(2, -1) @ np.linalg.solve(jacobian, by_values)
     assert found == pytest.approx(reduced, rel=1e-6, abs=1e-6)
-
-
-def dense_solve(self, tangent, rights, rtol=0.0):
-    """The whole Jacobian, all pairs, all harmonics."""
-    matrix = dense_of(tangent)
-    return np.array([np.linalg.solve(matrix, right.ravel()).reshape(right.shape) for right in rights])
-
-
-@pytest.mark.slow
-def test_wear_is_that_of_dense_solves(monkeypatch):
-    """264 unknowns, above the size that is always solved densely; adaptive steps are those of the reference."""
-    model, settings = dovetail(5), SolverSettings(harmonics=5, samples=64, tolerance=1e-10)
-    assert 33 * model.contact.n_contact > DENSE_UNKNOWNS
-    # one start for both: a sweep chooses its steps by what happens, and by every digit of that
-    (start,) = branch_states(model, 0.5, 0.5, [2.0 * np.pi * 212.86], settings)
-    asked = model, 0.5, start, 1.1e-11, 1000.0, "implicit", np.array([0.0, 2000.0]), settings
-    history = march_wear(*asked)
-    monkeypatch.setattr(JacobianSolver, "solve", dense_solve)
-    wanted = march_wear(*asked)
-    assert history.wear_depth[-1].max() > 1e-9
-    assert history.outcome is wanted.outcome is Outcome.CONVERGED
-    for name in ("wear_depth", "wear_rate", "response", "reference_volume"):
-        one, other = getattr(history, name), getattr(wanted, name)
-        assert np.linalg.norm(one - other) <= 1e-9 * np.linalg.norm(other)
