@@ -124,12 +124,12 @@ def _static_shapes(coordinates: Coordinates, stiffness: sparse.csr_matrix, facto
 
 def _on_shapes(form: sparse.csr_matrix, shapes: Matrix) -> Matrix:
     """`shapes^H form shapes` (n_relative, n_relative): its upper blocks are computed, the lower ones follow."""
-    own = np.empty((shapes.shape[1],) * 2, dtype=shapes.dtype)
+    own: Matrix = np.empty((shapes.shape[1],) * 2, dtype=shapes.dtype)
     for part in _parts(shapes):
         before = slice(part.stop)
         own[before, part] = shapes[:, before].conj().T @ (form @ shapes[:, part])
         own[part, before] = own[before, part].conj().T
-    return np.asarray(own)
+    return own
 
 
 def _lowest_modes(
