@@ -124,7 +124,7 @@ def _static_shapes(coordinates: Coordinates, stiffness: sparse.csr_matrix, facto
 
 def _on_shapes(form: sparse.csr_matrix, shapes: Matrix) -> Matrix:
     """`shapes^H form shapes` (n_relative, n_relative): its upper blocks are computed, the lower ones follow."""
-    own: Matrix = np.empty((shapes.shape[1],) * 2, dtype=shapes.dtype)
+    own: Matrix = np.empty_like(shapes, shape=(shapes.shape[1],) * 2)
     for part in _parts(shapes):
         before = slice(part.stop)
         own[before, part] = shapes[:, before].conj().T @ (form @ shapes[:, part])
