@@ -82,9 +82,9 @@ class LinearModel:
         return LinearModel(*(np.conj(part) for part in parts))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReducedModel:
-    """A scene: linear structure(s), the contact pairs on them and the names of the responses.
+    """A scene: linear structure(s), the contact pairs on them and the names of the responses. Equal to itself alone.
 
     - linear: structure for each nodal diameter k in 0..n_sectors // 2, with equal indices of the contact displacements;
       the key 0 only for a structure that is no cyclic sector.

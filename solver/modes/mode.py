@@ -86,7 +86,7 @@ class NonlinearMode:
     def case_of(self, values: FloatArray) -> Case:
         """Case of the modal model at a frequency, rad/s, and a damping ratio, the first two values."""
         model = modal_model(self.model, self.linear, 2.0 * float(values[1]) * float(values[0]))
-        return replace(self.case, model=model, _structures={})
+        return replace(self.case, model=model)
 
     def joint_of(self, values: FloatArray) -> Joint:
         """Joint of the modal model at some values (3,)."""

@@ -21,8 +21,8 @@ from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 DENSE_BYTES = 2e6
 """Bytes of the matrices of all harmonics up to which a product with each matrix is fastest."""
 
-KEPT_STRUCTURES = 8
-"""Condensed structures of a case in its cache. A wear history with its errors uses six."""
+KEPT_STRUCTURES = 12
+"""Condensed structures in the cache. A wear history with its errors uses six."""
 
 
 def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
@@ -100,6 +100,7 @@ class CondensedStructure:
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
 
+@lru_cache(maxsize=KEPT_STRUCTURES)
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:

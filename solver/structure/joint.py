@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ from solver.contact.law import ContactLaw
 from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
-from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure, build_structure, relative_indices
+from solver.structure.condensation import CondensedStructure, build_structure, relative_indices
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.penalty import Penalty, build_penalty
@@ -103,36 +103,20 @@ class Case:
     settings: SolverSettings
     resolution: Resolution
     hold: Hold | None = None
-    _structures: dict[tuple[float, float, tuple[int, ...]], CondensedStructure] = field(
-        default_factory=dict, repr=False, compare=False
-    )
 
     def joint(self, omega: float, excitation_amplitude: float) -> Joint:
         """Joint at the angular frequency omega (rad/s) and excitation amplitude (N).
 
         Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
         """
-        structure = self._structure(omega, excitation_amplitude)
-        basis = build_basis(self.resolution.orders, self.resolution.samples)
-        friction, penalty = self.friction_coefficient, self.penalty
-        return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, penalty)
-
-    def _structure(self, omega: float, excitation_amplitude: float) -> CondensedStructure:
-        key, cache, hold = (omega, excitation_amplitude, self.resolution.orders), self._structures, self.hold
-        if key not in cache:
-            found = build_structure(self.model, *key)
-            if hold is not None:
-                spring = hold.stiffness * np.outer(hold.direction, hold.direction)
-                force = found.static_force + hold.stiffness * hold.position * hold.direction
-                found = replace(found, static_stiffness=found.static_stiffness + spring, static_force=force)
-            while len(cache) >= KEPT_STRUCTURES:
-                del cache[next(iter(cache))]
-            cache[key] = found
-        return cache[key]
-
-    def held(self, hold: Hold | None) -> Case:
-        """The case with another hold."""
-        return replace(self, hold=hold, _structures={})
+        hold, (orders, samples) = self.hold, (self.resolution.orders, self.resolution.samples)
+        structure = build_structure(self.model, omega, excitation_amplitude, orders)
+        if hold is not None:
+            spring = hold.stiffness * np.outer(hold.direction, hold.direction)
+            force = structure.static_force + hold.stiffness * hold.position * hold.direction
+            structure = replace(structure, static_stiffness=structure.static_stiffness + spring, static_force=force)
+        friction, basis = self.friction_coefficient, build_basis(orders, samples)
+        return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, self.penalty)
 
     def at(self, resolution: Resolution) -> Case:
         """The case with another resolution, and the penalty for its harmonics."""

@@ -137,6 +137,7 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     orders = (1, 2, 3, 5)
     each = build_structure(model, OMEGA, AMPLITUDE, orders)
     monkeypatch.setattr(condensation, "DENSE_BYTES", 0.0)
+    build_structure.cache_clear()
     shared = build_structure(model, OMEGA, AMPLITUDE, orders)
     assert isinstance(each.moving, DenseStiffness)
     assert isinstance(shared.moving, SharedStiffness)
