@@ -14,9 +14,10 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
-from solver.harmonic_balance.state import State, final_history, transfer
+from solver.harmonic_balance.state import Failure, State, final_history, transfer
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING, JacobianSolver
+from solver.outcome import Outcome, describe_error
 from solver.structure.joint import Case, Joint
 
 MOST_ITERATIONS = 30
@@ -58,6 +59,7 @@ class Bordered:
 
 
 EvaluationT = TypeVar("EvaluationT", Evaluation, Bordered)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -275,3 +277,16 @@ class Run:
         """The state of a case with the harmonics and samples of another joint; None where it is not found."""
         balance, start = transfer(old, joint, state.evaluation)
         return self.fresh().state(balance, start, state.parameter)
+
+
+def guarded(compute: Callable[[], T]) -> T | Failure:
+    """Result of a computation, or its error as a failure."""
+    try:
+        return compute()
+    except np.linalg.LinAlgError:
+        return Failure(Outcome.SINGULAR)
+    except OutOfTimeError:
+        return Failure(Outcome.TIME_LIMIT)
+    except Exception as error:
+        # an error spoils one point only: the study goes on
+        return Failure(Outcome.EXCEPTION, describe_error(error))

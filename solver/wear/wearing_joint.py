@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.harmonic_levels import left_out
+from solver.accuracy.resolved_state import NOTHING, Estimate
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
