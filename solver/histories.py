@@ -30,8 +30,7 @@ from solver.settings import (
 )
 from solver.structure.joint import friction_of_pairs
 from solver.wear.history import integrate_together
-from solver.wear.integrate import WearRequest
-from solver.wear.step import steps_of
+from solver.wear.problem import WearRequest, steps_of
 
 
 def march_wear(

@@ -21,17 +21,16 @@ from solver.missions.mission import Block, Mission
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
-from solver.packing import in_rows, packable
+from solver.packing import packable
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
 from solver.results.verdict import first_cut_off
 from solver.settings import Direction, Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
-from solver.wear.integrate import Integrations, WearRequest
+from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of
 from solver.wear.rate_slope import rate_slope
-from solver.wear.slow_time import Guide
-from solver.wear.step import Adaptive
+from solver.wear.slow_time import Guide, Integrator
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 NODES_OF_A_REFERENCE_STEP = 3
@@ -167,13 +166,13 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     if start.state is None:
         return Failure(start.outcome, start.message)
     (setup, _), cycles = case.begin(start), case.block.steady[1]
-    counts = np.array([0.0, cycles])
-    steps, solve = Adaptive(case.mission.settings.rtol), Integrations(setup.case, start)
+    counts, steps = np.array([0.0, cycles]), Adaptive(case.mission.settings.rtol)
     asked = WearRequest(setup.wear_coefficient, steps, counts, law=setup.law, ends_at_last=True)
     if case.guide is None:
-        ended = solve.history(asked, stable_end=case.every)
+        problem = WearProblem(setup.case, start, asked, stable_end=case.every)
     else:
-        ended = solve.reference(asked, case.guide, counts)
+        problem = reference_of(setup.case, start, asked, case.guide, counts)
+    ended = Integrator(case.settings.time_limit).integrate(problem)
     state = ended.state
     if state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return ended.failure
@@ -186,7 +185,7 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         slope = np.asarray(scipy.linalg.expm(cycles * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
-    found = BlockRun(
+    return BlockRun(
         growth=depth[-1],
         response=values["response"],
         response_peak=values["response_peak"],
@@ -201,8 +200,6 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         begun=begun,
         iterations=start.newton_iterations + ended.iterations,
     )
-    # as read from a file: an interrupted mission goes on with equal bits
-    return in_rows(found)
 
 
 def _last(state: WearState, start: StartState) -> StartState:

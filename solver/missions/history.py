@@ -63,14 +63,14 @@ class MissionProblem:
 
     def __init__(self, mission: Mission, fine: Solution | None = None) -> None:
         self.mission, self.fine, self.budget = mission, fine, Budget()
+        self.name, self.course = "history" if fine is None else "reference", unworn_course(mission)
         self.last = mission.missions[-1] if fine is None else int(fine.course.ends[-1])
         # how each block began last, and why a step was not found
         self._begun: list[Begun | None] = []
         self._failure = Failure(Outcome.MARCH_FAILED)
 
-    def saved(self, state: MissionState) -> MissionState:
-        """As in SlowProblem: blocks are as read from a file."""
-        return state
+    def fresh(self) -> None:
+        """As in SlowProblem: nothing."""
 
     def advance(self, state: MissionState | None, course: Course) -> tuple[MissionState, Course] | Failure:
         """As in SlowProblem."""
@@ -165,13 +165,14 @@ def integrate_missions(
 
     keep: called after each step with the progress. resume: as for `wear.history.integrate_together`.
     """
-    unworn, integrator = unworn_course(mission), Integrator(mission.settings.time_limit, keep, resume)
-    fine = integrator.integrate("history", MissionProblem(mission), unworn)
+    integrator = Integrator(mission.settings.time_limit, keep, resume)
+    fine = integrator.integrate(MissionProblem(mission))
     solutions = Solutions(fine, fine)
     if fine.state is not None and fine.failure.outcome not in ENDS_ALL:
-        reference = integrator.integrate("reference", MissionProblem(mission, fine), unworn, fine.seconds)
+        reference = integrator.integrate(MissionProblem(mission, fine), fine.seconds)
         solutions = Solutions(fine, fine, reference)
-    history = _assembled(mission, solutions, unworn if solutions.reference is None else solutions.reference.course)
+    other = unworn_course(mission) if solutions.reference is None else solutions.reference.course
+    history = _assembled(mission, solutions, other)
     if history.outcome is not Outcome.CONVERGED:
         return history
     failure = _judged(mission, solutions, history)

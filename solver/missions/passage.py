@@ -38,7 +38,6 @@ from solver.missions.block_run import Begun, BlockCase, BlockRun
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
 from solver.outcome import Outcome
-from solver.packing import in_rows
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
@@ -109,7 +108,7 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
     error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
     error += min(lag * max(float(state.density @ area) for state in states), volume)
     ends, inaccurate = (states[0], states[-1]), [each for each in starts if each.outcome is Outcome.INACCURATE]
-    found = BlockRun(
+    return BlockRun(
         growth=growth,
         response=np.array([state.response for state in ends]),
         response_peak=np.array([state.peak for state in ends]),
@@ -123,7 +122,6 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
-    return in_rows(found)
 
 
 def _slope_of(case: BlockCase, state: SweptState) -> FloatArray:

@@ -38,7 +38,9 @@ def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) 
         # the last pairs that stick come loose together
         reached = _held(setup, state, worn, drifts=True) or reached
     setup.run.budget.limit = float("inf")
-    return reached if isinstance(reached, Failure) else setup.with_rates(replace(reached, cycle=cycle, previous=None))
+    if isinstance(reached, Failure):
+        return reached
+    return setup.with_rates(replace(reached, cycle=cycle, previous=None, error=0.0))
 
 
 def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:

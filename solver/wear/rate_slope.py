@@ -13,9 +13,10 @@ import numpy as np
 
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.harmonic_balance.dlft import Evaluation, worn_by
+from solver.harmonic_balance.state import Failure
 from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
-from solver.outcome import in_digits
+from solver.outcome import Outcome, in_digits
 from solver.structure.joint import Joint
 from solver.wear.wearing_joint import WearingJoint, WearState
 
@@ -94,7 +95,7 @@ def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, 
     return moved / preload if preload > 0.0 else 0.0
 
 
-def too_long(setup: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> str | None:
+def too_long(setup: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> Failure | None:
     """Why a step or a jump of some cycles to depths (n_contact,), m, is rejected, and how long it may be; else None."""
     for free_tangents in (False, True):
         fraction = moved_fraction(setup.joint_of(state), state.at, wear_depth, free_tangents=free_tangents)
@@ -103,7 +104,5 @@ def too_long(setup: WearingJoint, state: WearState, wear_depth: FloatArray, leng
     # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
     advised = length * LARGEST_MOVED_LOAD / 100.0 / fraction
     on, times, most = in_digits(length, 3), in_digits(fraction, 2), in_digits(advised, 2)
-    return (
-        f"wearing on for {on} cycles at once from cycle {in_digits(state.cycle)} on moves {times} times the normal"
-        f" forces of the joint: at most {most} cycles at once would do"
-    )
+    said = f"wearing on for {on} cycles at once from cycle {in_digits(state.cycle)} on moves {times} times the normal"
+    return Failure(Outcome.STEP_TOO_LONG, f"{said} forces of the joint: at most {most} cycles at once would do")

@@ -13,7 +13,7 @@ from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
 from solver.newton.run import Budget, OutOfTimeError
 from solver.outcome import Outcome, describe_error
-from solver.packing import Packed, pack, packable, unpack
+from solver.packing import Packed, in_rows, pack, packable, unpack
 from solver.settings import Resolution
 from solver.wear.course import Course
 
@@ -32,21 +32,22 @@ the steps of a reference solution are too long for pairs that stick again: dovet
 
 
 class SlowProblem(Protocol):
-    """What is integrated. The next step depends on the state alone; a state is frozen and packable."""
+    """What is integrated. The next step depends on the state alone; a state is frozen and packable.
 
-    @property
-    def budget(self) -> Budget:
-        """Newton iterations so far, and the deadline."""
+    name: tells apart histories that belong together. course: before the first step. budget: Newton iterations so far,
+    and the deadline. iterations_per_save: Newton iterations after which the progress is saved.
+    """
 
-    @property
-    def iterations_per_save(self) -> int:
-        """Newton iterations after which the progress is saved."""
+    name: str
+    course: Course
+    budget: Budget
+    iterations_per_save: int
 
     def advance(self, state: Any, course: Course, /) -> tuple[Any, Course] | Failure:
         """State and course after the next step, or the first ones where the state is None; or why the history ends."""
 
-    def saved(self, state: Any, /) -> Any:
-        """The state as it is read from a saved progress; what is kept from step to step beside the state is dropped."""
+    def fresh(self) -> None:
+        """Drop what a resumed history would not have beside its state."""
 
 
 @packable
@@ -112,12 +113,10 @@ class Integrator:
         self._time_limit, self._keep = time_limit, keep
         self._known: dict[str, Solution] = {} if resume is None else unpack(resume)
 
-    def integrate(self, name: str, problem: SlowProblem, course: Course, spent: float = 0.0) -> Solution:
-        """Integrate from the first or the saved state to the end. name: tells the histories apart.
-
-        course: before the first step. spent: CPU seconds of the time limit so far.
-        """
-        budget, state, began, known = problem.budget, None, computing_time(), self._known.get(name)
+    def integrate(self, problem: SlowProblem, spent: float = 0.0) -> Solution:
+        """Integrate from the first or the saved state to the end. spent: CPU seconds of the time limit so far."""
+        name, course, budget = problem.name, problem.course, problem.budget
+        state, began, known = None, computing_time(), self._known.get(name)
         if known is not None and known.failure != UNFINISHED:
             return known
         if known is not None:
@@ -131,12 +130,12 @@ class Integrator:
             state, course = after
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
-                state, saved_at = problem.saved(state), budget.iterations
+                problem.fresh()
+                state, saved_at = in_rows(state), budget.iterations
                 self._known[name] = Solution(state, UNFINISHED, course, saved_at, computing_time() - began)
                 if self._keep is not None:
                     # what its time limit has ended is not complete
-                    kept = {key: each for key, each in self._known.items() if each.failure.outcome not in ENDS_ALL}
-                    self._keep(pack(kept))
+                    self._keep(pack({key: s for key, s in self._known.items() if s.failure.outcome not in ENDS_ALL}))
 
 
 def guarded(compute: Callable[[], T]) -> T | Failure:

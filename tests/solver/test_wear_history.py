@@ -15,8 +15,8 @@ from solver.settings import Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import build_case
 from solver.wear import course as course_module
 from solver.wear.course import CERTIFIED, Course, Node
-from solver.wear.integrate import Integrations, WearRequest
-from solver.wear.step import Adaptive
+from solver.wear.problem import Adaptive, WearProblem, WearRequest
+from solver.wear.slow_time import Integrator
 from tests.solver.models import branch_states, march_wear, random_model, scene
 from tests.solver.worn_slider import (
     AREA,
@@ -150,7 +150,8 @@ def steps_and_volume(scene_name: str, start: StartState, settings: SolverSetting
     """Number of steps and worn volume, m3, of an adaptive history without its reference solution."""
     model = scene(scene_name, 13, **({"mesh": 1} if scene_name == "dovetail_sector" else {}))
     case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    ended = Integrations(case, start).history(WearRequest(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles])))
+    asked = WearRequest(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles]))
+    ended = Integrator(np.inf).integrate(WearProblem(case, start, asked))
     depth = ended.course.read(np.array([cycles]))["wear_depth"]
     return len(ended.course.ends), float((depth @ model.contact.area)[0])
 
