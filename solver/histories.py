@@ -14,7 +14,7 @@ from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word, worn_model
 from solver.loading_history.start_states import follow_branch
 from solver.missions.history import integrate_missions
-from solver.missions.mission import Begin, Block, Mission, MissionHistory, Passage
+from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest, Passage
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import (
@@ -188,7 +188,7 @@ def integrate_mission(
     wanted = tuple(sorted({0, *(int(count) for count in counts)}))
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
     return integrate_missions(
-        Mission(checked, per_pressure, wanted, settings, law, until, sweep, largest_step and int(largest_step))
+        MissionRequest(checked, per_pressure, wanted, settings, law, until, sweep, largest_step and int(largest_step))
     )
 
 

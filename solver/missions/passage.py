@@ -95,7 +95,7 @@ class Swept:
 
 def run_passage(case: BlockCase) -> BlockRun | Failure:
     """Compute a passage, as `block_run.run_block`."""
-    passage, swept = case.block.passage, find_states(case)
+    passage, swept = case.passage, find_states(case)
     if isinstance(swept, Failure):
         return swept
     ascending, area = swept.states, case.mission.area
@@ -129,7 +129,7 @@ def _slope_of(case: BlockCase, state: SweptState) -> FloatArray:
     if not state.density.any():
         return np.zeros((state.density.size, state.density.size))
     slope = rate_slope(*case.begin(state.start), (state.density > 0.0) | (case.depth > 0.0))
-    return np.asarray(slope * state.frequency / case.block.passage.rate)
+    return np.asarray(slope * state.frequency / case.passage.rate)
 
 
 def wear_in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -159,7 +159,7 @@ def parts_of(states: Sequence[SweptState]) -> FloatArray:
 
 def find_states(case: BlockCase) -> Swept | Failure:
     """The states of one passage at the depth before it, as many as its wear needs."""
-    passage, area = case.block.passage, case.mission.area
+    passage, area = case.passage, case.mission.area
     aim = FREQUENCY_ERROR * (1.0 if case.guide is None else RTOL_RATIO) * case.mission.settings.rtol
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
@@ -229,7 +229,7 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    passage, found = case.block.passage, []
+    passage, found = case.passage, []
     line = case.line(passage.sweep)
     if case.guide is not None:
         # errors of a reference solution are not used
@@ -262,5 +262,5 @@ def delay_of(case: BlockCase, states: Sequence[SweptState]) -> tuple[float, floa
     mode = next((found for found in modes if found is not None), None)
     if mode is None:
         return 0.0, 0.0
-    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), case.block.passage.rate
+    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), case.passage.rate
     return (rate / width**2, rate / (2.0 * math.pi * width)) if width > 0.0 else (math.inf, math.inf)

@@ -78,7 +78,7 @@ def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: Float
     return float(cycles[found[0]]) if found.size else math.nan
 
 
-def describe_cut_off(cycle: float) -> str:
+def describe_cut_off(count: float, of: str = "cycle") -> str:
     """Sentence with the first count of a cut off contact."""
-    when = f"at cycle {in_digits(cycle)}" + (" already" if cycle else "")
+    when = f"at {of} {in_digits(count)}" + (" already" if count else "")
     return f"pairs at the edge of the modelled contact carry load or have worn {when}"

@@ -14,7 +14,7 @@ from solver.model import FloatArray, IntArray
 from solver.packing import packable
 from solver.settings import WearTarget
 
-KEPT_STEPS = 800
+MOST_NODES = 800
 """Most stored steps of a history beside those with an output; half as many after those with the least progress are
 dropped. An adaptive history of 1e5 cycles has about 100 steps."""
 
@@ -90,18 +90,19 @@ class Course:
     def after(self, node: Node) -> Course:
         """The course with another step."""
         longer = replace(self, nodes=(*self.nodes, node), ends=(*self.ends, node.count))
-        return longer if len(longer.nodes) <= KEPT_STEPS + 2 * self.outputs.size else longer._thinned()
+        return longer if len(longer.nodes) <= MOST_NODES + 2 * self.outputs.size else longer._thinned()
 
     def _thinned(self) -> Course:
-        """The course without nodes of little progress, see `even_counts`, between which nothing is read."""
+        """The course without nodes of little progress in count and volume, between which nothing is read."""
         at, volumes = self.counts, self.volumes
         read = np.append(self.outputs, self.reached)
         ends = np.searchsorted(at, read[read <= at[-1]])
         way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
         # the first one in each of so many equal parts
-        firsts = np.unique(np.floor(0.5 * KEPT_STEPS * way / way[-1]), return_index=True)[1]
-        kept = np.unique([at.size - 1, *ends, *np.maximum(ends - 1, 0), *firsts])
-        return replace(self, nodes=tuple(self.nodes[place] for place in kept))
+        firsts = np.unique(np.floor(0.5 * MOST_NODES * way / way[-1]), return_index=True)[1]
+        # with the last three, from which a step over missions goes on
+        places = np.unique([*range(at.size - 3, at.size), *ends, *np.maximum(ends - 1, 0), *firsts])
+        return replace(self, nodes=tuple(self.nodes[place] for place in places))
 
     def depth_at(self, counts: FloatArray) -> FloatArray:
         """Depths (n, k), m, at counts (n,); beyond the last step those at its end."""
@@ -170,19 +171,19 @@ class Course:
 
         The worn volume is a parabola in the shift of the resonance, through both ends of the step and the end before.
         """
-        by_wear = target.quantity != "frequency_shift"
-        # asked after every step: depths and volumes never fall
-        if by_wear and not self._wear(self.nodes[-1].depth, target) >= target.value:
-            return math.nan, 0.0
-        values = self._values(target)
-        if not (values >= target.value).any():
-            return math.nan, 0.0
+        resonances = np.zeros(0)
+        if target.quantity == "frequency_shift":
+            resonances = np.array([node.values["resonance"] for node in self.nodes]) / self.nodes[0].values["resonance"]
+            values = np.abs(resonances - 1.0)
+        else:
+            values = self._wear(self.depths, target)
         end = int(np.argmax(values >= target.value))
-        if by_wear:
+        if not values[end] >= target.value:
+            return math.nan, 0.0
+        if not resonances.size:
             return self._count_of(target, end), 0.0
         ends = slice(max(end - 2, 0), end + 1)
-        signed = np.array([node.values["resonance"] for node in self.nodes[ends]]) / self.nodes[0].values["resonance"]
-        shifts, volumes = math.copysign(1.0, signed[-1] - 1.0) * (signed - 1.0), self.volumes[ends]
+        shifts, volumes = math.copysign(1.0, resonances[end] - 1.0) * (resonances[ends] - 1.0), self.volumes[ends]
         moved = shifts[-1] - shifts[-2]
         line = found = volumes[-2] + (target.value - shifts[-2]) * (volumes[-1] - volumes[-2]) / moved
         if shifts.size > 2 and (np.diff(volumes) > 0.0).all() and shifts[0] < shifts[1] < target.value:
@@ -190,7 +191,7 @@ class Course:
             # the volume has to rise with the shift
             found = curved if volumes[1] < curved < volumes[2] else line
         error = max(self.nodes[place].values["resonance_error"] for place in (0, end))
-        by_resonance = error * (self.nodes[end].count - self.nodes[end - 1].count) / moved
+        by_resonance = error * (self.counts[end] - self.counts[end - 1]) / moved
         count, straight = (self._count_of(WearTarget("worn_volume", float(each)), end) for each in (found, line))
         return count, abs(count - straight) + by_resonance
 
@@ -201,21 +202,15 @@ class Course:
         low, high = self.counts[end - 1 : end + 1]
 
         def above(fraction: float) -> float:
-            return self._wear(self.depth_at(np.array([low + fraction * (high - low)]))[0], target) - target.value
+            depths = self.depth_at(np.array([low + fraction * (high - low)]))
+            return float(self._wear(depths, target)[0]) - target.value
 
         if above(0.0) >= 0.0 or above(1.0) <= 0.0:
             return float(low if above(0.0) >= 0.0 else high)
         return float(low + brentq(above, 0.0, 1.0, xtol=1e-12) * (high - low))
 
-    def _wear(self, depth: FloatArray, target: WearTarget) -> float:
-        """Largest depth, m, or worn volume, m3, of depths (k,), m."""
+    def _wear(self, depths: FloatArray, target: WearTarget) -> FloatArray:
+        """Largest depth, m, or worn volume, m3, (n,) of depths (n, k), m."""
         if target.quantity == "worn_volume":
-            return float(self._volumes(depth[None])[0])
-        return float(depth.reshape(-1, self.area.size).sum(axis=0).max(initial=0.0))
-
-    def _values(self, target: WearTarget) -> FloatArray:
-        """What a target is compared with, at the nodes: wear, or the relative shift of the resonance up or down."""
-        if target.quantity == "frequency_shift":
-            resonances = np.array([node.values["resonance"] for node in self.nodes])
-            return np.asarray(np.abs(resonances / resonances[0] - 1.0))
-        return np.array([self._wear(node.depth, target) for node in self.nodes])
+            return self._volumes(depths)
+        return np.asarray(depths.reshape(len(depths), -1, self.area.size).sum(axis=1).max(axis=1, initial=0.0))

@@ -257,7 +257,7 @@ def test_a_cubic_never_falls_however_steep_its_ends_are():
 def test_of_many_steps_those_that_go_far_and_those_that_are_read_are_kept(monkeypatch):
     asked = [5.0, 15.0, 1005.0]
     whole = taken(None, n_steps=200)
-    monkeypatch.setattr(course_module, "KEPT_STEPS", 20)
+    monkeypatch.setattr(course_module, "MOST_NODES", 20)
     course = taken(asked, n_steps=200)
     assert len(course.nodes) <= 26
     assert course.counts[[0, -1]].tolist() == [0.0, 2000.0]
