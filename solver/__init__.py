@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from solver.nonlinear_modes import backbone as backbone
     from solver.outcome import Outcome as Outcome
     from solver.results.history import WearHistory as WearHistory
-    from solver.results.periodic_motion import PeriodicMotion as PeriodicMotion
+    from solver.results.state_report import PeriodicMotion as PeriodicMotion
     from solver.settings import SolverSettings as SolverSettings
     from solver.single_mode_theory import ModalResponse as ModalResponse
     from solver.single_mode_theory import modal_response as modal_response
@@ -58,7 +58,7 @@ _PLACES = {
     "ModalResponse": "single_mode_theory",
     "Outcome": "outcome",
     "Passage": "missions.mission",
-    "PeriodicMotion": "results.periodic_motion",
+    "PeriodicMotion": "results.state_report",
     "ReducedModel": "model",
     "ResponseCurve": "whole_response",
     "SolverSettings": "settings",

@@ -13,8 +13,7 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState
-from solver.results.periodic_motion import PeriodicMotion, periodic_motion
-from solver.results.state_report import evaluated
+from solver.results.state_report import PeriodicMotion, evaluated, periodic_motion
 from solver.settings import Direction, SolverSettings
 from solver.structure.joint import Case, build_case
 

@@ -14,9 +14,8 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to
 from solver.presentation import Presented
-from solver.results.history import StartState
+from solver.results.history import StartState, describe_cut_off, first_cut_off
 from solver.results.state_report import evaluated
-from solver.results.verdict import describe_cut_off, first_cut_off
 from solver.settings import Direction, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case, friction_of_pairs

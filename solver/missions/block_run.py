@@ -22,15 +22,14 @@ from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.results.history import StartState
+from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import periodic_state
-from solver.results.verdict import first_cut_off
 from solver.settings import Direction, Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
 from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of
-from solver.wear.rate_slope import rate_slope
 from solver.wear.slow_time import Guide, Integrator
+from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 LARGEST_CHANGE = 2.0

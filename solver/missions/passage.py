@@ -42,8 +42,8 @@ from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
 from solver.structure.joint import friction_of_pairs
-from solver.wear.rate_slope import rate_slope
 from solver.wear.slow_time import RTOL_RATIO, Guide
+from solver.wear.step import rate_slope
 
 FIRST_FREQUENCIES = 17
 """Frequencies before those that are added."""

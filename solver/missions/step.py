@@ -31,7 +31,7 @@ import numpy as np
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
 from solver.model import FloatArray
-from solver.wear.course import Node
+from solver.wear.slow_time import Node
 from solver.wear.step import allowed_error
 
 RunMission = Callable[[FloatArray, bool], tuple[BlockRun, ...] | Failure]

@@ -1,8 +1,8 @@
 """Check of a state of a wearing joint: whether it is a result, and whether it is the last one.
 
-In a steady state every pair that slips carries no force, and the slowest pair determines how fast a history approaches
-this state. So a history to the end of wear ends where the wear rate of every pair is below a fraction of its largest
-one. A joint that slips everywhere under a load that nothing else carries has no steady state: its rate is constant.
+In a final state every pair that slips carries no force. So a history to the end of wear ends where the wear rate of
+every pair is below a fraction of its largest one. A joint that slips everywhere under a load that nothing else carries
+has no final state: its wear rate becomes constant.
 """
 
 from __future__ import annotations
@@ -22,9 +22,8 @@ from solver.outcome import Outcome, in_digits
 from solver.results.state_report import report_state
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution
 from solver.stability.floquet import find_instability
-from solver.wear.course import Course
 from solver.wear.jump import creeps, free_slide
-from solver.wear.slow_time import AS_ASKED
+from solver.wear.slow_time import AS_ASKED, Course
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
@@ -146,13 +145,11 @@ def end_of_wear(setup: WearingJoint, state: WearState, course: Course, final_sha
     largest = state.largest_rates[:-1]
     if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():
         return AS_ASKED
-    rate, n_steps = float(state.rates[-1]), len(course.ends) - 1
-    if is_steady(setup, state, course):
-        steady = f"from cycle {in_digits(state.cycle, 4)} on they wear at a steady rate of {rate:.6g} m3 a cycle"
-        return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
-    if n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
-        still = f"the joint still wears at {rate:.6g} m3 a cycle"
-        return Failure(Outcome.NO_FINAL_STATE, f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}, {still}")
+    n_steps = len(course.ends) - 1
+    if is_steady(setup, state, course) or n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
+        at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
+        said = f"{at}, the joint still wears at {float(state.rates[-1]):.6g} m3 a cycle"
+        return Failure(Outcome.NO_FINAL_STATE, said)
     return None
 
 

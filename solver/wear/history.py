@@ -15,14 +15,12 @@ from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.results.history import StartState, WearHistory
+from solver.results.history import StartState, WearHistory, first_cut_off, judge, last_error
 from solver.results.state_report import LOOP_PHASES
-from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
-from solver.wear.course import Course, Node
 from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest, reference_of
-from solver.wear.slow_time import ENDS_ALL, Guide, Integrator, Solution, Solutions
+from solver.wear.slow_time import ENDS_ALL, Course, Guide, Integrator, Node, Solution, Solutions
 from solver.wear.wearing_joint import WearState
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))

@@ -22,7 +22,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome
-from solver.results.verdict import HELD_FORCE
+from solver.results.history import HELD_FORCE
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint

@@ -38,11 +38,9 @@ from solver.settings import (
 )
 from solver.structure.joint import Case
 from solver.wear.check import end_of_wear, full_check, report_only, unstable_at_end
-from solver.wear.course import Course, Node
 from solver.wear.jump import jump
-from solver.wear.rate_slope import explicit_step_limit, too_long
-from solver.wear.slow_time import AS_ASKED, RTOL_RATIO, Guide
-from solver.wear.step import allowed_error, attempt_step
+from solver.wear.slow_time import AS_ASKED, RTOL_RATIO, Course, Guide, Node
+from solver.wear.step import allowed_error, attempt_step, explicit_step_limit, too_long
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 HISTORY_ITERATIONS = 3000
@@ -175,14 +173,10 @@ class WearProblem:
             # the state holds for all later counts
             return state, course.after(replace(course.nodes[-1], count=asked.end))
         else:
-            found = self.step(state)
-            local = course.nodes[-1].values["local"]
+            found, local = self.step(state), course.nodes[-1].values["local"]
         if isinstance(found, Failure):
             return found
-        wanted, follow = asked.until, asked.follow
-        if state is not None and follow is not None and not follow.low <= found.omega / (2.0 * math.pi) <= follow.high:
-            return setup.lost(found)
-        shifts = wanted is not None and wanted.quantity == "frequency_shift"
+        shifts = asked.until is not None and asked.until.quantity == "frequency_shift"
         if self.guide is None:
             checked = full_check(setup, found, asked.loops, with_resonance=shifts)
         else:
@@ -246,8 +240,10 @@ class WearProblem:
         taken = take_step(self, state, length, Lengths(2, shortest=shortest, rescue=shortest))
         if isinstance(taken, Failure):
             return taken
-        end, ahead = taken
-        return self._refused(state, end.depth, end.cycle - state.cycle) or replace(end, length=ahead)
+        end, follow = replace(taken[0], length=taken[1]), self.asked.follow
+        if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
+            return self.setup.lost(end)
+        return self._refused(state, end.depth, end.cycle - state.cycle) or end
 
     def _shortest(self, state: WearState, length: float) -> float:
         """Shortest step, cycles, of one that is `length` long: the accuracy to which a branch end is located."""

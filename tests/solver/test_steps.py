@@ -20,7 +20,7 @@ from solver.structure.joint import build_case
 from solver.wear import problem as control
 from solver.wear.check import needs_new_choice
 from solver.wear.problem import Adaptive, Given
-from solver.wear.rate_slope import moved_fraction, rate_slope
+from solver.wear.step import moved_fraction, rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearState
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import AREA, problem
