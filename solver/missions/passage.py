@@ -95,11 +95,11 @@ class Swept:
 
 def run_passage(case: BlockCase) -> BlockRun | Failure:
     """Compute a passage, as `block_run.run_block`."""
-    passage, swept = case.passage, find_states(case)
+    swept = find_states(case)
     if isinstance(swept, Failure):
         return swept
     ascending, area = swept.states, case.mission.area
-    states = ascending[:: 1 if passage.sweep == "up" else -1]
+    states = ascending[:: 1 if case.passage.sweep == "up" else -1]
     starts, parts = [state.start for state in ascending], parts_of(ascending)
     volume = float(parts.sum(axis=0) @ area)
     growth, slope = wear_in_order(states, (_slope_of(case, state) for state in states))
@@ -139,14 +139,11 @@ def wear_in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) ->
     unit = np.eye(states[0].density.size)
     # columns: the wear, and the change of the depth after the passage
     grown: FloatArray = np.zeros((len(unit), len(unit) + 1))
-    last: tuple[SweptState, FloatArray, FloatArray] | None = None
+    before, rise = states[0].frequency, np.zeros_like(grown)
     for state, slope in zip(states, slopes, strict=True):
-        source = np.column_stack([state.density, slope])
-        if last is not None:
-            half = 0.5 * abs(state.frequency - last[0].frequency)
-            known = grown + half * (last[2] + last[1] @ grown + source)
-            grown = np.asarray(np.linalg.solve(unit - half * slope, known))
-        last = state, slope, source
+        half, source = 0.5 * abs(state.frequency - before), np.column_stack([state.density, slope])
+        grown = np.asarray(np.linalg.solve(unit - half * slope, grown + half * (rise + source)))
+        before, rise = state.frequency, source + slope @ grown
     return np.maximum(grown[:, 0], 0.0), grown[:, 1:]
 
 
@@ -199,11 +196,8 @@ def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least:
 
 def _between(one: SweptState, other: SweptState, finest: float) -> list[float]:
     """Further frequencies between two, Hz: both sides of a jump, or the middle of an interval above `finest`, Hz."""
-    low, high = one.frequency, other.frequency
-    near = NEGLIGIBLE * low
-    folds = [
-        fold for fold in sorted({each.start.fold_frequency for each in (one, other)}) if low + near < fold < high - near
-    ]
+    low, high, near = one.frequency, other.frequency, NEGLIGIBLE * one.frequency
+    folds = {each.start.fold_frequency for each in (one, other) if low + near < each.start.fold_frequency < high - near}
     if one.start.branch != other.start.branch and folds:
         return [side for fold in folds for side in (fold - near, fold + near)]
     return [0.5 * (low + high)] if high - low > max(2.0 * near, finest) else []
@@ -229,8 +223,7 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    passage, found = case.passage, []
-    line = case.line(passage.sweep)
+    found, line = [], case.line(case.passage.sweep)
     if case.guide is not None:
         # errors of a reference solution are not used
         line.known = case.guide.resolutions
@@ -241,7 +234,7 @@ def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Fa
             return Failure(Outcome.TIME_LIMIT)
         setup, begun = case.begin(start)
         joint, frequency = setup.joint_of(begun), float(frequencies[index])
-        density = setup.rate(begun.at) * frequency / passage.rate
+        density = setup.rate(begun.at) * frequency / case.passage.rate
         response = to_complex(joint.structure.response_h(joint.to_relative(begun.at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, begun.at)))
     return found

@@ -243,7 +243,7 @@ class WearProblem:
         end, follow = replace(taken[0], length=taken[1]), self.asked.follow
         if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
             return self.setup.lost(end)
-        return self._refused(state, end.depth, end.cycle - state.cycle) or end
+        return too_long(self.setup, state, end.depth, end.cycle - state.cycle) or end
 
     def _shortest(self, state: WearState, length: float) -> float:
         """Shortest step, cycles, of one that is `length` long: the accuracy to which a branch end is located."""
@@ -276,7 +276,7 @@ class WearProblem:
             if found is not None:
                 return found
         worn = state.depth + length * setup.rate(state.at)
-        if (failure := self._refused(state, worn, length)) is not None:
+        if (failure := too_long(setup, state, worn, length)) is not None:
             return failure
         beyond = jump(setup, state, worn, state.cycle + length)
         if isinstance(beyond, Failure):
@@ -305,10 +305,6 @@ class WearProblem:
                 return end
         self.setup.run = before
         return None
-
-    def _refused(self, state: WearState, depth: FloatArray, length: float) -> Failure | None:
-        """Why a step or a jump to depths (n_contact,), m, is no result of a history; None if it is."""
-        return too_long(self.setup, state, depth, length) if self.guide is None else None
 
 
 def reference_of(case: Case, start: StartState, asked: WearRequest, guide: Guide, counts: FloatArray) -> WearProblem:
