@@ -104,11 +104,6 @@ def largest_distance(state_t: FloatArray) -> FloatArray:
     return largest
 
 
-def loop_phases() -> FloatArray:
-    """Phases (LOOP_PHASES,), rad, from 0 without 2 pi."""
-    return 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES
-
-
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
     """Relative displacement, m, and contact force, N, of chosen pairs of a state, both (n_pairs, LOOP_PHASES, 3).
 
@@ -117,26 +112,23 @@ def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) 
     second tangent; closing and compression are positive. Along a direction that a pair does not have both are 0, but
     for a constant normal load.
     """
+    if not pairs:
+        return np.zeros((0, LOOP_PHASES, 3)), np.zeros((0, LOOP_PHASES, 3))
     chosen, n_samples, orders = list(pairs), joint.basis.n_samples, joint.basis.orders
-    motion_h = evaluation.displacement_h[chosen]
-    displacement = motion_h @ synthesis(orders, loop_phases())
-    ends = motion_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * (np.arange(n_samples) - 0.5) / n_samples)
-    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, chosen, ends), 0.5)
+    motion_h, phases = evaluation.displacement_h[chosen], np.arange(LOOP_PHASES) / LOOP_PHASES
+    # half a step before the samples
+    ends = (np.arange(n_samples) - 0.5) / n_samples
+
+    def at_phases(values_t: FloatArray, at: FloatArray) -> FloatArray:
+        rows = [np.interp(phases, at, row, period=1.0) for row in values_t.reshape(-1, n_samples)]
+        return np.array(rows).reshape(*values_t.shape[:-1], LOOP_PHASES)
+
+    displacement = motion_h @ synthesis(orders, 2.0 * np.pi * phases)
+    series = motion_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * ends)
+    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, chosen, series), ends)
     displacement *= (joint.contact.dofs[chosen] >= 0)[:, :, None]
-    force = at_phases(evaluation.force_t[chosen], 0.0)
+    force = at_phases(evaluation.force_t[chosen], np.arange(n_samples) / n_samples)
     return displacement.transpose(0, 2, 1), force.transpose(0, 2, 1)
-
-
-def at_phases(values_t: FloatArray, lead: float) -> FloatArray:
-    """Values (..., LOOP_PHASES) at the phases of a loop, by linear interpolation of periodic samples (..., N).
-
-    lead: 0 where the first sample is at phase 0, 0.5 where the first sample is half a step before.
-    """
-    # positions of the phases in whole numbers: a phase of a sample gives this sample to the last bit
-    n_samples = values_t.shape[-1]
-    whole, rest = np.divmod(2 * n_samples * np.arange(LOOP_PHASES) + round(2 * lead) * LOOP_PHASES, 2 * LOOP_PHASES)
-    before, after = values_t[..., whole % n_samples], values_t[..., (whole + 1) % n_samples]
-    return np.asarray(before + rest / (2 * LOOP_PHASES) * (after - before))
 
 
 @dataclass(frozen=True)
