@@ -180,50 +180,35 @@ class Course:
         return low
 
     def reach(self, target: WearTarget) -> tuple[float, float]:
-        """Count at which a target is reached, NaN if never, and its error by a resonance and its interpolation.
+        """Count at which a target is reached, NaN if never, and its error by a resonance and its interpolation."""
+        from scipy.optimize import brentq  # where it is used: it takes a while to load
 
-        The worn volume is a parabola in the shift of the resonance, through both ends of the step and the end before.
-        """
-        resonances = np.zeros(0)
-        if target.quantity == "frequency_shift":
-            resonances = np.array([node.values["resonance"] for node in self.nodes]) / self.nodes[0].values["resonance"]
-            values = np.abs(resonances - 1.0)
-        else:
-            values = self._wear(self.depths, target)
+        values = self._compared(target, self.counts)
         end = int(np.argmax(values >= target.value))
         if not values[end] >= target.value:
             return math.nan, 0.0
-        if not resonances.size:
-            return self._count_of(target, end), 0.0
-        ends = slice(max(end - 2, 0), end + 1)
-        shifts, volumes = math.copysign(1.0, resonances[end] - 1.0) * (resonances[ends] - 1.0), self.volumes[ends]
-        moved = shifts[-1] - shifts[-2]
-        line = found = volumes[-2] + (target.value - shifts[-2]) * (volumes[-1] - volumes[-2]) / moved
-        if shifts.size > 2 and (np.diff(volumes) > 0.0).all() and shifts[0] < shifts[1] < target.value:
-            curved = float(np.polyval(np.polyfit(shifts, volumes, 2), target.value))
-            # the volume has to rise with the shift
-            found = curved if volumes[1] < curved < volumes[2] else line
-        error = max(self.nodes[place].values["resonance_error"] for place in (0, end))
-        by_resonance = error * (self.counts[end] - self.counts[end - 1]) / moved
-        count, straight = (self._count_of(WearTarget("worn_volume", float(each)), end) for each in (found, line))
-        return count, abs(count - straight) + by_resonance
-
-    def _count_of(self, target: WearTarget, end: int) -> float:
-        """Count of a depth or a volume within the step to node `end`."""
-        from scipy.optimize import brentq  # where it is used: it takes a while to load
-
-        low, high = self.counts[end - 1 : end + 1]
+        start = max(end - 1, 0)
+        low, high = float(self.counts[start]), float(self.counts[end])
 
         def above(fraction: float) -> float:
-            depths = self.depth_at(np.array([low + fraction * (high - low)]))
-            return float(self._wear(depths, target)[0]) - target.value
+            return float(self._compared(target, np.array([low + fraction * (high - low)]))[0]) - target.value
 
-        if above(0.0) >= 0.0 or above(1.0) <= 0.0:
-            return float(low if above(0.0) >= 0.0 else high)
-        return float(low + brentq(above, 0.0, 1.0, xtol=1e-12) * (high - low))
+        count = low if above(0.0) >= 0.0 else high
+        if above(0.0) < 0.0 < above(1.0):
+            count = low + float(brentq(above, 0.0, 1.0, xtol=1e-12)) * (high - low)
+        if target.quantity != "frequency_shift":
+            return count, 0.0
+        # linear in the worn volume, against linear in the count
+        per_shift = (high - low) / (values[end] - values[start])
+        straight = low + per_shift * (target.value - values[start])
+        error = max(self.nodes[place].values["resonance_error"] for place in (0, end))
+        return count, float(abs(count - straight) + error * per_shift)
 
-    def _wear(self, depths: FloatArray, target: WearTarget) -> FloatArray:
-        """Largest depth, m, or worn volume, m3, (n,) of depths (n, k), m."""
+    def _compared(self, target: WearTarget, counts: FloatArray) -> FloatArray:
+        """What a target is compared with at counts (n,): wear, or the relative shift of the resonance up or down."""
+        if target.quantity == "frequency_shift":
+            return np.asarray(np.abs(self.read(counts)["resonance"] / self.nodes[0].values["resonance"] - 1.0))
+        depths = self.depth_at(counts)
         if target.quantity == "worn_volume":
             return self._volumes(depths)
         return np.asarray(depths.reshape(len(depths), -1, self.area.size).sum(axis=1).max(axis=1, initial=0.0))
