@@ -49,30 +49,23 @@ if TYPE_CHECKING:
     from solver.whole_response import response_curve as response_curve
 
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
-_PLACES = {
-    "Backbone": "nonlinear_modes",
-    "Block": "missions.mission",
-    "FrequencyResponse": "forced_response",
-    "HarmonicBalance": "balance_functions",
-    "MissionHistory": "missions.mission",
-    "ModalResponse": "single_mode_theory",
-    "Outcome": "outcome",
-    "Passage": "missions.mission",
-    "PeriodicMotion": "results.state_report",
-    "ReducedModel": "model",
-    "ResponseCurve": "whole_response",
-    "SolverSettings": "settings",
-    "WearHistory": "results.history",
-    "backbone": "nonlinear_modes",
-    "balance_of": "balance_functions",
-    "build_model": "model_from_matrices",
-    "frequency_response": "forced_response",
-    "integrate_mission": "histories",
-    "march_wear": "histories",
-    "modal_response": "single_mode_theory",
-    "response_curve": "whole_response",
-    "with_contact_stiffness": "compliant_contact",
+_NAMES = {
+    "balance_functions": "HarmonicBalance balance_of",
+    "compliant_contact": "with_contact_stiffness",
+    "forced_response": "FrequencyResponse frequency_response",
+    "histories": "integrate_mission march_wear",
+    "missions.mission": "Block MissionHistory Passage",
+    "model": "ReducedModel",
+    "model_from_matrices": "build_model",
+    "nonlinear_modes": "Backbone backbone",
+    "outcome": "Outcome",
+    "results.history": "WearHistory",
+    "results.state_report": "PeriodicMotion",
+    "settings": "SolverSettings",
+    "single_mode_theory": "ModalResponse modal_response",
+    "whole_response": "ResponseCurve response_curve",
 }
+_PLACES = {name: place for place, names in _NAMES.items() for name in names.split()}
 
 if not TYPE_CHECKING:
     __all__ = list(_PLACES)

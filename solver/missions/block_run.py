@@ -10,6 +10,7 @@ import scipy.linalg
 
 from solver.accuracy.history_error import HISTORY_SAFETY
 from solver.clock import computing_time
+from solver.contact.wear_law import WearLaw
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, State, vibration_change
@@ -24,9 +25,9 @@ from solver.outcome import Outcome
 from solver.packing import packable
 from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import periodic_state
-from solver.settings import Direction, Resolution, SolverSettings
+from solver.settings import Direction, Resolution
 from solver.stability.floquet import find_instability
-from solver.structure.joint import build_case
+from solver.structure.joint import Case, build_case
 from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
@@ -134,9 +135,14 @@ class BlockCase:
         return replace(self.block.model, contact=replace(contact, gap=contact.gap + self.depth))
 
     @property
-    def settings(self) -> SolverSettings:
-        """The settings, with the time that is left."""
-        return replace(self.mission.settings, time_limit=self.deadline - computing_time())
+    def law(self) -> WearLaw:
+        """The wear law from the depth on."""
+        return self.mission.law.begun_at(self.depth)
+
+    @property
+    def time_left(self) -> float:
+        """CPU seconds until the deadline."""
+        return self.deadline - computing_time()
 
     def run(self) -> Run:
         """A computation until the deadline."""
@@ -145,16 +151,20 @@ class BlockCase:
     def line(self, sweep: Direction, amplitude: float | None = None) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N; that of the block if not given."""
         load = self.block.excitation_amplitude if amplitude is None else amplitude
-        line = FrequencySweep(self.model, self.block.friction_coefficient, load, sweep, self.settings)
+        settings = replace(self.mission.settings, time_limit=self.time_left)
+        line = FrequencySweep(self.model, self.block.friction_coefficient, load, sweep, settings)
         line.every = self.every
         line.set_deadline(self.deadline)
         return line
 
+    def at(self, start: StartState) -> Case:
+        """The case at the depth before the block, with harmonics, samples and penalty of a state."""
+        friction = self.block.friction_coefficient
+        return build_case(self.model, friction, start.penalty_omega, self.mission.settings, start.resolution)
+
     def begin(self, start: StartState) -> tuple[WearingJoint, WearState]:
-        """The joint at the depth before the block, with harmonics, samples and penalty of a state, and this state."""
-        friction, mission = self.block.friction_coefficient, self.mission
-        case = build_case(self.model, friction, start.penalty_omega, self.settings, start.resolution)
-        setup = WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
+        """The joint at the depth before the block, and a state of it."""
+        setup = WearingJoint(self.at(start), start, self.mission.wear_coefficient, self.law)
         return setup, setup.begin()
 
 
@@ -163,23 +173,22 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     start, begun = find_start(case)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    setup, _ = case.begin(start)
     counts, steps = np.array([0.0, case.block.cycles]), Adaptive(case.mission.settings.rtol)
-    asked = WearRequest(setup.wear_coefficient, steps, counts, law=setup.law, ends_at_last=True)
+    asked = WearRequest(case.mission.wear_coefficient, steps, counts, law=case.law, ends_at_last=True)
     if case.guide is None:
-        problem = WearProblem(setup.case, start, asked, stable_end=case.every)
+        problem = WearProblem(case.at(start), start, asked, stable_end=case.every)
     else:
-        problem = reference_of(setup.case, start, asked, case.guide, counts)
-    ended = Integrator(case.settings.time_limit).integrate(problem)
+        problem = reference_of(case.at(start), start, asked, case.guide, counts)
+    ended = Integrator(case.time_left).integrate(problem)
     state = ended.state
     if state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return ended.failure
     values, slope = ended.course.read(counts), None
     depth = values["wear_depth"]
-    volume = float(depth[-1] @ setup.area)
+    volume = float(depth[-1] @ case.mission.area)
     if case.with_slope:
         # the flow of the linearised wear rate
-        rates = rate_slope(setup, state, case.depth + depth[-1] > 0.0)
+        rates = rate_slope(problem.setup, state, case.depth + depth[-1] > 0.0)
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0

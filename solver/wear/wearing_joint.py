@@ -7,13 +7,13 @@ amplitude (`solver.continuation.phase_lag`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.harmonic_levels import left_out
-from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
+from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
@@ -108,40 +108,35 @@ class WearState:
         return bool(self.rates[-1] > NO_WEAR * self.most_rate)
 
 
-@dataclass
 class WearingJoint:
     """The joint of one wear history.
 
     case: model, friction and settings. start: unworn state, which exists; its load is that of the history.
     wear_coefficient: 1/Pa. law: part of the slip work that wears.
     follow: what the frequency of the excitation follows, None for the frequency of the unworn state.
-    run: counts the iterations, limits the time, and keeps a factorisation from one solve to the next.
+    area (n_contact,): m2. wearing: wearing work of the law.
+    run: counts the iterations, limits the time, and has a factorisation from one solve to the next.
     """
 
-    case: Case
-    start: StartState
-    wear_coefficient: float
-    law: WearLaw = ARCHARD
-    follow: FollowedFrequency | None = None
-    excitation_amplitude: float = field(init=False)
-    wearing: WearingWork = field(init=False)
-    run: Run = field(init=False)
-    _joint: tuple[Case, Joint] | None = field(default=None, init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        assert self.start.state is not None
-        self.excitation_amplitude = self.start.state.excitation_amplitude
-        self.wearing = wearing_work(self.law, self.case.model.contact, self.case.friction_coefficient)
-        self.run = Run(self.case.settings.tolerance)
-
-    @property
-    def area(self) -> FloatArray:
-        """Area of the pairs (n_contact,), m2."""
-        return self.case.model.contact.area
+    def __init__(
+        self,
+        case: Case,
+        start: StartState,
+        wear_coefficient: float,
+        law: WearLaw = ARCHARD,
+        follow: FollowedFrequency | None = None,
+    ) -> None:
+        assert start.state is not None
+        self.case, self.start, self.wear_coefficient, self.follow = case, start, wear_coefficient, follow
+        self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude
+        self.area = case.model.contact.area
+        self.wearing = wearing_work(law, case.model.contact, case.friction_coefficient)
+        self.run = Run(case.settings.tolerance)
+        self._last: tuple[Case, Joint] | None = None
 
     def case_and_joint(self, state: WearState) -> tuple[Case, Joint]:
         """Case and joint of a state. The last ones are stored; others drop the factorisation."""
-        last = self._joint
+        last = self._last
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
             case = self.case if state.hold is None else self.case.held(state.hold)
             case = case.at(state.resolution)
@@ -150,8 +145,8 @@ class WearingJoint:
             case = last[0]
         else:
             return last
-        self._joint = case, case.joint(state.omega, self.excitation_amplitude)
-        return self._joint
+        self._last = case, case.joint(state.omega, self.excitation_amplitude)
+        return self._last
 
     def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
@@ -162,7 +157,7 @@ class WearingJoint:
         return Balance(self.joint_of(state), state.at.history, state.depth)
 
     def drop_factor(self) -> None:
-        """Drop the kept factorisation, so that the next solve depends on the state alone."""
+        """Drop the factorisation, so that the next solve depends on the state alone."""
         self.run = self.run.fresh()
 
     def is_stable(self, state: WearState) -> bool:
@@ -179,9 +174,7 @@ class WearingJoint:
 
     def begin(self, of: PeriodicState | None = None) -> WearState:
         """The unworn state, or that of the reference sweep, evaluated and not solved again."""
-        start = self.start
-        state = of or start.state
-        assert state is not None
+        start, state = self.start, of or self.unworn
         balance, at = evaluated(self.case.at(start.resolution).joint(state.omega, self.excitation_amplitude), state)
         nothing = np.zeros(self.area.size + 1)
         begun = WearState(
@@ -207,9 +200,9 @@ class WearingJoint:
         0.106 mm3; both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep
         is taken.
         """
-        fine, reference = self.start.state, self.start.reference
+        fine, reference = self.unworn, self.start.reference
         begun = self.begin(reference)
-        if fine is None or reference is None:
+        if reference is None:
             return begun
         history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
         balance = Balance(self.joint_of(begun), history, begun.depth)
