@@ -15,8 +15,7 @@ import numpy as np
 
 from studies.fe_models.deck.contents import Boundary, Deck
 from studies.fe_models.deck.model import deck_of_arrays
-from studies.fe_models.library_errors import library_errors
-from studies.fe_models.text import IntArray, Place, shown
+from studies.fe_models.text import IntArray, Place, library_errors, shown
 from studies.scene_error import SceneError
 
 # which of the nodes of an element of ANSYS are those of which kind: bricks may be collapsed to wedges or tetrahedra
@@ -165,7 +164,7 @@ class _Commands:
     def boundaries(self) -> tuple[Boundary, ...]:
         """Displacements that are given."""
         return tuple(
-            Boundary(f"D,{label}", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
+            Boundary("the command D", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
             for (label, value), nodes in self.held.items()
         )
 

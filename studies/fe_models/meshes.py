@@ -19,8 +19,7 @@ from studies.fe_models.cdb import read_cdb
 from studies.fe_models.deck.contents import ContactNodes, Deck
 from studies.fe_models.deck.model import deck_of_arrays
 from studies.fe_models.deck.read import read_deck
-from studies.fe_models.library_errors import library_errors
-from studies.fe_models.text import IntArray
+from studies.fe_models.text import IntArray, library_errors
 from studies.scene_error import SceneError
 
 # meshio's names, whose order of nodes is VTK's: for these kinds that of the decks

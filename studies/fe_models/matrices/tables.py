@@ -15,10 +15,10 @@ import numpy as np
 import pandas as pd
 from scipy import io, sparse
 
-from studies.fe_models.library_errors import library_errors
 from studies.fe_models.matrices.matrices import IntArray, Matrices, assemble, label, of_table, wrong
 from studies.fe_models.matrices.nastran import names_of_matrices
 from studies.fe_models.matrices.op4 import read_op4
+from studies.fe_models.text import library_errors
 
 NAMES = ("stiffness", "mass", "damping", "load")
 """Variables of a .mat file, and ends of the names of files with one matrix each."""
