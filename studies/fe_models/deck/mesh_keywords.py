@@ -34,18 +34,13 @@ OTHER_KINDS = {
 }
 """Kinds of elements that are not read, and their numbers of nodes: without a section they carry nothing."""
 
-_OF_PARTS = ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE")
 _MOST_MADE = 4_000_000  # nodes or elements that one keyword may make
 
 
 def read_mesh_keyword(draft: Draft, block: Block) -> None:
     """Acts on a keyword of the mesh; others are put aside, as all keywords of a part are until it has an instance."""
     block = replace(block, scope=draft.scope)
-    if block.keyword in _OF_PARTS:
-        for name in set(block.parameters) - {"NAME", "PART", "NSET", "ELSET"}:
-            raise block.place.wrong(f"{shown(name)} is not read", "leave it out")
-        _of_parts(draft, block)
-    elif draft.part:
+    if draft.part and block.keyword not in ("PART", "ENDPART", "INSTANCE"):
         draft.parts[draft.part].append(block)
     elif block.keyword in KEYWORDS and KEYWORDS[block.keyword].of_mesh:
         find_keyword(block).reader(draft, block)
@@ -53,30 +48,38 @@ def read_mesh_keyword(draft: Draft, block: Block) -> None:
         draft.others.append(block)
 
 
-def _of_parts(draft: Draft, block: Block) -> None:
-    """*PART and *INSTANCE, which is the mesh of a part, shifted and turned."""
-    if block.keyword == "PART":
-        name = block.name("NAME")
-        if draft.part or draft.scope or name in draft.parts:
-            raise block.place.wrong(f"{shown(name)} again, or within another", "write *END PART above it")
-        draft.part, draft.parts[name] = name, []
-    elif block.keyword == "ENDPART":
-        draft.part = ""
-    elif block.keyword == "ENDINSTANCE":
-        draft.scope, draft.system = "", None
-    else:
-        name, part = block.name("NAME"), block.name("PART")
-        if part not in draft.parts or draft.part or draft.scope or name in draft.placed:
-            found = f"{shown(name)} of {shown(part)}, which is no part, or again"
-            raise block.place.wrong(found, "give *PART above it, and each instance once")
-        draft.placed[name] = _placement(block)
-        draft.scope, draft.system = name, None
-        for each in draft.parts[part]:
-            read_mesh_keyword(draft, each)
-        # sets of the assembly with all of the instance
-        for parameter, sets in (("NSET", draft.node_sets), ("ELSET", draft.element_sets)):
-            if parameter in block.parameters:
-                sets.add(("", block.name(parameter)), Numbers(name, np.array([1, LARGEST_NUMBER]), 1))
+@keyword("PART", "NAME", of_mesh=True)
+def _part(draft: Draft, block: Block) -> None:
+    name = block.name("NAME")
+    if draft.part or draft.scope or name in draft.parts:
+        raise block.place.wrong(f"{shown(name)} again, or within another", "write *END PART above it")
+    draft.part, draft.parts[name] = name, []
+
+
+@keyword("ENDPART", of_mesh=True)
+def _end_part(draft: Draft, _block: Block) -> None:
+    draft.part = ""
+
+
+@keyword("ENDINSTANCE", of_mesh=True)
+def _end_instance(draft: Draft, _block: Block) -> None:
+    draft.scope, draft.system = "", None
+
+
+@keyword("INSTANCE", "NAME PART NSET ELSET", of_mesh=True)
+def _instance(draft: Draft, block: Block) -> None:
+    """The mesh of a part, shifted and turned; sets of the assembly with all of the instance."""
+    name, part = block.name("NAME"), block.name("PART")
+    if part not in draft.parts or draft.part or draft.scope or name in draft.placed:
+        found = f"{shown(name)} of {shown(part)}, which is no part, or again"
+        raise block.place.wrong(found, "give *PART above it, and each instance once")
+    draft.placed[name] = _placement(block)
+    draft.scope, draft.system = name, None
+    for each in draft.parts[part]:
+        read_mesh_keyword(draft, each)
+    for parameter, sets in (("NSET", draft.node_sets), ("ELSET", draft.element_sets)):
+        if parameter in block.parameters:
+            sets.add(("", block.name(parameter)), Numbers(name, np.array([1, LARGEST_NUMBER]), 1))
 
 
 @keyword("NODE", "NSET SYSTEM INPUT", of_mesh=True)
@@ -88,7 +91,7 @@ def _node(draft: Draft, block: Block) -> None:
     if draft.system is not None:
         origin, axes = draft.system
         coordinates = coordinates @ axes + origin
-    _add_nodes(draft, block, numbers, coordinates, "NSET")
+    _add(draft, block, Records(block.scope, numbers, coordinates, block.place), "NSET")
 
 
 @keyword("SYSTEM", of_mesh=True)
@@ -117,7 +120,7 @@ def _element(draft: Draft, block: Block) -> None:
         remedy = f"mesh the model with {', '.join(NODES_OF_KIND)}, and remove elements that carry nothing"
         raise block.place.wrong(f"elements of type {shown(kind)}", remedy)
     records = read_records(block, length + 1, f"a {kind} of {length} nodes with its number")
-    _add_elements(draft, block, kind, records[:, 0], records[:, 1:], "ELSET")
+    _add(draft, block, Records(block.scope, records[:, 0], records[:, 1:], block.place, kind), "ELSET")
 
 
 @keyword("NSET", "NSET ELSET GENERATE INSTANCE INPUT UNSORTED", "INTERNAL", of_mesh=True)
@@ -216,8 +219,8 @@ def _fill(
     numbers = (first[:, None] + step * np.arange(1, n_intervals)).ravel()
     start, end = _coordinates(draft, block, first), _coordinates(draft, block, last)
     share = np.linspace(0.0, 1.0, n_intervals + 1)[1:-1, None]
-    points = start[:, None] + share * (end - start)[:, None]
-    _add_nodes(draft, block, numbers, points.reshape(-1, 3), "NSET", np.concatenate(ends))
+    points = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3)
+    _add(draft, block, Records(block.scope, numbers, points, block.place), "NSET", np.concatenate(ends))
 
 
 @keyword("NCOPY", "CHANGENUMBER OLDSET NEWSET SHIFT", of_mesh=True)
@@ -227,7 +230,8 @@ def _ncopy(draft: Draft, block: Block) -> None:
         raise block.place.wrong("a copy without SHIFT", "give the nodes of copies that are mirrored or scaled")
     (change,) = _whole_numbers([block.parameters.get("CHANGENUMBER", "")], block.place, (0,))
     numbers, (shift, turn) = _members(draft, block.reference("OLDSET")), _placement(block)
-    _add_nodes(draft, block, numbers + change, _coordinates(draft, block, numbers) @ turn.T + shift, "NEWSET")
+    points = _coordinates(draft, block, numbers) @ turn.T + shift
+    _add(draft, block, Records(block.scope, numbers + change, points, block.place), "NEWSET")
 
 
 @keyword("ELGEN", "ELSET", of_mesh=True)
@@ -301,26 +305,16 @@ def _coordinates(draft: Draft, block: Block, wanted: IntArray) -> FloatArray:
     return np.concatenate([each.values for each in own])[order[np.searchsorted(numbers[order], wanted)]]
 
 
-def _add_nodes(
-    draft: Draft, block: Block, numbers: IntArray, points: FloatArray, parameter: str, more: IntArray = NONE
-) -> None:
-    """Nodes with coordinates (n, 3); the set that a parameter names has them, and `more`."""
-    _check_numbers(block, numbers)
-    draft.nodes.append(Records(block.scope, numbers, points, block.place))
+def _add(draft: Draft, block: Block, made: Records, parameter: str, more: IntArray = NONE) -> None:
+    """Nodes, or elements, which have a kind; the set that a parameter names has them, and `more`."""
+    whole = np.append(made.numbers, made.values) if made.kind else made.numbers
+    if whole.size and not 0 < whole.min() <= whole.max() <= LARGEST_NUMBER:
+        raise block.place.wrong(f"numbers beyond 1 to {LARGEST_NUMBER}", "give smaller steps")
+    records, sets = (draft.elements, draft.element_sets) if made.kind else (draft.nodes, draft.node_sets)
+    records.append(made)
     if parameter in block.parameters:
-        members = np.concatenate([numbers, more])
-        draft.node_sets.add((block.scope, block.name(parameter)), Numbers(block.scope, members))
-
-
-def _add_elements(
-    draft: Draft, block: Block, kind: str, numbers: IntArray, nodes: IntArray, parameter: str, more: IntArray = NONE
-) -> None:
-    """The same of elements with nodes (n, k)."""
-    _check_numbers(block, np.append(numbers, nodes))
-    draft.elements.append(Records(block.scope, numbers, nodes, block.place, kind))
-    if parameter in block.parameters:
-        members = np.concatenate([numbers, more])
-        draft.element_sets.add((block.scope, block.name(parameter)), Numbers(block.scope, members))
+        members = Numbers(block.scope, np.concatenate([made.numbers, more]))
+        sets.add((block.scope, block.name(parameter)), members)
 
 
 def _copy_elements(
@@ -334,12 +328,8 @@ def _copy_elements(
         rows = np.flatnonzero(np.isin(each.numbers, own))
         numbers = (each.numbers[rows] + by_element[:, None]).ravel()
         nodes = (each.values[rows] + by_node[:, None, None]).reshape(-1, each.values.shape[1]).astype(np.int64)
-        _add_elements(draft, block, each.kind, numbers, nodes, parameter, each.numbers[rows])
+        made = Records(block.scope, numbers, nodes, block.place, each.kind)
+        _add(draft, block, made, parameter, each.numbers[rows])
         done += rows.size
     if done < own.size or not own.size:
         raise block.place.wrong("an element that does not exist", "define it above this line")
-
-
-def _check_numbers(block: Block, numbers: IntArray) -> None:
-    if numbers.size and not 0 < numbers.min() <= numbers.max() <= LARGEST_NUMBER:
-        raise block.place.wrong(f"numbers beyond 1 to {LARGEST_NUMBER}", "give smaller steps")
