@@ -81,14 +81,10 @@ class Mesh:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What sets name that does not exist."""
-        return (*self._nodes.notes, *self._elements.notes)
-
-    @property
-    def numbering(self) -> tuple[str, ...]:
-        """Which numbers the nodes of instances have."""
+        """What sets name that does not exist, and which numbers the nodes of later instances have."""
         later = [(name, offset) for name, offset in self.offsets.items() if offset]
-        return tuple(f"Node 1 of {name or 'the assembly'} is node {offset + 1}." for name, offset in later)
+        numbering = (f"Node 1 of {name or 'the assembly'} is node {offset + 1}." for name, offset in later)
+        return (*self._nodes.notes, *self._elements.notes, *numbering)
 
     def nodes(self, reference: Reference) -> IntArray:
         """The nodes of a set or number, ascending."""

@@ -111,7 +111,8 @@ class Model:
         gone = NONE
         for removed, elements, _ in self.get("removed"):
             gone = np.union1d(gone, elements) if removed else np.setdiff1d(gone, elements)
-        blocks = [_without(block, gone) for block in mesh.blocks if block.kind in NODES_OF_KIND]
+        solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.blocks if block.kind in NODES_OF_KIND]
+        faces = {name: (surface, ~np.isin(surface.elements, gone)) for name, surface in mesh.surfaces.items()}
         kept = np.setdiff1d(mesh.all_elements[mesh.solid], gone)
         names = ("boundaries", "transforms", "equations", "rigid_motions", "forces", "pressures")
         fields: dict[str, Any] = {name: tuple(self.get(name)) for name in names}
@@ -123,10 +124,14 @@ class Model:
             path=mesh.draft.name,
             node_numbers=mesh.numbers,
             coordinates=mesh.coordinates,
-            blocks=tuple(block for block in blocks if block.numbers.size),
+            blocks=tuple(
+                ElementBlock(block.kind, block.numbers[own], block.nodes[own]) for block, own in solid if own.any()
+            ),
             node_sets=mesh.node_sets,
             element_sets={name: np.intersect1d(members, kept) for name, members in mesh.element_sets.items()},
-            surfaces={name: _surface_without(surface, gone) for name, surface in mesh.surfaces.items()},
+            surfaces={
+                name: Surface(each.elements[own], each.faces[own], each.nodes) for name, (each, own) in faces.items()
+            },
             ties=tuple(pair for _, cyclic, pair in ties if not cyclic),
             contact_pairs=tuple(self._contact_pairs()),
             cyclic=self._cyclic(),
@@ -138,7 +143,7 @@ class Model:
             n_instances=len(mesh.draft.placed),
             unassembled=tuple(text for text, _ in self.get("unassembled")),
             skipped=(*self.skipped, *self._idle()),
-            notes=(*mesh.notes, *self.notes, *mesh.numbering, *changes),
+            notes=(*mesh.notes, *self.notes, *changes),
             included=tuple(mesh.draft.included),
             **fields,
         )
@@ -221,16 +226,6 @@ class Model:
                 found = f"{number} sectors, another one has {first.n_sectors}, or about other axes"
                 raise place.wrong(found, "give all of them one N and one axis: several stages are not supported")
         return first
-
-
-def _without(block: ElementBlock, gone: IntArray) -> ElementBlock:
-    keep = ~np.isin(block.numbers, gone)
-    return ElementBlock(block.kind, block.numbers[keep], block.nodes[keep])
-
-
-def _surface_without(surface: Surface, gone: IntArray) -> Surface:
-    keep = ~np.isin(surface.elements, gone)
-    return Surface(surface.elements[keep], surface.faces[keep], surface.nodes)
 
 
 def deck_of_arrays(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from studies.fe_models.deck import contact_keywords, model_keywords, step_keywords
+from studies.fe_models.deck import model_keywords, step_keywords
 from studies.fe_models.deck.blocks import Block, read_blocks
 from studies.fe_models.deck.contents import Deck
 from studies.fe_models.deck.keywords import HARMLESS, KEYWORDS, find_keyword
@@ -17,7 +17,7 @@ from studies.fe_models.deck.mesh_keywords import read_mesh_keyword
 from studies.fe_models.deck.model import Model
 
 # the table is complete once all its readers are loaded
-__all__ = ["HARMLESS", "KEYWORDS", "contact_keywords", "model_keywords", "read_deck", "step_keywords"]
+__all__ = ["HARMLESS", "KEYWORDS", "model_keywords", "read_deck", "step_keywords"]
 
 _LOADS = ("CLOAD", "DSLOAD", "TEMPERATURE")  # of steps that are not static they do not matter
 

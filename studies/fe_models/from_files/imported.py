@@ -31,9 +31,6 @@ from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
 
-_OF_ELEMENTS = ("material", "rotation_speed")
-"""Keys that need elements: the forces of rotation are among those of the matrices, or in `preload`."""
-
 
 @dataclass(frozen=True)
 class NodalMatrices:
@@ -87,10 +84,11 @@ def import_matrices(
     selections: Selections,
     surfaces: tuple[tuple[ContactSurfaces, ...], tuple[ContactSurfaces, ...]],
     rotation: Rotation | None,
+    on_cut: IntArray,
 ) -> NodalMatrices:
     """Reads matrices; those of a mesh are whole, and nothing joins surfaces in contact. Raises SceneError.
 
-    surfaces: those in contact, and those that are glued.
+    surfaces: those in contact, and those that are glued. on_cut: numbers of the nodes on both cut faces.
     """
     deck, mesh, units, parameters = selections.deck, selections.mesh, selections.units, selections.parameters
     if not parameters.stress_stiffening:
@@ -112,16 +110,16 @@ def import_matrices(
             check_contact_removed(deck, matrices, nodes, (each.first.name, each.second.name), units)
         if rotation is not None:
             held_speed = check_speed(deck, matrices, rotation, of_study=parameters.rotation_speed is not None)
+    else:
+        _check_table(matrices, selections, on_cut)
     return replace(order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates), omega_squared_held=held_speed)
 
 
-def check_table(imported: NodalMatrices, selections: Selections, on_cut: IntArray) -> None:
-    """Raises SceneError where a table of nodes and matrices do not go together, or a key needs elements.
-
-    on_cut: numbers of the nodes on both cut faces.
-    """
-    deck, matrices = selections.deck, imported.matrices
-    for key in _OF_ELEMENTS:
+def _check_table(matrices: Matrices, selections: Selections, on_cut: IntArray) -> None:
+    """Raises SceneError where a table of nodes and matrices do not go together, or a key needs elements."""
+    deck = selections.deck
+    # forces of rotation are among those of the matrices, or in `preload`
+    for key in ("material", "rotation_speed"):
         if getattr(selections.parameters, key) is not None:
             remedy = "leave it out: reduced matrices have it in them, and forces stand in their load or in preload"
             raise SceneError(key, "the model is a table of nodes", remedy)
@@ -135,14 +133,6 @@ def check_table(imported: NodalMatrices, selections: Selections, on_cut: IntArra
     if len(turning):
         found = f"node {turning[0]} of a cut face has rotations"
         raise SceneError("cut_faces", found, "reduce the sector to the displacements of its cut faces")
-
-
-def constant_forces(imported: NodalMatrices, units: Units, n_nodes: int) -> FloatArray:
-    """Forces (3 n_nodes,), N, that stand beside the matrices."""
-    found = np.zeros(3 * n_nodes)
-    if imported.matrices.load is not None:
-        found[imported.place] = imported.matrices.load[:, 0] * units.force
-    return found
 
 
 def read_recovery(path: Path, imported: NodalMatrices, units: Units, taken: Collection[str]) -> Mapping[str, RowMotion]:

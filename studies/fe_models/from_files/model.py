@@ -15,7 +15,7 @@ from studies.contact_compliance import build_compliant
 from studies.fe_models.deck.contents import Deck
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.export_mistakes import check_nodes_have_dofs
-from studies.fe_models.from_files.imported import check_table, constant_forces, import_matrices, read_recovery
+from studies.fe_models.from_files.imported import import_matrices, read_recovery
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import Selections, find_clamped, find_cut, find_surfaces
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_cyclic_axis, find_rotation
@@ -142,7 +142,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     imported = None
     if files.matrices:
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
-        imported = import_matrices(files, selections, (contacts, ties), rotation)
+        imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
     numbers = mesh.numbers if imported is None else imported.model.numbers
     if clamped is not None:
         clamped = np.pad(clamped, ((0, len(numbers) - len(clamped)), (0, 0)))
@@ -156,10 +156,9 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     if imported is None:
         model = MeshModel(mesh, rotation, parameters.stress_stiffening, preload, gravity, extra=supported.extra)
     else:
-        if deck.contact_nodes is not None:
-            check_table(imported, selections, mesh.numbers[on_cut])
-            preload = preload + constant_forces(imported, units, len(supported.held))
-        else:
+        if imported.matrices.load is not None:
+            preload[imported.place] += imported.matrices.load[:, 0] * units.force
+        if deck.contact_nodes is None:
             free = mesh.numbers[~supported.own[: mesh.n_nodes].all(axis=1)]
             check_nodes_have_dofs(imported.matrices, free, "the mesh without its clamps")
         supported.held[: len(imported.missing)] |= imported.missing
