@@ -25,10 +25,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from solver.balance_functions import HarmonicBalance as HarmonicBalance
-    from solver.balance_functions import balance_of as balance_of
     from solver.compliant_contact import with_contact_stiffness as with_contact_stiffness
     from solver.forced_response import FrequencyResponse as FrequencyResponse
+    from solver.forced_response import HarmonicBalance as HarmonicBalance
+    from solver.forced_response import balance_of as balance_of
     from solver.forced_response import frequency_response as frequency_response
     from solver.histories import integrate_mission as integrate_mission
     from solver.histories import march_wear as march_wear
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel as ReducedModel
     from solver.model_from_matrices import build_model as build_model
     from solver.nonlinear_modes import Backbone as Backbone
+    from solver.nonlinear_modes import ModalResponse as ModalResponse
     from solver.nonlinear_modes import backbone as backbone
+    from solver.nonlinear_modes import modal_response as modal_response
     from solver.outcome import Outcome as Outcome
     from solver.results.history import WearHistory as WearHistory
     from solver.results.periodic_motion import PeriodicMotion as PeriodicMotion
     from solver.settings import SolverSettings as SolverSettings
-    from solver.single_mode_theory import ModalResponse as ModalResponse
-    from solver.single_mode_theory import modal_response as modal_response
     from solver.whole_response import ResponseCurve as ResponseCurve
     from solver.whole_response import response_curve as response_curve
 
@@ -53,9 +53,9 @@ _PLACES = {
     "Backbone": "nonlinear_modes",
     "Block": "missions.mission",
     "FrequencyResponse": "forced_response",
-    "HarmonicBalance": "balance_functions",
+    "HarmonicBalance": "forced_response",
     "MissionHistory": "missions.mission",
-    "ModalResponse": "single_mode_theory",
+    "ModalResponse": "nonlinear_modes",
     "Outcome": "outcome",
     "Passage": "missions.mission",
     "PeriodicMotion": "results.periodic_motion",
@@ -64,12 +64,12 @@ _PLACES = {
     "SolverSettings": "settings",
     "WearHistory": "results.history",
     "backbone": "nonlinear_modes",
-    "balance_of": "balance_functions",
+    "balance_of": "forced_response",
     "build_model": "model_from_matrices",
     "frequency_response": "forced_response",
     "integrate_mission": "histories",
     "march_wear": "histories",
-    "modal_response": "single_mode_theory",
+    "modal_response": "nonlinear_modes",
     "response_curve": "whole_response",
     "with_contact_stiffness": "compliant_contact",
 }

@@ -282,7 +282,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
     while ahead:
         here, parameter = states[-1], ahead[0]
         after = coarse.solve(states, parameter, run if parameter == target else rough)
-        if after is not None and coarse.change(here, after, float(stride)) <= LARGEST_CHANGE:
+        if after is not None and coarse.change(here, after) <= LARGEST_CHANGE * stride:
             states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > MOST_HALVINGS:

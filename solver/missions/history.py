@@ -18,13 +18,13 @@ from solver.missions.mission import Mission, MissionHistory, Passage
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import Nodes, Step, attempt_step, values_of
 from solver.model import FloatArray
-from solver.newton.run import Budget
+from solver.newton.run import Budget, guarded
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, packable
 from solver.results.verdict import describe_cut_off, describe_uncertain
 from solver.wear.course import Course, Node
 from solver.wear.history import compare
-from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Guide, Integrator, Solution, Solutions, guarded
+from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Guide, Integrator, Solution, Solutions
 
 STEP_ERROR_FRACTION = 0.5
 """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.

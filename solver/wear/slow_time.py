@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol, TypeVar
-
-import numpy as np
+from typing import Any, Protocol
 
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
-from solver.newton.run import Budget, OutOfTimeError
-from solver.outcome import Outcome, describe_error
+from solver.newton.run import Budget, guarded
+from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable, unpack
 from solver.settings import Resolution
 from solver.wear.course import Course
-
-T = TypeVar("T")
 
 AS_ASKED, UNFINISHED = Failure(Outcome.CONVERGED), Failure(Outcome.NOT_COMPUTED)
 """The regular end of a history, and that of one that goes on."""
@@ -137,16 +133,3 @@ class Integrator:
                     # what its time limit has ended is not complete
                     kept = {key: each for key, each in self._known.items() if each.failure.outcome not in ENDS_ALL}
                     self._keep(pack(kept))
-
-
-def guarded(compute: Callable[[], T]) -> T | Failure:
-    """Result of a computation, or its error as a failure."""
-    try:
-        return compute()
-    except np.linalg.LinAlgError:
-        return Failure(Outcome.SINGULAR)
-    except OutOfTimeError:
-        return Failure(Outcome.TIME_LIMIT)
-    except Exception as error:
-        # an error spoils one point only: the study goes on
-        return Failure(Outcome.EXCEPTION, describe_error(error))
