@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.hdf5 import find_datasets, is_number, open_hdf5, read_attribute, read_text_attribute, read_texts
 from studies.model_check import PAIRS_ARE_ROWS, check_model, check_order, check_sector, is_grouped
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
 
 Datasets = Mapping[str, h5py.Dataset]

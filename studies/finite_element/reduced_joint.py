@@ -39,7 +39,7 @@ from studies.finite_element.solid_mesh import (
     spin_softening,
 )
 from studies.finite_element.structure import Structure, hold_cut_faces, hold_pairs, loose_ties, merge_cut_pairs
-from studies.scene_answers import N_MODES, NaturalFrequencies
+from studies.scene import N_MODES, NaturalFrequencies
 from studies.scene_error import SceneError
 
 Progress = Callable[[str], None]

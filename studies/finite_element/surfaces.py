@@ -14,7 +14,7 @@ import numpy as np
 from solver.model import FloatArray, IntArray
 from studies.finite_element.elements import CORNERS, ELEMENT_KINDS, HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
 from studies.finite_element.solid_mesh import SolidMesh
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
 
 

@@ -138,17 +138,9 @@ def _integrated(rate: Callable[[float], float], sliding: FloatArray) -> FloatArr
 
     found, fastest, later = np.zeros_like(sliding), abs(rate(0.0)), sliding > 0.0
     if fastest > 0.0 and later.any():
-        end, smallest = float(sliding[-1]), 1e-13 * fastest * float(sliding[later][0])
+        end = float(sliding[-1])
         # between two steps the solution is interpolated, with an error that the tolerance does not bound
-        solution = solve_ivp(
-            lambda _, y: [rate(float(y[0]))],
-            (0.0, end),
-            [0.0],
-            "DOP853",
-            sliding[later],
-            rtol=1e-11,
-            atol=smallest,
-            max_step=end / _STEPS,
-        )
-        found[later] = solution.y[0]
+        limits = {"rtol": 1e-11, "atol": 1e-13 * fastest * float(sliding[later][0]), "max_step": end / _STEPS}
+        wearing = solve_ivp(lambda _, y: [rate(float(y[0]))], (0.0, end), [0.0], "DOP853", sliding[later], **limits)
+        found[later] = wearing.y[0]
     return found

@@ -8,27 +8,30 @@ stops, the motion is that of Den Hartog, Trans. ASME 53 (1931).
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from solver.contact.wear_law import wearing_work
 from solver.model import ReducedModel
 from solver.model_from_matrices import build_model
-from studies.contact_compliance import ContactStiffness
-from studies.scene_answers import ExactAnswer, WearQuestion, unknown_answer
+from studies.scene import ExactAnswer, Scene, WearQuestion
 from studies.scenes.den_hartog import DenHartogSlider, WearingSlider
 
+_KNOWN = {"scene.worn", *(f"axes.{key}" for key in ("frequency", "wear_coefficient", "excitation_amplitude"))}
+_KNOWN |= {f"wear.{key}" for key in ("law", "threshold", "pressure", "depth", "factor", "surfaces")}
+"""Keys of a study, beside the parameters of the scene, on which the exact answer depends."""
 
-class Parameters(BaseModel):
+
+class Parameters(Scene):
     """The defaults resonate at 201.3 Hz without friction.
 
     With 10 N at 160 Hz the mass never stops, and 1e5 cycles at 1.1e-11 1/Pa wear off half of the normal force.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    OFFERS: ClassVar = ("exact",)
 
-    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, 1")
-    contact_stiffness: ContactStiffness = None
     mass: float = Field(0.1, gt=0, description="mass, kg")
     damping: float = Field(0.0, ge=0, description="viscous damping of the mount, N s/m")
     stiffness: float = Field(1.6e5, gt=0, description="tangential stiffness of the mount, N/m")
@@ -38,61 +41,47 @@ class Parameters(BaseModel):
     )
     area: float = Field(1e-4, gt=0, description="contact area, m2")
 
+    def reduced_model(self) -> ReducedModel:
+        """The response is the displacement of the mass, on which the load acts.
 
-def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
-    """Reduced model: the response is the displacement of the mass, the unit harmonic load acts on the mass.
+        With a spring the closing displacement of the pair comes before that of the mass: a massless degree of freedom,
+        pressed by `normal_load`.
+        """
+        mass, damping, stiffness = (np.diag(each) for each in (
+            (0.0, self.mass), (0.0, self.damping), (self.normal_stiffness, self.stiffness)
+        ))  # fmt: skip
+        sprung = self.normal_stiffness > 0
+        own = slice(0 if sprung else 1, None)  # with the closing displacement, or without it
+        return build_model(
+            mass[own, own],
+            damping[own, own],
+            stiffness[own, own],
+            [[0, 1, -1]] if sprung else [[-1, 0, -1]],
+            self.area,
+            load_harmonic=np.array([0.0, 1.0])[own],
+            load_static=np.array([self.normal_load, 0.0]) if sprung else None,
+            response=np.array([[0.0, 1.0]])[:, own],
+            normal_load=0.0 if sprung else self.normal_load,
+            surface=("support",),
+            response_names=("mass",),
+        )
 
-    With a constant normal force the only displacement is that of the mass. With a spring the closing displacement of
-    the pair comes before it: a massless degree of freedom, pressed by `normal_load`. `n_harmonics` has no influence:
-    all harmonics see the same structure.
-    """
-    del n_harmonics
-    p = parameters
-    mass, damping, stiffness = (np.diag(each) for each in (
-        (0.0, p.mass), (0.0, p.damping), (p.normal_stiffness, p.stiffness)
-    ))  # fmt: skip
-    sprung = p.normal_stiffness > 0
-    own = slice(0 if sprung else 1, None)  # with the closing displacement, or without it
-    return build_model(
-        mass[own, own],
-        damping[own, own],
-        stiffness[own, own],
-        [[0, 1, -1]] if sprung else [[-1, 0, -1]],
-        p.area,
-        load_harmonic=np.array([0.0, 1.0])[own],
-        load_static=np.array([p.normal_load, 0.0]) if sprung else None,
-        response=np.array([[0.0, 1.0]])[:, own],
-        normal_load=0.0 if sprung else p.normal_load,
-        surface=("support",),
-        response_names=("mass",),
-    )
+    def exact_answer(self, asked: WearQuestion) -> ExactAnswer:
+        """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
 
-
-_OF_SCENE = "friction_coefficient", "mass", "stiffness", "normal_load", "normal_stiffness", "area", "worn"
-_OF_WEAR = "law", "threshold", "pressure", "depth", "factor", "surfaces"
-_OF_AXES = "frequency", "wear_coefficient", "excitation_amplitude"
-_KNOWN = {"scene": _OF_SCENE, "wear": _OF_WEAR, "axes": _OF_AXES}
-EXACT_ANSWER_KNOWS = frozenset(f"{table}.{key}" for table, keys in _KNOWN.items() for key in keys)
-"""Keys of a study on which `exact_answer` depends; a damped mount or a compliant contact has no closed form."""
-
-
-def exact_answer(parameters: Parameters, asked: WearQuestion) -> ExactAnswer:
-    """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
-
-    NaN where the mass stops on its way, or the frequency is one of the singular ones of the form.
-    """
-    p = parameters
-    load = p.normal_load - p.normal_stiffness * asked.worn_depth
-    slider = DenHartogSlider(p.mass, p.stiffness, asked.excitation_amplitude, 2.0 * np.pi * asked.frequency)
-    if not slider.holds(p.friction_coefficient * max(load, 0.0)):
-        return unknown_answer(asked, 1)
-    law, contact = asked.law.begun_at(np.array([asked.worn_depth])), build(p, 1).contact
-    work = wearing_work(law, contact, np.array([p.friction_coefficient]))
-    # the worn state depends on wear coefficient and cycle count through their product alone
-    sliding = np.multiply.outer(asked.wear_coefficients, asked.cycles)
-    different, places = np.unique(sliding, return_inverse=True)
-    pair = WearingSlider(slider, p.friction_coefficient, load, p.normal_stiffness, p.area, work)
-    depth, force = pair.worn(different)
-    response = slider.first_harmonic(p.friction_coefficient * force)
-    places = places.reshape(sliding.shape)
-    return ExactAnswer(p.area * depth[places], response[places][..., np.newaxis])
+        NaN where the mass stops on its way, the frequency is one of the singular ones of the form, the mount is damped
+        or the contact compliant, or a key of the study is changed that the form does not know.
+        """
+        mu, load = self.friction_coefficient, self.normal_load - self.normal_stiffness * asked.worn_depth
+        slider = DenHartogSlider(self.mass, self.stiffness, asked.excitation_amplitude, 2.0 * np.pi * asked.frequency)
+        # the worn state depends on wear coefficient and cycle count through their product alone
+        sliding = np.multiply.outer(asked.wear_coefficients, asked.cycles)
+        known = self.damping == 0.0 and self.contact_stiffness is None and asked.changed <= _KNOWN
+        if not (known and slider.holds(mu * max(load, 0.0))):
+            return ExactAnswer(np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan))
+        law, contact = asked.law.begun_at(np.array([asked.worn_depth])), self.reduced_model().contact
+        different, places = np.unique(sliding, return_inverse=True)
+        work = wearing_work(law, contact, np.array([mu]))
+        depth, force = WearingSlider(slider, mu, load, self.normal_stiffness, self.area, work).worn(different)
+        response, places = slider.first_harmonic(mu * force), places.reshape(sliding.shape)
+        return ExactAnswer(self.area * depth[places], response[places][..., np.newaxis])

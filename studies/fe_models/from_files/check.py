@@ -9,12 +9,12 @@ from scipy.linalg import eigh
 
 from solver import SolverSettings, march_wear
 from solver.model import FloatArray, LinearModel, ReducedModel
-from studies.contact_compliance import make_compliant
 from studies.fe_models.from_files.model import LoadedModel
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
 from studies.finite_element.joint_model import MatrixModel
 from studies.finite_element.reduced_joint import FeScene, Progress, glued_frequencies, prepare_model, silent
+from studies.scene import make_compliant
 
 N_FREQUENCIES = 4
 """Natural frequencies that are shown."""

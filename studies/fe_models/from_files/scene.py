@@ -8,7 +8,6 @@ from importlib import metadata
 from pydantic import BaseModel
 
 from solver.model import ReducedModel
-from studies.contact_compliance import build_compliant
 from studies.fe_models.from_files.model import LoadedModel, load_mesh, load_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.meshes import read_mesh_file
@@ -16,7 +15,7 @@ from studies.fe_models.model_files import ModelFiles, file_digest
 from studies.finite_element.joint_model import ReductionOptions
 from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
 from studies.finite_element.surfaces import describe_mesh
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh, build_compliant
 
 
 def checked(parameters: BaseModel) -> Parameters:
