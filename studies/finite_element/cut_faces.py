@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from solver.model import ComplexArray, FloatArray, IntArray
+from solver.model import FloatArray, IntArray
 from studies.scene_error import SceneError
 
 _SAME = 1e-3  # distance of two nodes that are images, over the distance of neighbouring nodes on the face
@@ -72,16 +72,15 @@ class CutFaces:
         """Rotation (3, 3) by one sector."""
         return self.axis.pitch()
 
-    def across(self, sectors: IntArray, nodal_diameter: int) -> FloatArray | ComplexArray:
-        """Factors (n, 3, 3) from displacements in this sector to those at the same places, sectors (n,) further on."""
-        steps = [self.phase(nodal_diameter) ** int(each) * self.axis.pitch(int(each)) for each in sectors]
-        return np.array(steps).reshape(-1, 3, 3)
+    def across(self, sectors: IntArray, nodal_diameter: int) -> sparse.bsr_matrix:
+        """Factors (3 n, 3 n) from displacements of points (n,) in this sector to those of their images.
 
-    def images(self, nodal_diameter: int, n_nodes: int) -> sparse.csr_matrix:
-        """Displacements (3 n, 3 n_nodes) of the right nodes from those of all nodes."""
-        blocks = np.tile(self.phase(nodal_diameter) * self.rotation, (len(self.left), 1, 1))
-        starts = np.arange(len(self.left) + 1)
-        return sparse.bsr_matrix((blocks, self.left, starts), shape=(3 * len(self.left), 3 * n_nodes)).tocsr()
+        sectors (n,): how far the images are from this sector.
+        """
+        steps, which = np.unique(sectors, return_inverse=True)
+        blocks = np.array([self.phase(nodal_diameter) ** int(each) * self.axis.pitch(int(each)) for each in steps])
+        each = np.arange(len(sectors) + 1)
+        return sparse.bsr_matrix((blocks[which], each[:-1], each))
 
     def phase(self, nodal_diameter: int) -> complex | float:
         """`exp(i 2 pi k / N)` of a nodal diameter in 0..n_sectors // 2, real at both ends."""
