@@ -256,10 +256,7 @@ def _match(
 ) -> _Match:
     """Nodes of the first surface and the closest points of the second one where its sector has it."""
     moving, opposite, there = contact.first, contact.second, contact.beside(coordinates, axis)
-    found = closest_points(coordinates[moving.nodes], opposite, there)
-    point, corner = np.nonzero(found.weights)
-    entries = (found.weights[point, corner], (point, found.nodes[point, corner]))
-    weights = sparse.csr_matrix(entries, shape=(len(moving.nodes), len(coordinates)))
+    weights, apart = closest_points(coordinates[moving.nodes], opposite, there)
     area, normals = moving.areas_and_normals(coordinates)
     facing, depth = np.zeros_like(coordinates), np.zeros(len(coordinates))
     facing[opposite.nodes] = opposite.areas_and_normals(there)[1]
@@ -267,7 +264,7 @@ def _match(
     return _Match(
         contact=contact,
         pairs=_pairs_of(coordinates, there, contact, place, weights, (area, normals), along),
-        apart=found.distance,
+        apart=apart,
         facing=np.einsum("ij,ij->i", weights @ facing, normals),
         depth=np.minimum(moving.depth, weights @ depth),
     )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
 from solver.model import (
-    BoolArray,
     ContactInterface,
     FloatArray,
     LinearModel,
@@ -22,7 +21,6 @@ from studies.finite_element.joint_model import (
     JointDefinition,
     MatrixModel,
     MeshModel,
-    ModelSummary,
     ReductionOptions,
     Retainer,
 )
@@ -47,11 +45,14 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class FeScene:
-    """A reduced model, its pairs in the order of the model, and values for a user to check."""
+    """A reduced model, its pairs in the order of the model, and frequencies of the glued structure.
+
+    glued_frequencies: Hz, ascending, by nodal diameter.
+    """
 
     model: ReducedModel
     pairs: ContactPairs
-    summary: ModelSummary
+    glued_frequencies: Mapping[int, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def build_fe_scene(
             )
     contact = _interface(prepared.pairs, joint)
     reduced_model = ReducedModel({k: linear[k] for k in wanted}, contact, tuple(joint.responses), n_sectors, excited)
-    return FeScene(reduced_model, prepared.pairs, _summary(model, joint, prepared, frequencies))
+    return FeScene(reduced_model, prepared.pairs, frequencies)
 
 
 def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progress: Progress = silent) -> PreparedModel:
@@ -148,7 +149,7 @@ def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progre
     if not model.prestress or model.rotation is None:
         return still
     progress("static state of the glued structure under the centrifugal load")
-    load = _centrifugal_load(mass, model.coordinates, model.rotation)
+    load = centrifugal_load(mass, model.coordinates, model.rotation)
     try:
         displacements = still.reduction.solve_static(load)
     except NotPositiveDefiniteError as error:
@@ -169,7 +170,7 @@ def _prepare(
     if model.gravity is not None:
         load = load + mass @ (placed * model.gravity).ravel()
     if model.rotation is not None:
-        load = load + _centrifugal_load(mass, model.coordinates, model.rotation)
+        load = load + centrifugal_load(mass, model.coordinates, model.rotation)
     along_x = placed * np.array([1.0, 0.0, 0.0])
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
     reduction = Reduction(structure, forms, _positions(model, structure, forms.values()))
@@ -217,11 +218,6 @@ def natural_frequencies(prepared: PreparedModel, n_sectors: int) -> NaturalFrequ
     return NaturalFrequencies(tuple(range(len(found))), found)
 
 
-def _centrifugal_load(mass: sparse.csr_matrix, coordinates: FloatArray, rotation: Rotation) -> FloatArray:
-    # what has no place has no arm: an amplitude within an element
-    return centrifugal_load(mass, np.where(np.isnan(coordinates), rotation.point, coordinates), rotation)
-
-
 def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
     given = [contact.friction_coefficient for contact in joint.contacts]
     friction = None
@@ -251,25 +247,6 @@ def _retained(stiffness: Matrix, pairs: ContactPairs, retainer: Retainer | None)
     shares = (pairs.frames @ direction) * (pairs.area / pairs.area.sum())[:, None]
     row[: np.count_nonzero(pairs.present)] = shares[pairs.present]
     return stiffness + retainer.stiffness * np.outer(row, row)
-
-
-def _summary(
-    model: MeshModel | MatrixModel,
-    joint: JointDefinition,
-    prepared: PreparedModel,
-    frequencies: dict[int, FloatArray],
-) -> ModelSummary:
-    weight, coordinates = prepared.weight, model.coordinates
-    free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
-    if joint.cut is not None:
-        free[joint.cut.right] = False
-    return ModelSummary(
-        mass=float(weight.sum()),
-        centre=weight @ np.nan_to_num(coordinates) / weight.sum(),
-        extent=np.nanmax(coordinates, axis=0) - np.nanmin(coordinates, axis=0),
-        n_dofs=3 * int(np.count_nonzero(free)),
-        glued_frequencies=frequencies,
-    )
 
 
 def _refused(error: NotPositiveDefiniteError, nodal_diameter: int, rotation: Rotation | None) -> SceneError:

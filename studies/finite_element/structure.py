@@ -84,9 +84,8 @@ def build_structure(model: MeshModel | MatrixModel, joint: JointDefinition) -> S
     numbers, coordinates, cut = model.numbers, model.coordinates, joint.cut
     constraints = joint.constraints or eliminate((), joint.held, {}, numbers, len(numbers))[0]
     axis = None if cut is None else cut.axis
-    along = joint.along
-    if along is None:
-        along = axis.axis if axis is not None else model.rotation.axis if model.rotation is not None else np.eye(3)[2]
+    # first tangents lie along the axis
+    along = axis.axis if axis is not None else model.rotation.axis if model.rotation is not None else np.eye(3)[2]
     pairs = joint.pairs
     if pairs is None:
         follow = np.asarray(constraints.dependent.any(axis=1))
