@@ -4,7 +4,7 @@ A constant force P presses. A tangential force Q or a stroke moves the cylinder;
 the stroke, and the frequency has no influence. Strips of half of the contact carry uniform tractions on two elastic
 half-planes; each strip also stands for its mirror image (`half_space`). Areas, forces and volumes are of both
 halves, a depth is the sum of both bodies. A stroke has to be small against the contact. Without wear the pressure is
-that of Hertz, the stick zone that of Cattaneo; partial slip wears to a known profile (`hertz`).
+that of Hertz, the stick zone that of Cattaneo; partial slip wears to a known profile.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from solver.model import ReducedModel
+from solver.model import FloatArray, ReducedModel
 from studies.scene_error import SceneError
 from studies.scenes.half_space import PressedBody, press_body, strip_compliance
-from studies.scenes.hertz import line_half_width, line_stick_under_stroke, line_stick_width, line_worn_edge
 
 _WIDER = 1.0 / 6.0
 """Of its width: by this much strips of uniform traction are wider, at each end, than the flat punch that they bear as.
@@ -26,6 +25,49 @@ to 0.9 % off, of first order."""
 
 _WIDEST = 0.45
 """Of the depth that displacements refer to: half of the width of all strips has to be below a half of it."""
+
+_FARTHEST = 20.0  # of the contact: beyond what slip up to 0.9999 of sliding wears
+
+
+def line_half_width(load: float, radius: float, modulus: float) -> float:
+    """Half-width a, m, of a line contact: `a^2 = 4 P R / (pi E*)`. load: N/m. radius: m. modulus: E*, Pa."""
+    return float(np.sqrt(4.0 * load * radius / (np.pi * modulus)))
+
+
+def line_stick_width(half_width: float, share: float) -> float:
+    """Half-width c, m, of the stick zone under a share Q / (mu P) of the force that slides: `c = a sqrt(1 - share)`."""
+    return float(half_width * np.sqrt(1.0 - share))
+
+
+def line_stick_under_stroke(
+    stroke: float, friction_coefficient: float, load: float, half_width: float, modulus: float, depth: float
+) -> float:
+    """Half-width c, m, of the stick zone of a line contact whose body moves by +- stroke, m; 0 where all of it slides.
+
+    `stroke = mu (d(P, a) - d(P_c, c))` with `P_c = P (c/a)^2` and the approach
+    `d(P, a) = 2 P / (pi E*) (ln(2 depth / a) + 1/2)`, depth, m, being what displacements refer to. load: N/m.
+    """
+    c = half_width * np.linspace(0.0, 1.0, 2001)[1:]
+    approach = 2.0 * load / (np.pi * modulus) * (c / half_width) ** 2 * (np.log(2.0 * depth / c) + 0.5)
+    motion = friction_coefficient * (approach[-1] - approach)
+    return float(np.interp(-stroke, -motion, c, left=0.0))
+
+
+def line_worn_depth(x: FloatArray, radius: float, half_width: float, stick_width: float) -> FloatArray:
+    """Depth W, m, of both bodies at distances x, m, from the middle where partial slip has worn all that it can.
+
+    `W = (1/2R) [a^2 arccosh(|x|/c) - |x| sqrt(x^2 - c^2)]` between the stick zone and where the bodies part, else 0
+    (Ciavarella and Hills 1999): the stick zone carries all, and beside it the overlap of the bodies has gone.
+    """
+    away = np.maximum(np.abs(x), stick_width)
+    overlap = half_width**2 * np.arccosh(away / stick_width) - away * np.sqrt(away**2 - stick_width**2)
+    return np.asarray(np.maximum(overlap, 0.0) / (2.0 * radius))
+
+
+def line_worn_edge(half_width: float, stick_width: float) -> float:
+    """Half-width b, m, over which the bodies lie on each other where all has worn that can: the last depth above 0."""
+    x = np.linspace(half_width, _FARTHEST * half_width, 10001)
+    return float(x[line_worn_depth(x, 1.0, half_width, stick_width) > 0.0][-1])
 
 
 class Parameters(PressedBody):

@@ -4,15 +4,15 @@ Compliances are of the relative displacement of both bodies under uniform tracti
 normal tractions cause no tangential displacement and the other way round (Johnson, Contact Mechanics, 1985, sections
 2.6, 3.2, 3.6).
 
-Under gross slip the scar grows beyond the unworn contact, without end. Worn flat, a body of radius R lies on the other
-over a half-width b: wear has removed a segment of area `2 b^3 / (3 R)` of a cylinder, a cap of volume `pi b^4 / (4 R)`
-of a sphere, and its depth is `b^2 / (2 R)`. By Archard's law the volume is at most `4 k_w N P s` after N cycles of
-stroke s under the force P.
+Under gross slip the scar grows without end. Worn flat, a body of radius R lies on the other over a half-width b: wear
+has removed a segment of area `2 b^3 / (3 R)` of a cylinder, a cap of volume `pi b^4 / (4 R)` of a sphere, and its depth
+is `b^2 / (2 R)`. By Archard's law the volume is at most `4 k_w N P s` after N cycles of stroke s under the force P.
 """
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from typing import ClassVar, Self
 
 import numpy as np
@@ -126,22 +126,22 @@ class PressedBody(Scene):
         return 1.0
 
     @property
+    @abstractmethod
     def contact(self) -> float:
         """Half-width a of the unworn contact, m."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def patched(self) -> float:
         """Half-width that pairs cover, m."""
-        raise NotImplementedError
 
+    @abstractmethod
     def worn_edge(self, stroke: float) -> float:
         """Half-width, m, over which the bodies touch once a stroke, m, has worn all that it can; inf without end."""
-        raise NotImplementedError
 
+    @abstractmethod
     def room(self, worn: float) -> float:
         """Half-width that pairs have to cover, m, where the worn one is given, as far as the model allows."""
-        raise NotImplementedError
 
     def scar(self, volume: float, depth: float) -> float:
         """Half-width of what is worn, m, with a margin.

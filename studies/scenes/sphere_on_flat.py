@@ -12,9 +12,8 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from solver.model import ReducedModel
+from solver.model import FloatArray, ReducedModel
 from studies.scenes.half_space import PressedBody, patch_compliance, press_body
-from studies.scenes.hertz import point_radius, point_stick_radius, point_stick_under_stroke, point_worn_edge
 
 _WIDER = 0.11
 """Of the width of a patch: by so much the circle of equal area is wider than the punch that stuck patches bear as.
@@ -24,6 +23,50 @@ _NEAR = 0.08
 
 _WIDEST = 0.5
 """Of the radius of the sphere: beyond it is no paraboloid."""
+
+_FARTHEST = 20.0  # of the contact: beyond what slip up to 0.9999 of sliding wears
+
+
+def point_radius(load: float, radius: float, modulus: float) -> float:
+    """Radius a, m, of a point contact: `a^3 = 3 P R / (4 E*)`. load: N. radius: m. modulus: E*, Pa."""
+    return float(np.cbrt(0.75 * load * radius / modulus))
+
+
+def point_stick_radius(contact_radius: float, share: float) -> float:
+    """Radius c, m, of the stick zone under a share Q / (mu P) of the force that slides: `c = a cbrt(1 - share)`."""
+    return float(contact_radius * np.cbrt(1.0 - share))
+
+
+def point_stick_under_stroke(
+    stroke: float, friction_coefficient: float, load: float, radius: float, young: float, poisson: float
+) -> float:
+    """Radius c, m, of the stick zone of a body that moves by +- stroke, m; 0 where all of it slides.
+
+    `stroke = 3 mu P (2 - nu) / (8 a G) (1 - (c/a)^2)`. load: N. radius: a, m. young: Pa.
+    """
+    shear = young / (2.0 * (1.0 + poisson))
+    slides = 3.0 * friction_coefficient * load * (2.0 - poisson) / (8.0 * radius * shear)
+    return float(radius * np.sqrt(max(1.0 - stroke / slides, 0.0))) if slides > 0.0 else 0.0
+
+
+def point_worn_depth(r: FloatArray, radius: float, contact_radius: float, stick_radius: float) -> FloatArray:
+    """Depth W, m, of both bodies at distances r, m, from the axis where partial slip has worn all that it can.
+
+    `W = [r^2 arcsin(c/r) - c sqrt(r^2 - c^2)] / (pi R) + (2 d / pi) arccos(c/r) - r^2 / (2 R)` with the approach
+    `d = 2 a^3 / (3 R c) + c^2 / (3 R)` (Popov 2014).
+    """
+    c = stick_radius
+    away = np.maximum(np.abs(r), c)
+    approach = 2.0 * contact_radius**3 / (3.0 * radius * c) + c**2 / (3.0 * radius)
+    profile = (away**2 * np.arcsin(c / away) - c * np.sqrt(away**2 - c**2)) / (np.pi * radius)
+    overlap = profile + 2.0 * approach / np.pi * np.arccos(c / away) - away**2 / (2.0 * radius)
+    return np.asarray(np.where(np.abs(r) > c, np.maximum(overlap, 0.0), 0.0))
+
+
+def point_worn_edge(contact_radius: float, stick_radius: float) -> float:
+    """Radius b, m, over which the bodies lie on each other where all has worn that can: the last depth above 0."""
+    r = np.linspace(contact_radius, _FARTHEST * contact_radius, 10001)
+    return float(r[point_worn_depth(r, 1.0, contact_radius, stick_radius) > 0.0][-1])
 
 
 class Parameters(PressedBody):

@@ -11,7 +11,7 @@ from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
 from solver.model import LinearModel
 from studies.scene import WearQuestion, stuck_frequencies
 from studies.scenes import build_scene, scene_parameters
-from studies.scenes.den_hartog import DenHartogSlider
+from studies.scenes.sdof_slider import DenHartogSlider
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit
 
 WEAR = np.array([1.1e-11, 0.0, 1.1e-12])
