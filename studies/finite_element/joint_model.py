@@ -21,8 +21,8 @@ class MeshModel:
 
     prestress: whether the stiffness contains the stress and the displacements of the glued structure under the
     centrifugal load, and spin softening. preload (3 n_nodes,): constant forces, N, and gravity (3,): acceleration of
-    all mass, m/s2. They are no part of the prestress: forces that press on gaps and flanks act otherwise on a glued
-    structure. extra (m,): numbers of nodes without elements, behind those of the mesh: others follow them.
+    all mass, m/s2; no part of the prestress, as forces on gaps and flanks act otherwise on a glued structure. extra
+    (m,): numbers of nodes without elements, behind those of the mesh: others follow them.
     """
 
     mesh: SolidMesh

@@ -27,12 +27,11 @@ class ContactSurfaces:
     """Two surfaces in contact.
 
     The nodes of the finer surface move, those of the first one where both are alike; where one surface alone is covered
-    by the other, its nodes move. tolerance: largest distance of a node that is paired, m; None for a share of the size
-    of a facet. friction_coefficient: None where all pairs have the same. with_gaps: whether distances in the mesh are
-    gaps of the joint; else they are errors of flat facets on curved surfaces, and the pairs touch. clearance: gap of
-    all pairs in place of the distances, m, negative for an interference. label: of the pairs; the names of both
-    surfaces if empty. sector: of the second surface: 1 where it belongs to the next sector in the sense of the axis, -1
-    to the one before.
+    by the other, its nodes move. tolerance: largest distance of a node that is paired, m; None for a share of a facet.
+    friction_coefficient: None where all pairs have the same. with_gaps: whether distances in the mesh are gaps of the
+    joint, and no errors of flat facets on curved surfaces. clearance: gap of all pairs in place of the distances, m,
+    negative for an interference. label: of the pairs; the names of both surfaces if empty. sector: of the second
+    surface: 1 for the next sector in the sense of the axis, -1 for the one before.
     """
 
     first: Surface
@@ -65,15 +64,14 @@ class ContactSurfaces:
 
 @dataclass(frozen=True)
 class ContactPairs:
-    """Contact pairs, `n_contact` of them.
+    """Contact pairs; the relative displacement is that of the moving node minus that of the opposite point.
 
-    moving (n_contact,): nodes; the relative displacement is that of the node minus that of the opposite point. opposite
-    (n_contact, n_nodes): interpolation weights of the opposite points, of the nodes of this sector whose images they
-    are; sector (n_contact,): where the point is, 0, 1 or -1. frames (n_contact, 3, 3): rows are normal (out of the
-    moving body, so that motion along it closes the pair), first and second tangent. present (n_contact, 3): whether a
-    relative displacement exists; the others are held. area (n_contact,): m2. position (n_contact, 3): of the moving
-    node, m. distance (n_contact,): along the normal, positive where the pair is open, m. gap (n_contact,): m. surface
-    (n_contact,): number of the pair of surfaces, whose names are moving_name and opposite_name.
+    moving (n_contact,): nodes. opposite (n_contact, n_nodes): interpolation weights of the opposite points, of the
+    nodes of this sector whose images they are; sector (n_contact,): where the point is, 0, 1 or -1. frames (n_contact,
+    3, 3): rows are normal (out of the moving body: motion along it closes the pair), first and second tangent. present
+    (n_contact, 3): whether a relative displacement exists; the others are held. area (n_contact,): m2. position
+    (n_contact, 3): of the moving node, m. distance (n_contact,): along the normal, positive where the pair is open, m.
+    gap (n_contact,): m. surface (n_contact,): number of the pair of surfaces, with moving_name and opposite_name.
     """
 
     moving: IntArray
@@ -112,8 +110,7 @@ def build_contact_pairs(
     """Pairs of all surfaces, those of the first ones first, each by its moving nodes in ascending order.
 
     coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. contacts: at least one.
-    along (3,): the first tangents are the projections of this direction where it does not stand on the surface; else
-    of the axis of coordinates that lies flattest on it. axis: of the cyclic structure, for contacts between sectors.
+    along (3,): see `local_frames`. axis: of the cyclic structure, for contacts between sectors.
 
     Raises SceneError where nodes find no point of the other surface, do not face it, or find it behind their own body,
     and where nodes belong to two pairs.
@@ -145,12 +142,11 @@ def match_nodes(
     given: tuple[FloatArray, FloatArray, FloatArray],
     axis: CyclicAxis | None,
 ) -> ContactPairs:
-    """As `build_contact_pairs`, of nodes that meet, of reduced matrices, which have no facets.
+    """As `build_contact_pairs`, of nodes of the first surface that meet nodes of the second, as reduced matrices have.
 
-    Pairs of the nodes of the first surface and the nearest ones of the second. given, of the first surface: areas
-    (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, initial gaps (n_nodes,), m; NaN where there is
-    none. The first tangents are as near to the axis as possible, else to z. Raises SceneError where a node has no area
-    or normal, or finds no node that it meets.
+    given, of the first surface: areas (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, initial gaps
+    (n_nodes,), m; NaN where there is none. The first tangents are as near to the axis as possible, else to z. Raises
+    SceneError where a node has no area or normal, or meets no node.
     """
     along = np.array([0.0, 0.0, 1.0]) if axis is None else axis.axis
     area, normals, gap = given
@@ -177,14 +173,14 @@ def _pairs_of(
     contact: ContactSurfaces,
     place: int,
     weights: sparse.csr_matrix,
-    facing_out: tuple[FloatArray, FloatArray],
+    surface: tuple[FloatArray, FloatArray],
     along: FloatArray,
 ) -> ContactPairs:
-    """Pairs of the nodes of the first surface; place: of the contact among all.
+    """Pairs of the nodes of the first surface, with areas and normals; place: of the contact among all.
 
-    there (n_nodes, 3): coordinates where the sector of the second surface is. facing_out: areas and normals.
+    there (n_nodes, 3): coordinates where the sector of the second surface is.
     """
-    nodes, (area, normals) = contact.first.nodes, facing_out
+    nodes, (area, normals) = contact.first.nodes, surface
     n = len(nodes)
     distance = np.einsum("ij,ij->i", weights @ there - coordinates[nodes], normals)
     gap = distance if contact.with_gaps else np.zeros(n)
@@ -222,7 +218,11 @@ def _joined(parts: Sequence[ContactPairs], numbers: IntArray) -> ContactPairs:
 
 
 def local_frames(normals: FloatArray, along: FloatArray) -> FloatArray:
-    """Frames (n, 3, 3) of unit normals (n, 3): rows normal, first tangent near `along`, second tangent."""
+    """Frames (n, 3, 3) of unit normals (n, 3): rows normal, first tangent, second tangent.
+
+    The first tangents are projections of the direction along (3,) where it does not stand on the surface, else of the
+    axis of coordinates that lies flattest on it.
+    """
     candidates = [along / np.linalg.norm(along), *np.eye(3)]
     steepest = [np.abs(normals @ each).max(initial=0.0) for each in candidates]
     # one direction for the whole surface, so that neighbouring frames are alike

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +37,6 @@ from studies.finite_element.solid_mesh import (
     spin_softening,
 )
 from studies.finite_element.structure import Structure, build_structure
-from studies.scene import N_MODES, NaturalFrequencies
 from studies.scene_error import SceneError
 
 Progress = Callable[[str], None]
@@ -113,10 +113,8 @@ def build_fe_scene(
     order = sorted({excited, *wanted}, key=lambda k: (k != excited, k))
     for number, k in enumerate(order):
         progress(f"reduction at nodal diameter {k} ({number + 1} of {len(order)})" if n_sectors else "reduction")
-        try:
+        with _positive_definite(k, model.rotation):
             reduced = prepared.reduction.reduce(k, options.n_modes, vectors)
-        except NotPositiveDefiniteError as error:
-            raise _refused(error, k, model.rotation) from error
         frequencies[k] = reduced.frequencies / (2.0 * np.pi)
         if k == excited:
             damping = options.loss_factor / reduced.frequencies[0]
@@ -150,10 +148,8 @@ def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progre
         return still
     progress("static state of the glued structure under the centrifugal load")
     load = centrifugal_load(mass, model.coordinates, model.rotation)
-    try:
+    with _positive_definite(0, model.rotation):
         displacements = still.reduction.solve_static(load)
-    except NotPositiveDefiniteError as error:
-        raise _refused(error, 0, model.rotation) from error
     progress("assembly of the prestressed stiffness")
     stressed = assemble_tangent_stiffness(model.mesh, displacements[: 3 * model.mesh.n_nodes])
     stiffness = (model.padded(stressed) + spin_softening(mass, model.rotation)).tocsr()
@@ -203,19 +199,8 @@ def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int
 
     Raises SceneError where the glued structure is not held, or unstable.
     """
-    try:
+    with _positive_definite(nodal_diameter, prepared.rotation):
         return prepared.reduction.frequencies(nodal_diameter, n_modes) / (2.0 * np.pi)
-    except NotPositiveDefiniteError as error:
-        raise _refused(error, nodal_diameter, prepared.rotation) from error
-
-
-def natural_frequencies(prepared: PreparedModel, n_sectors: int) -> NaturalFrequencies:
-    """Those at all nodal diameters 0..n_sectors // 2. Raises SceneError as `glued_frequencies` does."""
-    found = np.full((n_sectors // 2 + 1, N_MODES), np.nan)
-    for k, row in enumerate(found):
-        own = glued_frequencies(prepared, k, N_MODES)
-        row[: len(own)] = own
-    return NaturalFrequencies(tuple(range(len(found))), found)
 
 
 def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
@@ -249,10 +234,19 @@ def _retained(stiffness: Matrix, pairs: ContactPairs, retainer: Retainer | None)
     return stiffness + retainer.stiffness * np.outer(row, row)
 
 
-def _refused(error: NotPositiveDefiniteError, nodal_diameter: int, rotation: Rotation | None) -> SceneError:
-    if error.unstable:
-        speed = "that of the matrices" if rotation is None else f"{np.sqrt(rotation.omega_squared) * 30.0 / np.pi:.6g}"
-        found = "the glued structure is unstable: spin softening exceeds its stiffness"
-        return SceneError("rotation_speed", speed, f"reduce it: at nodal diameter {nodal_diameter} {found}")
-    found = f"at nodal diameter {nodal_diameter} nothing holds the glued structure: its stiffness is singular"
-    return SceneError("clamp", found, "clamp nodes, so that with all contact pairs glued no body can move as a whole")
+@contextmanager
+def _positive_definite(nodal_diameter: int, rotation: Rotation | None) -> Iterator[None]:
+    """Raises SceneError where a glued stiffness is not positive definite."""
+    try:
+        yield
+    except NotPositiveDefiniteError as error:
+        if error.unstable:
+            speed = (
+                "that of the matrices" if rotation is None else f"{np.sqrt(rotation.omega_squared) * 30.0 / np.pi:.6g}"
+            )
+            found = "the glued structure is unstable: spin softening exceeds its stiffness"
+            remedy = f"reduce it: at nodal diameter {nodal_diameter} {found}"
+            raise SceneError("rotation_speed", speed, remedy) from error
+        found = f"at nodal diameter {nodal_diameter} nothing holds the glued structure: its stiffness is singular"
+        remedy = "clamp nodes, so that with all contact pairs glued no body can move as a whole"
+        raise SceneError("clamp", found, remedy) from error

@@ -20,10 +20,9 @@ from studies.scene_error import SceneError
 
 @dataclass(frozen=True)
 class FaceShape:
-    """Shape functions of an element face: those of an element whose face it is.
+    """Shape functions of the face of an element at a reference coordinate zeta, the height.
 
-    element, nodes: the element and its nodes on the face, corners first. height: reference coordinate zeta of the face.
-    facets: its linear facets by the face's nodes, of a triangle the last one twice.
+    nodes: of the element on the face, corners first. facets: linear ones by these, of a triangle the last one twice.
     """
 
     element: ReferenceElement
@@ -124,7 +123,7 @@ class Surface:
 
 
 def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> Surface:
-    """Surface of faces of elements, as `loops_of_faces` has them."""
+    """Surface of faces of elements, as `loops_of_faces` has them. Raises SceneError where there is none."""
     return _surface(mesh, name, *loops_of_faces(mesh, name, elements, faces))
 
 

@@ -17,10 +17,10 @@ from solver.model import FloatArray, IntArray, ReducedModel
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions
-from studies.finite_element.reduced_joint import build_fe_scene, natural_frequencies, prepare_model
+from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.finite_element.surfaces import describe_mesh
-from studies.scene import NaturalFrequencies, Scene, SurfaceMesh
+from studies.scene import N_MODES, NaturalFrequencies, Scene, SurfaceMesh
 from studies.scene_error import SceneError
 
 _SAME_NODE = 1e-9  # points closer than this, in m, are one node
@@ -112,7 +112,11 @@ class SectorParameters(Scene):
         """With all contacts glued, at all nodal diameters 0..N/2; of a compliant contact those of the model."""
         if self.contact_stiffness is not None:
             return super().natural_frequencies(model)
-        return natural_frequencies(prepare_model(*self.define_sector()), self.n_sectors)
+        prepared, found = prepare_model(*self.define_sector()), np.full((self.n_sectors // 2 + 1, N_MODES), np.nan)
+        for k, row in enumerate(found):
+            own = glued_frequencies(prepared, k, N_MODES)
+            row[: len(own)] = own
+        return NaturalFrequencies(tuple(range(len(found))), found)
 
 
 def mesh_of_bodies(

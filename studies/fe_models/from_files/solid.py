@@ -142,14 +142,13 @@ def find_cut(
     if axis is None:
         return None
     deck, mesh = selections.deck, selections.mesh
-    places = mesh.coordinates, mesh.numbers, mesh.bodies
     names = _cut_names(deck) if parameters.cut_faces is None else [parameters.cut_faces]
     if not names:
         across = [surface.nodes for each in contacts if each.sector for surface in (each.first, each.second)]
-        return find_cut_faces(*places, axis, np.concatenate([np.empty(0, dtype=np.int64), *across]))
+        return find_cut_faces(mesh, axis, np.concatenate([np.empty(0, dtype=np.int64), *across]))
     sides = ([selections.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
     first, second = (np.unique(np.concatenate(each)) for each in sides)
-    return match_cut_faces(*places, axis, first, second)
+    return match_cut_faces(mesh, axis, first, second)
 
 
 def find_clamped(selections: Selections, parameters: Parameters) -> BoolArray | None:

@@ -1,5 +1,7 @@
 """Surfaces, pairing, cut faces: each against closed forms, and what is said of wrong ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -144,18 +146,18 @@ def test_cut_faces_are_matched_and_found():
     mesh = sector.mesh
     axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
     shuffled = np.random.default_rng(0).permutation(sector.left)
-    cut = match_cut_faces(*sector.places, axis, sector.right, shuffled)
+    cut = match_cut_faces(mesh, axis, sector.right, shuffled)
     turned = mesh.coordinates[cut.left] @ cut.rotation.T
     assert np.allclose(turned, mesh.coordinates[cut.right], atol=1e-10)
     assert np.array_equal(np.sort(cut.left), sector.left)
-    found = find_cut_faces(*sector.places, axis, NONE)
+    found = find_cut_faces(mesh, axis, NONE)
     assert dict(zip(found.left, found.right, strict=True)) == dict(zip(cut.left, cut.right, strict=True))
     # about another axis through another point
     frame = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
     frame *= np.linalg.det(frame)
     moved = mesh.coordinates @ frame.T + [1.0, 2.0, 3.0]
     tilted = CyclicAxis(N_SECTORS, np.array([1.0, 2.0, 3.0]), frame @ Z)
-    again = match_cut_faces(moved, mesh.numbers, mesh.bodies, tilted, sector.left, sector.right)
+    again = match_cut_faces(replace(mesh, coordinates=moved), tilted, sector.left, sector.right)
     assert np.array_equal(again.left[np.argsort(again.left)], np.sort(cut.left))
     assert np.allclose(again.rotation @ frame, frame @ cut.rotation, atol=1e-12)
 
@@ -165,11 +167,11 @@ def test_wrong_cut_faces_are_named():
     mesh = sector.mesh
     axis = CyclicAxis(47, np.zeros(3), Z)
     with pytest.raises(SceneError, match=r"cut faces are 30 degrees apart, 47 sectors need 7\.66"):
-        match_cut_faces(*sector.places, axis, sector.left, sector.right)
+        match_cut_faces(mesh, axis, sector.left, sector.right)
     with pytest.raises(SceneError, match=r"no node has an image under rotation by 7\.66 degrees"):
-        find_cut_faces(*sector.places, axis, NONE)
+        find_cut_faces(mesh, axis, NONE)
     axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
     coordinates = mesh.coordinates.copy()
     coordinates[sector.left[2]] += [1e-3, 0.0, 0.0]
     with pytest.raises(SceneError, match=f"1 nodes of one cut face have no image .*: {mesh.numbers[sector.left[2]]}"):
-        match_cut_faces(coordinates, mesh.numbers, mesh.bodies, axis, sector.left, sector.right)
+        match_cut_faces(replace(mesh, coordinates=coordinates), axis, sector.left, sector.right)
