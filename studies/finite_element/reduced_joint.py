@@ -154,7 +154,7 @@ def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progre
     stressed = assemble_tangent_stiffness(model.mesh, displacements[: 3 * model.mesh.n_nodes])
     stiffness = (model.padded(stressed) + spin_softening(mass, model.rotation)).tocsr()
     forms = {"stiffness": stiffness, "mass": mass, "elastic": elastic}
-    return replace(still, reduction=Reduction(structure, forms, still.reduction.positions), at_rest=still.reduction)
+    return replace(still, reduction=replace(still.reduction, forms=forms), at_rest=still.reduction)
 
 
 def _prepare(
