@@ -115,8 +115,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _scene_help(scene: str) -> str:
-    from studies.scene_help import scene_help
-    from studies.scenes import BUNDLED
+    from studies.scenes import BUNDLED, scene_help
 
     if scene not in BUNDLED:
         raise UserError("command line", "--scene-help", scene, f"give one of {', '.join(BUNDLED)}")
