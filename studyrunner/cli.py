@@ -189,14 +189,12 @@ def _show_plan(study: Study) -> int:
     from studyrunner.kinds.kind import build_tasks
     from studyrunner.plan import doubts_of_study, format_plan
     from studyrunner.scene.answers import remarks_of_study
-    from studyrunner.scene.pairs import contact_changes
     from studyrunner.scene.scene_set import plan_scenes
 
     before = largest_memory()
     planned = plan_scenes(study, _slow_steps())
     built_with = largest_memory() - before
-    contacts = contact_changes(study, planned.scenes, planned.facts)
-    plan = build_tasks(study, [each.n_displacements for each in planned.facts], contacts, planned.scenes)
+    plan = build_tasks(study, planned.scenes, planned.facts)
     seconds = time.process_time() + planned.seconds_left
     lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
     said = *remarks_of_study(study), *(("note", doubt) for doubt in doubts_of_study(study, planned.largest))

@@ -7,11 +7,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from solver.outcome import COMPLETE, Outcome
-from studyrunner.checkpoint.completion_index import CompletionIndex, record_type
-from studyrunner.checkpoint.store import Store, StoreInUseError
+from solver.outcome import Outcome
+from studyrunner.checkpoint.completion_index import CompletionIndex
+from studyrunner.checkpoint.store import Store
 from studyrunner.kinds.kind import build_tasks, describe_tasks
-from studyrunner.kinds.task import Identity, digest
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import serve_tasks
 from studyrunner.plan import doubts_of_study
@@ -19,7 +18,6 @@ from studyrunner.result.arrays import small_arrays
 from studyrunner.result.provenance import compare_with_archived, describe_run, describe_time_and_commit
 from studyrunner.result.target import Target, identity_of
 from studyrunner.scene.answers import remarks_of_study
-from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import merge_facts
 from studyrunner.scene_building import Scenes, build_scenes
@@ -28,7 +26,7 @@ from studyrunner.system.files import remove_leftovers
 from studyrunner.system.process import begin_ending, is_ending
 from studyrunner.system.progress import ProgressDisplay, count
 from studyrunner.task_runs import StudyRun, evaluator
-from studyrunner.user_error import UserError, Verbatim, show_text
+from studyrunner.user_error import show_text
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ def _compute(
     try:
         if run.tasks:
             run.display.say(f"computing {describe_tasks(run.tasks)}")
-        serve_tasks(ranks, run, evaluator(), run.costs)
+        serve_tasks(ranks, run, evaluator())
         run.display.say("writing the result")
         # a signal that comes now finds a result that is about to be whole
         begin_ending()
@@ -126,12 +124,7 @@ def _compute(
 def _open_progress(target: Target) -> Iterator[Store]:
     """The file of the progress beside a result, open for a run: before the scene is built, which may be in the file."""
     path = target.progress
-    try:
-        store = Store(path)
-    except StoreInUseError as error:
-        remedy = "wait for its end, or give another result file with -o; where no run is at work the disk has no locks"
-        raise UserError(str(path), "in use", Verbatim(f"by {error}"), remedy) from None
-    with contextlib.closing(store):
+    with contextlib.closing(Store(path)) as store:
         remove_leftovers(path)
         remove_leftovers(target.path)
         try:
@@ -146,16 +139,13 @@ def _open_completion(
     study: Study, scenes: Scenes, store: Store, facts: SceneFacts, options: RunOptions
 ) -> CompletionIndex:
     """The tasks of a study, and what of them is finished and wanted. facts: of all scenes."""
-    contacts = contact_changes(study, scenes.scenes, scenes.facts)
-    plan = build_tasks(study, [each.n_displacements for each in scenes.facts], contacts, scenes.scenes)
-    kind = record_type(study, facts)
-    identity = Identity(tuple(each.digest for each in scenes.facts), digest(repr(kind.descr)))
-    completion = CompletionIndex(plan, identity, store, kind)
+    plan = build_tasks(study, scenes.scenes, scenes.facts)
+    completion = CompletionIndex(study, plan, facts, [each.digest for each in scenes.facts], store)
     store.note_study(identity_of(study))
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:
-        completion.forget_failed(COMPLETE)
+        completion.forget_failed()
     completion.give_up_crashed()
     store.flush()
     return completion

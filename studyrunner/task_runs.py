@@ -13,7 +13,6 @@ from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Keep, Result, StartResult, Task
-from studyrunner.mpi.dispatch import CostModel
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Office, Run
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task
@@ -29,10 +28,6 @@ Models = Mapping[int, "ReducedModel"]
 _LATE = 0.3
 """Expected further time of a task that takes longer than estimated, over the time that it is late. For an estimate with
 an uncertainty factor of two the mean further time is this fraction."""
-
-_FAR = 2.0
-"""Times the estimate, from which on a task is expected to take about as long again as it has taken: it is at a fold,
-which takes up to five times as long as other points, or more."""
 
 
 def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
@@ -85,7 +80,7 @@ class TaskProgress(Office):
     """
 
     def __init__(self, completion: CompletionIndex) -> None:
-        self.costs = CostModel()
+        super().__init__()
         self.n_points = completion.n_points_finished
         self._completion = completion
         self._sweeps = completion.sweeps_left()
@@ -135,7 +130,7 @@ class TaskProgress(Office):
         """State of the tasks. running: as `Dispatcher.running`."""
         factors = {group: self.costs.correction(((group,),)) for group in self._left}
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
-        done = sum(map(self.costs.measured, factors))
+        done = sum(self.costs.sums.get(group, (0.0, 0.0, 0))[0] for group in factors)
         longest = 0.0
         for task, _, elapsed in running:
             expected = task.cost / task.n_results * factors[task.group]
@@ -152,18 +147,15 @@ class TaskProgress(Office):
         )
 
     def _still(self, task: Task, expected: float, elapsed: float) -> float:
-        """Time left, s, of a running task: by its expected time at first, then more and more by the share that is done.
+        """Time left, s, of a running task: by the share that is done where it says so, else by its expected time.
 
         What a task takes that is late already, or stands still, is a guess.
         """
-        planned = max(expected - elapsed, _LATE * elapsed, elapsed - _FAR * expected)
         share, came = self._shares.get(task.key, (0.0, 0.0))
         if share == 0.0:
-            return planned
+            return max(expected - elapsed, _LATE * elapsed)
         since = min(time.monotonic() - came, elapsed)
-        by_share = max((elapsed - since) * (1.0 - share) / share - since, _LATE * since)
-        weight = min(1.0, 2.0 * share)
-        return (1.0 - weight) * planned + weight * by_share
+        return max((elapsed - since) * (1.0 - share) / share - since, _LATE * since)
 
     def _without_suspects(self, tasks: Iterable[Task]) -> list[Task]:
         """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""

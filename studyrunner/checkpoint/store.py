@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from solver.packing import Packed
 from studyrunner.system.files import sync_folder
 from studyrunner.system.process import uninterrupted
-from studyrunner.user_error import StorageError
+from studyrunner.user_error import StorageError, UserError, Verbatim
 
 STARTS, PROGRESS, RESULTS, COMPUTED = "start", "progress", "result", "computed"
 """Kinds of entries: start states; progress of tasks; results of points; what is computed once for a study."""
@@ -54,10 +54,6 @@ _FAULTS = {
     sqlite3.SQLITE_READONLY: errno.EACCES,
     sqlite3.SQLITE_CANTOPEN: errno.EACCES,
 }
-
-
-class StoreInUseError(Exception):
-    """Another run works with the file, or the file system has no locks; the text says which run."""
 
 
 class _OtherFileError(Exception):
@@ -91,7 +87,7 @@ def from_blob(blob: bytes) -> Packed:
 
 
 class Store:
-    """The open file of a run. Raises StoreInUseError and StorageError.
+    """The open file of a run. Raises UserError where another run uses the file, and StorageError.
 
     path: of the file.
     notes: lines for the user on what was found.
@@ -102,9 +98,8 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.notes: list[str] = []
-        self._waiting: dict[tuple[str, str], bytes | None] = {}
-        self._n_bytes = 0  # that wait
         self._next_write = 0.0
+        self._n_bytes = 0  # in the open transaction
         with _storage_errors(path):
             try:
                 self._database = _open_locked(path)
@@ -116,7 +111,7 @@ class Store:
                 self.notes.append(f"{path.name} {why}: it is kept as {aside.name}, and the study begins anew")
                 self._database = _open_locked(path)
             self._file = path.stat().st_ino
-            self._keys: dict[str, set[str]] = {kind: set() for kind in (STARTS, PROGRESS, RESULTS, COMPUTED, _RUN)}
+            self._keys: dict[str, set[str]] = {kind: set() for kind in (STARTS, PROGRESS, RESULTS, COMPUTED)}
             for kind, key in self._database.execute("SELECT kind, key FROM entries"):
                 self._keys.setdefault(kind, set()).add(key)
         before = _run_in(self._database)
@@ -131,8 +126,7 @@ class Store:
 
     def note_study(self, study: str) -> None:
         """Writes which study the file belongs to, in words."""
-        self._study = study
-        self._is_noted = False
+        self._study, self._is_noted = study, False
         self.flush()
 
     def note_begin(self, key: str) -> None:
@@ -159,7 +153,7 @@ class Store:
                 return
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
         blob = to_blob(packed)
-        self._waiting[kind, key] = blob
+        self._execute("INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", kind, key, blob)
         self._keys[kind].add(key)
         self._n_bytes += len(blob)
         if self._n_bytes > _BYTES_A_TRANSACTION:
@@ -173,11 +167,9 @@ class Store:
         """An entry; None where there is none, or a damaged one, which is forgotten. Raises StorageError."""
         if key not in self._keys[kind]:
             return None
-        blob = self._waiting.get((kind, key))
-        if blob is None:
-            with _storage_errors(self.path):
-                query = "SELECT blob FROM entries WHERE kind=? AND key=?"
-                (blob,) = self._database.execute(query, [kind, key]).fetchone() or (b"",)
+        with _storage_errors(self.path):
+            query = "SELECT blob FROM entries WHERE kind=? AND key=?"
+            (blob,) = self._database.execute(query, [kind, key]).fetchone() or (b"",)
         with contextlib.suppress(zlib.error, ValueError, TypeError):
             return from_blob(blob)
         self.forget(kind, key)
@@ -195,30 +187,30 @@ class Store:
         """Removes an entry with the next transaction."""
         if key in self._keys[kind]:
             self._keys[kind].discard(key)
-            self._waiting[kind, key] = None
+            self._execute("DELETE FROM entries WHERE kind=? AND key=?", kind, key)
+
+    def _execute(self, statement: str, *values: object) -> None:
+        """Changes the file in the transaction that the next `flush` ends."""
+        with uninterrupted(), _storage_errors(self.path):
+            self._database.execute(statement, values)
 
     def tick(self) -> None:
-        """Called many times a second: writes what waits, when it has waited long enough. Raises StorageError."""
-        if (self._waiting or not self._is_noted) and time.monotonic() > self._next_write:
+        """Called many times a second: ends a transaction that is open for long enough. Raises StorageError."""
+        if time.monotonic() > self._next_write:
             self.flush()
 
     def flush(self) -> None:
-        """Writes what waits, in one transaction. Raises StorageError; what waits then still waits."""
-        if not self._waiting and self._is_noted:
+        """Ends the transaction: everything is on the disk when this returns. Raises StorageError."""
+        if self._is_noted and not self._database.in_transaction:
             return
-        if not self._is_noted:
-            self._waiting[_RUN, ""] = self._describe_run()
         began = time.monotonic()
         with uninterrupted(), _storage_errors(self.path):
             if self.path.stat().st_ino != self._file:
                 raise FileNotFoundError(None, "another file has taken its place")
-            with self._database as database:
-                for (kind, key), blob in self._waiting.items():
-                    if blob is None:
-                        database.execute("DELETE FROM entries WHERE kind=? AND key=?", [kind, key])
-                    else:
-                        database.execute("INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", [kind, key, blob])
-            self._waiting, self._n_bytes, self._is_noted = {}, 0, True
+            if not self._is_noted:
+                self._execute("INSERT OR REPLACE INTO entries VALUES (?, '', ?)", _RUN, self._describe_run())
+            self._database.commit()
+            self._is_noted, self._n_bytes = True, 0
         now = time.monotonic()
         self._next_write = now + max(SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
 
@@ -280,6 +272,8 @@ def _open_locked(path: Path) -> sqlite3.Connection:
             database.execute("BEGIN EXCLUSIVE")
             _check(database)
             database.commit()
+            sync_folder(path.parent)
+            return database
         except BaseException as error:
             database.close()
             if not isinstance(error, sqlite3.Error):
@@ -288,11 +282,10 @@ def _open_locked(path: Path) -> sqlite3.Connection:
                 raise _OtherFileError from error
             if _code(error) != sqlite3.SQLITE_BUSY:
                 raise
-        else:
-            sync_folder(path.parent)
-            return database
         if time.monotonic() > latest:
-            raise StoreInUseError(str(_read_run(path).get("run", "no run that is known")))
+            run = Verbatim(f"by {_read_run(path).get('run', 'no run that is known')}")
+            remedy = "wait for its end, or give another result file with -o; where no run is at work the disk has no"
+            raise UserError(str(path), "in use", run, f"{remedy} locks")
         time.sleep(_PAUSE)
 
 

@@ -11,31 +11,26 @@ from studyrunner.kinds.missions import Mission
 from studyrunner.kinds.modes import Mode
 from studyrunner.kinds.task import Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
-from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.scene.pairs import contact_changes
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.study import MISSIONS, MODES, Study
 from studyrunner.system.progress import count
 
 
-def build_tasks(
-    study: Study,
-    n_displacements: int | Sequence[int],
-    contacts: Sequence[Any] | None = None,
-    scenes: SceneSet | None = None,
-) -> TaskPlan:
+def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> TaskPlan:
     """Tasks of a study. Their order and numbers depend on the study alone.
 
-    n_displacements: number of relative displacements of each scene of the study (`find_scenes`), or of all scenes.
-    contacts: what is drawn for the pairs of each part (`contact_changes`); None for nothing. scenes: of the study,
-    where they are known already.
+    scenes: of the study (`find_scenes`). facts: of each scene. Raises UserError where a sample draws a value that is
+    none, or blocks of a mission differ in their pairs.
     """
-    scenes = find_scenes(study) if scenes is None else scenes
-    drawn: Sequence[Any] = (((),) * len(study.mission),) * len(scenes.parts) if contacts is None else contacts
-    sizes = [n_displacements] * len(scenes.studies) if isinstance(n_displacements, int) else n_displacements
+    n_displacements = [each.n_displacements for each in facts]
+    contacts: Any = contact_changes(study, scenes, facts)
     if study.kind is MISSIONS:
-        return missions.build_tasks(study, sizes, drawn, scenes)
+        return missions.build_tasks(study, scenes, n_displacements, contacts)
     if study.kind is MODES:
-        return modes.build_tasks(study, sizes, drawn, scenes)
-    return wear_plan.build_tasks(study, sizes, drawn, scenes)
+        return modes.build_tasks(study, scenes, n_displacements, contacts)
+    return wear_plan.build_tasks(study, scenes, n_displacements, contacts)
 
 
 def describe_tasks(tasks: Sequence[Task]) -> str:

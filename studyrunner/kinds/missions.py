@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -25,21 +25,24 @@ from studyrunner.kinds.task import (
     PointResult,
     Task,
     TaskPlan,
+    deepest,
     described,
     digest,
+    first_harmonic,
     grid,
     joint_of,
     n_unknowns_of,
+    named,
     number_points,
     raise_fault,
     settings_at,
 )
-from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import Realisation
 from studyrunner.study.study import Study
 from studyrunner.units import show_count
+from studyrunner.variables import OF_A_MISSION
 
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
@@ -95,11 +98,6 @@ class Mission(Task):
         """One place."""
         return (0,)
 
-    @property
-    def cost_keys(self) -> CostKeys:
-        """By unknowns and wear coefficient."""
-        return (("mission", ("mission", self.n_unknowns)), (("mission", self.wear_coefficient),))
-
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hash of the history: of all blocks with their scenes."""
         blocks = [(identity.joint(block.joint), astuple(replace(block, joint=_NO_JOINT))) for block in self.blocks]
@@ -148,7 +146,7 @@ class Mission(Task):
 
 
 def build_tasks(
-    study: Study, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet
+    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
 ) -> TaskPlan:
     """Tasks of a study of missions. Points with equal blocks share a task.
 
@@ -215,30 +213,27 @@ def _task(
     )
 
 
-def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
+def _values(task: Mission, history: MissionHistory) -> dict[str, Any]:
     """Variables of the result, at the numbers of missions that the task asks for."""
     counts = np.array(task.missions)
     rows, ends = (np.searchsorted(history.missions, each) for each in (counts, np.clip(counts, 1.0, None)))
     in_mission = history.block_volume[ends] - history.block_volume[ends - 1]
     rate, worn = in_mission.sum(axis=1), history.worn_volume[rows]
     share = np.divide(in_mission, rate[:, None], out=np.full_like(in_mission, np.nan), where=rate[:, None] > 0.0)
-    depth, depth_error = history.wear_depth[rows], history.wear_depth_error[rows]
-    deepest = np.nan_to_num(depth).argmax(axis=1)[:, None]
     reached = np.flatnonzero(np.isfinite(worn))
     last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
     is_state = np.isfinite(history.worn_volume).any() and np.isfinite(history.response_begin).any()
-    of_task: Mapping[str, object] = {
+    depth, depth_error = history.wear_depth[rows], history.wear_depth_error[rows]
+    own: Mapping[str, object] = {
+        **deepest(depth, depth_error),
+        **first_harmonic(history.response_end[rows]),
         "worn_volume": worn,
         "wear_rate": np.where(np.isfinite(worn), rate, np.nan),
         "wear_depth": depth,
-        "wear_depth_max": depth.max(axis=1, initial=0.0),
-        "wear_depth_max_error": np.take_along_axis(depth_error, deepest, axis=1)[:, 0],
         "wear_depth_last": last,
         "block_worn_volume": history.block_volume[rows],
         "block_worn_volume_error": history.block_volume_error[rows],
         "block_share": share,
-        "response_amplitude": np.abs(history.response_end[rows]),
-        "response_phase": np.angle(history.response_end[rows]),
         "response_amplitude_begin": np.abs(history.response_begin[rows]),
         "response_peak": history.response_peak_end[rows],
         "response_peak_begin": history.response_peak_begin[rows],
@@ -246,23 +241,16 @@ def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
         "excitation_frequency": history.excitation_frequency[:, 1],
         "excitation_frequency_begin": history.excitation_frequency[:, 0],
         "block_cycles": np.array([block.cycles for block in task.blocks]),
-        "sweep_rate": history.sweep_rate,
         "worn_volume_error": history.worn_volume_error[rows],
         "wear_depth_error": depth_error,
-    }
-    return {
-        **{name: of_task[name] for name in task.variables},
         "outcome": int(history.outcome),
-        "missions_to_target": history.missions_to_target,
-        "missions_to_target_error": history.missions_to_target_error,
-        "newton_iterations": history.newton_iterations,
-        "run_time": history.run_time,
         # a mission is computed for the vibration at 0
         "error_estimate": history.error_estimate if counts[-1] > 0.0 else 0.0,
         "last_mission": min(history.last_mission, float(counts[-1])) if is_state else math.nan,
         "largest_wear_depth": float(last.max(initial=0.0)) if reached.size else math.nan,
         "message": "; ".join(filter(None, (history.message, _of_target(task, history)))),
     }
+    return named((*task.variables, *OF_A_MISSION), own, history)
 
 
 def _of_target(task: Mission, history: MissionHistory) -> str:

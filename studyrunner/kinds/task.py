@@ -1,8 +1,7 @@
 """What a rank computes at a time, what it gives back, and all tasks of a study.
 
 A task gives one result or several, one after the other, each at a place of its own. There are four kinds: `Sweep` and
-`History` (`wear`), `Mode` (`modes`), `Mission` (`missions`). What hands tasks out, saves and shows them uses this base
-alone.
+`History` (`wear`), `Mode` (`modes`), `Mission` (`missions`).
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from solver.packing import Packed
@@ -84,11 +84,11 @@ class StartResult:
         """Everything except the place, for a file."""
         return Packed(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
 
-
-def unpack_start(place: int, packed: Packed) -> StartResult:
-    """The start state from the output of `StartResult.pack`."""
-    moves, n_unknowns, text = json.loads(packed.text)
-    return StartResult(place, Packed(text, packed.arrays), moves, n_unknowns)
+    @classmethod
+    def unpack(cls, place: int, packed: Packed) -> StartResult:
+        """The start state from the output of `pack`."""
+        moves, n_unknowns, text = json.loads(packed.text)
+        return cls(place, Packed(text, packed.arrays), moves, n_unknowns)
 
 
 @dataclass(frozen=True)
@@ -104,11 +104,6 @@ class PointResult:
     values: Mapping[str, Any]
     place: int = 0
     progress: Packed | None = None
-
-    @property
-    def outcome(self) -> int:
-        """Outcome of the computation, as a number of the result file."""
-        return int(self.values["outcome"])
 
 
 Result = StartResult | PointResult
@@ -191,9 +186,9 @@ class Task(ABC):
         return self
 
     @property
-    @abstractmethod
     def cost_keys(self) -> CostKeys:
         """Groups of similar tasks, see `CostModel`."""
+        return ((type(self).__name__,),)
 
     @property
     def group(self) -> str:
@@ -272,6 +267,23 @@ def raise_fault(outcome: Outcome, message: str) -> None:
     """The solver takes whatever breaks it off for an end: raises MachineFaultError where that was not its own."""
     if outcome is Outcome.EXCEPTION and tells_of_machine(message):
         raise MachineFaultError(message)
+
+
+def first_harmonic(response: NDArray[np.complex128]) -> dict[str, NDArray[np.float64]]:
+    """Variables of the first harmonic of the response, in the shape of the response."""
+    return {"response_amplitude": np.abs(response), "response_phase": np.angle(response)}
+
+
+def deepest(depth: NDArray[np.float64], error: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Variables of the deepest pair at each count, m, from depths (n_counts, n_contact) and their errors."""
+    pair = np.nan_to_num(depth).argmax(axis=1)[:, None]
+    of_deepest = np.take_along_axis(error, pair, axis=1)[:, 0]
+    return {"wear_depth_max": depth.max(axis=1, initial=0.0), "wear_depth_max_error": of_deepest}
+
+
+def named(names: Sequence[str], own: Mapping[str, Any], source: object) -> dict[str, Any]:
+    """Variables by name: those of `own`, the others as the attributes of what the solver has returned."""
+    return {name: own[name] if name in own else getattr(source, name) for name in names}
 
 
 class LastProgress:

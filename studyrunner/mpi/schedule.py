@@ -62,7 +62,13 @@ class _Progress:
 
 
 class Office:
-    """What rank 0 does with tasks, results and messages. All of it is called in the main thread."""
+    """What rank 0 does with tasks, results and messages. All of it is called in the main thread.
+
+    costs: learns the run times of the tasks.
+    """
+
+    def __init__(self) -> None:
+        self.costs = CostModel()
 
     def begin(self) -> Iterable[Task]:
         """Tasks that are possible at the beginning; taken one by one, when ranks can use more."""
@@ -83,13 +89,13 @@ class Office:
         """Called many times a second. running: returns the running tasks, as `Dispatcher.running`."""
 
 
-def serve_tasks(ranks: Ranks, office: Office, run: Run, costs: CostModel | None = None) -> None:
-    """Rank 0: has all tasks done and computes some of them. costs: learns the run times of tasks.
+def serve_tasks(ranks: Ranks, office: Office, run: Run) -> None:
+    """Rank 0: has all tasks done and computes some of them.
 
     An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here, and
     MachineFaultError or KeyboardInterrupt where another rank has said so.
     """
-    server = _Server(ranks, office, run, costs or CostModel())
+    server = _Server(ranks, office, run)
     try:
         with uninterrupted():
             server.hand_out()
@@ -191,11 +197,11 @@ class _LocalWorker:
 
 
 class _Server:
-    def __init__(self, ranks: Ranks, office: Office, run: Run, costs: CostModel) -> None:
+    def __init__(self, ranks: Ranks, office: Office, run: Run) -> None:
         self._ranks = ranks
         self._office = office
         self._waiting = iter(office.begin())
-        self.dispatcher = Dispatcher(ranks.size, costs, time.monotonic)
+        self.dispatcher = Dispatcher(ranks.size, office.costs, time.monotonic)
         self.local = _LocalWorker(run, _seconds_to_progress(ranks))
 
     def look(self) -> None:

@@ -10,14 +10,13 @@ from solver import Block, Outcome, Passage, integrate_mission
 from studies import build_scene
 from studyrunner.cli import main
 from studyrunner.kinds.estimate import iterations_of_missions
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi import schedule
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from tests.mpi.launching import options, results
 from tests.studyrunner.faked_blocks import FakedBlocks, load_of
-from tests.studyrunner.fakes import points_of
+from tests.studyrunner.fakes import plan_of, points_of
 from tests.studyrunner.small_studies import MISSIONS, compute
 
 LINE = ("axes.frequency=160", "axes.sweep=up")
@@ -162,7 +161,7 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
     scenes = find_scenes(study)
     assert len(scenes.studies) == 4
     assert scenes.of_blocks == ((0, 0, 1), (2, 2, 3))
-    plan = build_tasks(study, 2)
+    plan = plan_of(study, 2)
     assert [task.scenes for task in plan.results[:: len(plan.results) // 2]] == [(0, 1), (2, 3)]
     assert plan.n_points == len({point for task in plan.results for point in points_of(task)}) == 8
     begins = [[block.begin for block in task.blocks] for task in plan.results[:2]]
@@ -175,7 +174,7 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
 def test_an_engine_order_is_a_frequency_by_the_speed_of_the_block():
     study = read_study("engine.toml")
     assert tuple(study.dimensions) == ("wear_coefficient", "excitation_amplitude", "sweep", "rotation_speed")
-    tasks = build_tasks(study, 10).results
+    tasks = plan_of(study, 10).results
     assert [[block.frequency for block in task.blocks] for task in tasks] == [[180.0, 200.0], [180.0, 4 * 3100 / 60]]
     assert [task.blocks[1].cycles for task in tasks] == [2000.0, 10 * 4 * 3100 / 60]
     assert find_scenes(study).of_blocks == ((0, 1), (0, 2))
