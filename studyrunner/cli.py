@@ -6,7 +6,7 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,6 @@ from studyrunner.mpi.ranks import (
     LauncherError,
     RankInterrupted,
     Ranks,
-    job_size,
     launcher_rank,
     start_ranks,
 )
@@ -29,7 +28,7 @@ from studyrunner.system.process import (
     raise_ending,
     take_endings,
 )
-from studyrunner.user_error import StorageError, UserError, show_text
+from studyrunner.user_error import StorageError, UserError
 
 if TYPE_CHECKING:
     import argparse
@@ -45,7 +44,6 @@ _SECONDS_FOR_RANK_0 = 60.0
 """Time that rank 0 has for writing the result, s, before another interrupted rank ends the run."""
 
 _SECONDS_FOR_A_LINE = 2.0
-_SECONDS_WITHOUT_A_WORD = 3.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -155,12 +153,8 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 
         study = read_study(options.study, options.overrides)
         raise_ending()
-        if options.plan:
-            return _show_plan(study)
-        if options.check:
-            return _check(study)
-        if options.write_scene is not None:
-            return _write_scene(study, options.write_scene)
+        if options.plan or options.check or options.write_scene is not None:
+            return _describe(study, options)
         return _compute(ranks, study, options)
     except UserError as error:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
@@ -171,79 +165,51 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     return BAD_INPUT
 
 
-def _slow_steps() -> Callable[[str], None]:
-    """Takes lines on how a scene is built, and prints those of a scene that takes long."""
-    began = time.monotonic()
-
-    def say(doing: str) -> None:
-        raise_ending()
-        seconds = time.monotonic() - began
-        if seconds > _SECONDS_WITHOUT_A_WORD:
-            print(f"[{seconds:5.0f} s] {doing}", file=sys.stderr, flush=True)
-
-    return say
-
-
-def _show_plan(study: Study) -> int:
-    from studyrunner.kinds.estimate import largest_memory
-    from studyrunner.kinds.kind import build_tasks
-    from studyrunner.plan import doubts_of_study, format_plan
-    from studyrunner.scene.answers import remarks_of_study
-    from studyrunner.scene.scene_set import plan_scenes
-
-    before = largest_memory()
-    planned = plan_scenes(study, _slow_steps())
-    built_with = largest_memory() - before
-    plan = build_tasks(study, planned.scenes, planned.facts)
-    seconds = time.process_time() + planned.seconds_left
-    lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
-    said = *remarks_of_study(study), *(("note", doubt) for doubt in doubts_of_study(study, planned.largest))
-    print(*lines, *(f"{label:<10} {show_text(text)}" for label, text in said), sep="\n", flush=True)
-    error = last_error(sys.stdout)
-    if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
-        raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
-    return CONVERGED
-
-
-def _check(study: Study) -> int:
-    from studyrunner.result.target import check_output
+def _describe(study: Study, options: argparse.Namespace) -> int:
+    """What the options --plan, --check and --write-scene print and write."""
+    from studyrunner.plan import plan_lines
+    from studyrunner.result.target import check_output, check_scene_file
     from studyrunner.scene.answers import check_study_model
-
-    picture = Path(f"{study.study.name}.check.png")
-    target = check_output("--check", picture, study.files)
-    print(check_study_model(study, target, _slow_steps()), flush=True)
-    print(f"{picture}: the contact pairs and their frames", flush=True)
-    return CONVERGED
-
-
-def _write_scene(study: Study, path: Path) -> int:
-    from studyrunner.result.target import check_scene_file
     from studyrunner.scene.scene import write_study_scene
+    from studyrunner.system.progress import ProgressDisplay
 
-    write_study_scene(study, check_scene_file("--write-scene", path, study), _slow_steps())
-    print(f"{path}: the scene of study {study.study.name}", flush=True)
+    step = ProgressDisplay().step
+    if options.plan:
+        print(*plan_lines(study, step), sep="\n", flush=True)
+        error = last_error(sys.stdout)
+        if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
+            raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
+    elif options.check:
+        picture = Path(f"{study.study.name}.check.png")
+        print(check_study_model(study, check_output("--check", picture, study.files), step), flush=True)
+        print(f"{picture}: the contact pairs and their frames", flush=True)
+    else:
+        path = options.write_scene
+        write_study_scene(study, check_scene_file("--write-scene", path, study), step)
+        print(f"{path}: the scene of study {study.study.name}", flush=True)
     return CONVERGED
 
 
 def _compute(ranks: Ranks, study: Study, options: argparse.Namespace) -> int:
     from solver.outcome import COMPLETE
     from studyrunner.result.target import check_result
-    from studyrunner.run import RunOptions, compute_study
+    from studyrunner.run import RunOptions, compute_study, open_progress
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", path, study, overwrite=options.overwrite)
-    display, announced = ProgressDisplay(), job_size() if ranks.size == 1 else 0
-    idle = f"one process, although the job has room for {announced}: srun or mpiexec starts them"
-    given = RunOptions(options.fresh, options.retry_failed, options.date)
-    outcomes = compute_study(ranks, study, target, given, display, _slow_steps(), [idle] if announced > 1 else [])
+    display, given = ProgressDisplay(), RunOptions(options.fresh, options.retry_failed, options.date)
+    with open_progress(target) as store:
+        outcomes = compute_study(ranks, study, target, store, given, display)
+        # no other run replaces the result meanwhile
+        answer = _answer(target.path)
     n_points, n_complete = outcomes.total(), sum(outcomes[number] for number in COMPLETE)
     counts = f"{count(n_points, 'point')}, {n_complete} computed, {n_points - n_complete} failed"
-    print(f"{path}: {counts}, {format_seconds(display.seconds)}", *_answer(target.path), sep="\n", flush=True)
+    print(f"{path}: {counts}, {format_seconds(display.seconds)}", *answer, sep="\n", flush=True)
     return SOME_FAILED if n_complete < n_points else CONVERGED
 
 
-def _answer(path: Path) -> tuple[str, ...]:
+def _answer(path: Path) -> Sequence[str]:
     """What came out, in lines, read from the result."""
     # where they are used: they take a second to load
     from studyrunner.result.opening import open_result
@@ -252,11 +218,10 @@ def _answer(path: Path) -> tuple[str, ...]:
 
     try:
         with open_result(path) as dataset:
-            found = summary(dataset)
+            return summary_lines(summary(dataset))
     except UserError as error:
         # the result is there all the same, but larger than what is read
         return (f"no summary: {error}",)
-    return tuple(summary_lines(found))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from studyrunner.user_error import UserError
 
@@ -41,50 +41,6 @@ class _Parser(argparse.ArgumentParser):
         raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
 
 
-def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "study",
-        nargs="?",
-        default="dovetail",
-        metavar="STUDY",
-        help="TOML file, result file or bundled study (default: dovetail)",
-    )
-    parser.add_argument(
-        "-o", dest="output", type=Path, metavar="OUT.nc", help="result file (default: <study name>.nc, here)"
-    )
-    parser.add_argument(
-        "--version", action="version", version=f"fretwear {metadata.version('fretwear')}", help="print the version"
-    )
-    parser.add_argument("--new", metavar="NAME", help="write NAME.toml, a study to start from, and stop")
-    parser.add_argument("--from", dest="deck", type=Path, metavar="DECK", help="with --new: a study of this deck")
-    parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
-    parser.add_argument(
-        "--check", action="store_true", help="print what a finite-element model is, draw its contact pairs; then stop"
-    )
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
-    )
-    parser.add_argument("--write-scene", type=Path, metavar="PATH.h5", help="write the scene as a scene file and stop")
-    parser.add_argument("--scene-help", metavar="SCENE", help="print what a bundled scene is, and its parameters")
-    parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
-    parser.add_argument("--overwrite", action="store_true", help="replace the result of another study")
-    parser.add_argument(
-        "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
-    )
-    parser.add_argument(
-        "--date",
-        nargs="?",
-        const="now",
-        metavar="ISO",
-        help="date_created of the result: a date, or now; without it equal runs have equal files",
-    )
-
-
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Options from the command line, by their names.
 
@@ -92,14 +48,27 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
     Raises UserError; SystemExit after --help, --new and the like.
     """
-    parser = _Parser(
-        prog="run-study",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
-    _add_options(parser)
+    look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+    parser = _Parser("run-study", description=_DESCRIPTION, epilog=_EPILOG, **look)
+    add, flag, path = parser.add_argument, dict[str, Any](action="store_true"), dict[str, Any](type=Path)
+    which = "TOML file, result file or bundled study (default: dovetail)"
+    add("study", nargs="?", default="dovetail", metavar="STUDY", help=which)
+    add("-o", dest="output", metavar="OUT.nc", help="result file (default: <study name>.nc, here)", **path)
+    version = f"fretwear {metadata.version('fretwear')}"
+    add("--version", action="version", version=version, help="print the version")
+    add("--new", metavar="NAME", help="write NAME.toml, a study to start from, and stop")
+    add("--from", dest="deck", metavar="DECK", help="with --new: a study of this deck", **path)
+    add("--plan", help="print what would be computed; compute nothing", **flag)
+    add("--check", help="print what a finite-element model is, draw its contact pairs; then stop", **flag)
+    changed = "override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated"
+    add("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help=changed)
+    add("--write-scene", metavar="PATH.h5", help="write the scene as a scene file and stop", **path)
+    add("--scene-help", metavar="SCENE", help="print what a bundled scene is, and its parameters")
+    add("--fresh", help="start over: forget what an earlier run of it has left", **flag)
+    add("--overwrite", help="replace the result of another study", **flag)
+    add("--retry-failed", help="compute points that failed in an earlier run once more", **flag)
+    date = "date_created of the result: a date, or now; without it equal runs have equal files"
+    add("--date", nargs="?", const="now", metavar="ISO", help=date)
     found = parser.parse_args(list(arguments))
     if found.deck is not None and found.new is None:
         remedy = "give --new NAME beside it: the name of the new study"

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
+from studyrunner.system.process import raise_ending
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -17,6 +19,7 @@ FIRST_LINE = 2.0
 LONGEST_SILENCE = 30.0
 """Seconds between two plain lines, at most."""
 
+_SECONDS_WITHOUT_A_WORD = 3.0
 _GROWTH = 0.5  # of the time since the start: later lines are rarer
 _SECONDS_A_PICTURE = 0.1
 _MOST_NAMED = 3
@@ -67,6 +70,12 @@ class ProgressDisplay:
             self._bar.console.print(text, markup=False, highlight=False)
         elif not self._quiet:
             print(f"[{format_seconds(self.seconds):>7}] {text}", file=sys.stderr, flush=True)
+
+    def step(self, text: str) -> None:
+        """Shows a line on a step before the tasks, where these steps take long: a wrong scene is one line, no more."""
+        raise_ending()
+        if self.seconds > _SECONDS_WITHOUT_A_WORD:
+            self.say(text)
 
     def tick(self, look: Callable[[], Standing]) -> None:
         """Called many times a second: shows how far the tasks are where that is due, and only then looks.
