@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -86,8 +85,7 @@ class TaskProgress(Office):
         self._sweeps = completion.sweeps_left()
         self.tasks = [*self._sweeps, *(task for task in completion.plan.results if not completion.is_finished(task))]
         self._n_given: Counter[str] = Counter()
-        self._words: dict[str, str] = {}  # where a sweep is
-        self._shares: dict[str, tuple[float, float]] = {}  # what of a task is done, and when it said so, s
+        self._words: dict[str, str] = {}  # where a task is
         self._suspects: list[Task] = []  # they wait for the one that is under way
         self._tried = ""
         self._left: dict[str, float] = defaultdict(float)  # estimated seconds, by group
@@ -105,24 +103,21 @@ class TaskProgress(Office):
         """Takes a result; returns tasks that the result makes possible."""
         self._n_given[task.key] += 1
         is_last = self._n_given[task.key] == task.n_results
-        if is_last:
-            del self._n_given[task.key]
         self._left[task.group] -= task.cost / task.n_results
-        self._shares.pop(task.key, None)
         self._completion.add(task, result)
         self.n_points += len(task.points(result.place))
         new = self._start(task, result) if isinstance(result, StartResult) else ()
-        if task.key == self._tried and is_last:
-            self._tried = ""
-            new, self._suspects = [*new, *self._suspects], []
+        if is_last:
+            del self._n_given[task.key]
+            if task.key == self._tried:
+                self._tried = ""
+                new, self._suspects = [*new, *self._suspects], []
         return self._without_suspects(new)
 
     def keep(self, task: Task, progress: object) -> None:
         """Takes the progress of a task as `Keep` does."""
         if isinstance(progress, str):
             self._words[task.key] = progress
-        elif isinstance(progress, float):
-            self._shares[task.key] = progress, time.monotonic()
         else:
             self._completion.keep(task, progress)
 
@@ -130,14 +125,11 @@ class TaskProgress(Office):
         """State of the tasks. running: as `Dispatcher.running`."""
         factors = {group: self.costs.correction(((group,),)) for group in self._left}
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
-        done = sum(self.costs.sums.get(group, (0.0, 0.0, 0))[0] for group in factors)
-        longest = 0.0
+        done, longest = sum(self.costs.sums.get(group, (0.0, 0.0, 0))[0] for group in factors), 0.0
         for task, _, elapsed in running:
             expected = task.cost / task.n_results * factors[task.group]
-            still = self._still(task, expected, elapsed)
-            left += still - expected
-            done += elapsed
-            longest = max(longest, still)
+            still = max(expected - elapsed, _LATE * elapsed)
+            left, done, longest = left + still - expected, done + elapsed, max(longest, still)
         return Standing(
             n_done=self.n_points,
             n_points=self._completion.plan.n_points,
@@ -146,27 +138,9 @@ class TaskProgress(Office):
             running=tuple(self._describe(task, n_left) for task, n_left, _ in running),
         )
 
-    def _still(self, task: Task, expected: float, elapsed: float) -> float:
-        """Time left, s, of a running task: by the share that is done where it says so, else by its expected time.
-
-        What a task takes that is late already, or stands still, is a guess.
-        """
-        share, came = self._shares.get(task.key, (0.0, 0.0))
-        if share == 0.0:
-            return max(expected - elapsed, _LATE * elapsed)
-        since = min(time.monotonic() - came, elapsed)
-        return max((elapsed - since) * (1.0 - share) / share - since, _LATE * since)
-
-    def _without_suspects(self, tasks: Iterable[Task]) -> list[Task]:
-        """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""
-        now = []
-        for task in tasks:
-            if not self._completion.is_suspect(task) or self._tried in ("", task.key):
-                self._tried = task.key if self._completion.is_suspect(task) else self._tried
-                now.append(task)
-            else:
-                self._suspects.append(task)
-        return now
+    def _describe(self, task: Task, n_left: int) -> str:
+        what = task.describe(task.places[task.n_results - n_left])
+        return f"{what} ({self._words[task.key]})" if task.key in self._words else what
 
     def _start(self, sweep: Task, result: StartResult) -> Sequence[Task]:
         """The tasks that begin from a start state, whose cost is known better now."""
@@ -177,11 +151,17 @@ class TaskProgress(Office):
                 self._left[task.group] += sign * task.cost
         return new
 
-    def _describe(self, task: Task, n_left: int) -> str:
-        what = task.describe(task.places[task.n_results - n_left])
-        if task.key in self._shares:
-            return f"{what} ({100.0 * self._shares[task.key][0]:.0f} %)"
-        return f"{what} ({self._words[task.key]})" if task.key in self._words else what
+    def _without_suspects(self, tasks: Iterable[Task]) -> list[Task]:
+        """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""
+        now = []
+        for task in tasks:
+            is_suspect = self._completion.is_suspect(task)
+            if is_suspect and self._tried not in ("", task.key):
+                self._suspects.append(task)
+            else:
+                self._tried = task.key if is_suspect else self._tried
+                now.append(task)
+        return now
 
 
 class StudyRun(TaskProgress):
@@ -189,9 +169,7 @@ class StudyRun(TaskProgress):
 
     def __init__(self, completion: CompletionIndex, models: SceneModels, display: ProgressDisplay) -> None:
         super().__init__(completion)
-        self._store = completion.store
-        self._models = models
-        self.display = display
+        self._store, self._models, self._display = completion.store, models, display
         self._n_compiled: int | None = n_compiled()
 
     def prepare(self, rank: int, task: Task) -> Task:
@@ -203,6 +181,6 @@ class StudyRun(TaskProgress):
         """Writes and shows what is due."""
         if self._n_compiled is not None and n_compiled() > self._n_compiled:
             self._n_compiled = None
-            self.display.say("the solver is compiled for this machine, once after an installation")
+            self._display.say("the solver is compiled for this machine, once after an installation")
         self._store.tick()
-        self.display.tick(lambda: self.look(running()))
+        self._display.tick(lambda: self.look(running()))

@@ -39,7 +39,6 @@ from studyrunner.kinds.task import (
 )
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import Realisation
 from studyrunner.study.study import Study
 from studyrunner.units import show_count
 from studyrunner.variables import OF_A_MISSION
@@ -47,12 +46,6 @@ from studyrunner.variables import OF_A_MISSION
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
     from solver.model import ReducedModel
-
-_OF_ONE_PAIR = 3
-"""Relative displacements of one contact pair, at most."""
-
-_MOST = 0.95
-"""Largest share of a history that is said to be done before all of it is: the number of steps is an estimate."""
 
 _NO_JOINT = Joint(0, None)
 
@@ -71,6 +64,12 @@ class PlannedBlock:
     excitation_amplitude: float
     cycles: float
     begin: Begin
+
+    @property
+    def octaves(self) -> float:
+        """Of a passage; 0 for steady vibration."""
+        of = self.frequency
+        return abs(math.log2(of.stop / of.start)) if isinstance(of, Passage) else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +128,7 @@ class Mission(Task):
 
         def note(progress: Packed) -> None:
             reached(progress)
-            keep(min(next(n_computed) / n_planned, _MOST))
+            keep(f"{next(n_computed)} of about {n_planned} missions that are computed")
 
         kept = {int(number) for number in self.missions}
         # with those before, for the wear of one
@@ -156,8 +155,22 @@ def build_tasks(
     axes = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
     for part, numbers, of_blocks in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         for at in grid(part.study, *axes):
-            blocks = tuple(_blocks(part.study, at, numbers, of_blocks))
-            task = _task(study, part, at, blocks, [n_displacements[block.joint.scene] for block in blocks])
+            blocks, settings = tuple(_blocks(part.study, at, numbers, of_blocks)), settings_at(study, at)
+            n_unknowns = n_unknowns_of(max(n_displacements[number] for number in numbers), settings.harmonics)
+            ways = [(block.begin, block.octaves) for block in blocks]
+            task = Mission(
+                number=0,
+                settings=settings,
+                cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1])),
+                n_unknowns=n_unknowns,
+                blocks=blocks,
+                law=part.study.wear.as_law,
+                wear_coefficient=part.study.axes.wear_coefficient[at["wear_coefficient"]],
+                first=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",
+                missions=study.output_counts,
+                variables=tuple(study.recorded),
+                until=study.until,
+            )
             points.setdefault(task, []).append((*(at[name] for name in study.own_axes), *part.place))
     return number_points({task: [tuple(indices)] for task, indices in points.items()}, study)
 
@@ -179,38 +192,6 @@ def _blocks(
             cycles = given.cycles_at(frequency)
         joint = joint_of(study, scene, contact)
         yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))
-
-
-def _task(
-    study: Study,
-    part: Realisation,
-    at: Mapping[str, int],
-    blocks: tuple[PlannedBlock, ...],
-    n_displacements: Sequence[int],
-) -> Mission:
-    """The task of a point, without its number and its points. n_displacements: of each block."""
-    settings = settings_at(study, at)
-    n_unknowns = max(n_unknowns_of(number, settings.harmonics) for number in n_displacements)
-    ways = [
-        (block.begin, abs(math.log2(block.frequency.stop / block.frequency.start)))
-        if isinstance(block.frequency, Passage)
-        else (block.begin, 0.0)
-        for block in blocks
-    ]
-    one_pair = n_displacements[0] <= _OF_ONE_PAIR
-    return Mission(
-        number=0,
-        settings=settings,
-        cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1], one_pair=one_pair)),
-        blocks=blocks,
-        law=part.study.wear.as_law,
-        wear_coefficient=part.study.axes.wear_coefficient[at["wear_coefficient"]],
-        first=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",
-        missions=study.output_counts,
-        variables=tuple(study.recorded),
-        until=study.until,
-        n_unknowns=n_unknowns,
-    )
 
 
 def _values(task: Mission, history: MissionHistory) -> dict[str, Any]:

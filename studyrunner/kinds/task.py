@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 Index = tuple[int, ...]
 """Index of a point along the dimensions of the study."""
 
-Keep = Callable[[Packed | str | float], None]
-"""Takes the progress of a task: data to continue from, words, or the share that is done, 0 to 1."""
+Keep = Callable[[Packed | str], None]
+"""Takes the progress of a task: data to continue from, or words."""
 
 EQUAL_POINTS = "all values are those of another point"
 """Reason for a result that points share, whatever the kind of study."""
@@ -293,7 +293,7 @@ class LastProgress:
         self.last = task.resume
         self._keep = keep
 
-    def __call__(self, progress: Packed | str | float) -> None:
+    def __call__(self, progress: Packed | str) -> None:
         """Takes progress as `Keep` does."""
         self.last = progress if isinstance(progress, Packed) else self.last
         self._keep(progress)

@@ -196,10 +196,8 @@ def test_samples_draw_what_all_blocks_have(blocks):
 
 
 def test_the_estimated_time_follows_the_number_of_missions():
-    times = [iterations_of_missions([("ramp", 0.0)], number, one_pair=False) for number in (1, 3, 20, 1e6)]
+    times = [iterations_of_missions([("ramp", 0.0)], number) for number in (1, 3, 20, 1e6)]
     assert times[2] < 4 * times[1]
     assert times[3] < 5 * times[2]
-    # a ramp of one pair is seldom computed again
-    assert iterations_of_missions([("ramp", 0.0)], 20, one_pair=True) < 0.7 * times[2]
-    narrow, wide = (iterations_of_missions([("up", octaves)], 20, one_pair=True) for octaves in (0.1, 13.3))
+    narrow, wide = (iterations_of_missions([("up", octaves)], 20) for octaves in (0.1, 13.3))
     assert wide == pytest.approx(6 * narrow, rel=0.2)
