@@ -35,9 +35,8 @@ def run_study(
 ) -> xr.Dataset:
     """Run a study in this process, as the command `run-study` does, and open its result.
 
-    The result is that of the command, to the last bit, and a run that was ended early goes on when it is called again,
-    from here or by the command. This process computes alone, with one thread of the linear algebra; for several
-    processes give `mpiexec -n 8 run-study study.toml -o output.nc`.
+    The result is that of the command, to the last bit, and a run that was ended early goes on, from here or by the
+    command. This process computes alone, with one thread; for several give `mpiexec -n 8 run-study study.toml`.
 
     Parameters
     ----------

@@ -10,14 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studyrunner.mpi.ranks import (
-    POLL_SECONDS,
-    LauncherError,
-    RankInterrupted,
-    Ranks,
-    launcher_rank,
-    start_ranks,
-)
+from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, RankInterrupted, Ranks, launcher_rank, start_ranks
 from studyrunner.system.machine import MachineFaultError
 from studyrunner.system.process import (
     INTERRUPTED,
@@ -49,10 +42,7 @@ _SECONDS_FOR_A_LINE = 2.0
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks.
 
-    Parameters
-    ----------
-    arguments
-        None for those of the process, which ends here if the run did not come to its end.
+    arguments: None for those of the process, which ends here if the run did not come to its end.
     """
     try:
         take_endings()
@@ -84,7 +74,11 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
             for rank in range(1, ranks.size):
                 ranks.send(None, rank)
         else:
-            status = _follow(ranks)
+            from studyrunner.mpi.schedule import follow_rank_0
+            from studyrunner.task_runs import evaluator
+
+            follow_rank_0(ranks, evaluator())
+            status = CONVERGED
         if arguments is None:
             # it has come to its end: what comes while MPI and the interpreter end is of no use to anybody
             begin_ending()
@@ -133,14 +127,6 @@ def _leave_to_rank_0(ranks: Ranks, reason: object) -> bool:
             return True
         time.sleep(POLL_SECONDS)
     return False
-
-
-def _follow(ranks: Ranks) -> int:
-    from studyrunner.mpi.schedule import follow_rank_0
-    from studyrunner.task_runs import evaluator
-
-    follow_rank_0(ranks, evaluator())
-    return CONVERGED
 
 
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:

@@ -36,15 +36,12 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
     rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
     known = rows[reached]
-    jump = history.jump_cycle
-    if place:
-        jump = jump / slower if endless or jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
-    target = history.cycles_to_target / slower
-    if target > (1.0 + _ROUND_OFF) * counts[-1] / slower:
-        # another history of the task goes farther
-        target = math.nan
-    life_error = math.nan if math.isnan(target) else history.cycles_to_target_error / slower
-    whole = bool(reached.all())
+    # another history of the task may go farther
+    farthest, whole = (1.0 + _ROUND_OFF) * counts[-1], bool(reached.all())
+    jump = history.jump_cycle / slower if endless or history.jump_cycle <= farthest else math.nan
+    target, life_error = math.nan, math.nan
+    if history.cycles_to_target <= farthest:
+        target, life_error = history.cycles_to_target / slower, history.cycles_to_target_error / slower
     # one that was not reached to its end has ended as the integrated history has
     shared = place > 0 and whole and (not endless or history.outcome.complete)
     # of the integrated history, and of all without a start state
@@ -52,13 +49,10 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
     outcome, message = history.outcome, history.message if own_message else ""
     if shared:
         outcome, message = judge(history, known, task.settings.rtol, slower)
-    last = 0.0 if task.to_the_end is not None else task.cycles[-1]
-    if endless:
-        last = history.last_cycle / slower
-    elif not whole:
-        last = min(history.last_cycle / slower, last)
-    elif not outcome.complete and not integrated.unworn:
-        last = min(history.last_cycle, last)
+    last = history.last_cycle / slower
+    if not endless:
+        asked = 0.0 if task.to_the_end is not None else task.cycles[-1]
+        last = asked if whole else min(last, asked)
     depths = history.wear_depth[known]
     if not message and known.size and not outcome.complete:
         message = _end_of_shared(task, history, outcome, slower, known, last)

@@ -13,11 +13,8 @@ from studyrunner.system.process import raise_ending
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-FIRST_LINE = 2.0
-"""Seconds to the first plain line."""
-
-LONGEST_SILENCE = 30.0
-"""Seconds between two plain lines, at most."""
+FIRST_LINE, LONGEST_SILENCE = 2.0, 30.0
+"""Seconds to the first plain line, and between two of them at most."""
 
 _SECONDS_WITHOUT_A_WORD = 3.0
 _GROWTH = 0.5  # of the time since the start: later lines are rarer
@@ -46,14 +43,9 @@ class ProgressDisplay:
     """What the user sees while a study runs. Only rank 0 has one. quiet: nothing is shown."""
 
     def __init__(self, *, quiet: bool = False) -> None:
-        self._began = time.monotonic()
-        self._quiet = quiet
-        self._next = FIRST_LINE  # seconds
-        self._share = 0.0
+        self._began, self._quiet, self._share = time.monotonic(), quiet, 0.0
         self._bar = _new_bar() if sys.stderr.isatty() and not quiet else None
-        if self._bar is not None:
-            self._next = 0.0
-            self._bar_task = self._bar.add_task("", total=1.0)
+        self._next = FIRST_LINE if self._bar is None else 0.0  # seconds
 
     def __enter__(self) -> Self:
         if self._bar is not None:
@@ -78,17 +70,14 @@ class ProgressDisplay:
             self.say(text)
 
     def tick(self, look: Callable[[], Standing]) -> None:
-        """Called many times a second: shows how far the tasks are where that is due, and only then looks.
-
-        On a terminal the bar moves; elsewhere a plain line is printed, often at first, then every half minute.
-        """
+        """Called many times a second: shows how far the tasks are where that is due, and only then looks."""
         elapsed = self.seconds
         if elapsed < self._next or self._quiet:
             return
         text = self._describe(look())
         if self._bar is not None:
             self._next = elapsed + _SECONDS_A_PICTURE
-            self._bar.update(self._bar_task, completed=self._share, description=text)
+            self._bar.update(self._bar.task_ids[0], completed=self._share, description=text)
         else:
             self._next = elapsed + min(max(FIRST_LINE, _GROWTH * elapsed), LONGEST_SILENCE)
             self.say(text)
@@ -120,7 +109,9 @@ def _new_bar() -> Progress | None:
     console = Console(stderr=True)
     # the text comes last: it is cut where the terminal is narrow
     columns = (SpinnerColumn(), BarColumn(20), TaskProgressColumn(), TextColumn("{task.description}", markup=False))
-    return Progress(*columns, console=console, transient=True) if console.is_terminal else None
+    bar = Progress(*columns, console=console, transient=True)
+    bar.add_task("", total=1.0)
+    return bar if console.is_terminal else None
 
 
 def format_seconds(seconds: float) -> str:
