@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -26,7 +26,6 @@ from studyrunner.kinds.task import (
     Task,
     TaskPlan,
     deepest,
-    described,
     digest,
     first_harmonic,
     grid,
@@ -99,10 +98,9 @@ class Mission(Task):
 
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hash of the history: of all blocks with their scenes."""
-        blocks = [(identity.joint(block.joint), astuple(replace(block, joint=_NO_JOINT))) for block in self.blocks]
-        until = None if self.until is None else astuple(self.until)
-        wear = (self.wear_coefficient, asdict(self.law), self.first, described(self.settings))
-        return (digest("mission", blocks, wear, self.missions, until, identity.record),)
+        blocks = [(identity.joint(block.joint), replace(block, joint=_NO_JOINT)) for block in self.blocks]
+        wear = (self.wear_coefficient, self.law, self.first, self.settings)
+        return (digest("mission", blocks, wear, self.missions, self.until, identity.record),)
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """The history."""

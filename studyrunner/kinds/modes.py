@@ -15,7 +15,6 @@ from studyrunner.kinds.task import (
     Keep,
     PointResult,
     TaskPlan,
-    described,
     digest,
     first_harmonic,
     grid,
@@ -54,7 +53,7 @@ class Mode(JointTask):
 
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
-        own = (identity.joint(self.joint), self.mode, self.direction, described(self.settings), identity.record)
+        own = (identity.joint(self.joint), self.mode, self.direction, self.settings, identity.record)
         return tuple(digest("mode", *own, amplitude) for amplitude in self.amplitudes)
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:

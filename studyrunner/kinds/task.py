@@ -229,9 +229,13 @@ class JointTask(Task):
 
 
 def digest(*values: object) -> str:
-    """Hash of values; numbers enter with all bits."""
+    """Hash of values, frozen dataclasses among them; numbers enter with all bits.
+
+    A time limit does not enter: it decides whether there is a result, not the values of the result.
+    """
     # by hand: `joblib.hash` hashes pickled bytes, which change with the versions of Python and numpy
-    return hashlib.sha256(json.dumps(values, allow_nan=True).encode()).hexdigest()[:32]
+    text = json.dumps(values, default=lambda each: {**asdict(each), "time_limit": None})
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:
@@ -251,11 +255,6 @@ def settings_at(study: Study, at: Mapping[str, int]) -> SolverSettings:
     """Settings of the solver. at: indices along the axes, those of `SOLVER_AXES` among them."""
     limit = math.inf if study.solver.time_limit is None else study.solver.time_limit
     return SolverSettings(**{key: getattr(study.solver, key)[at[key]] for key in SOLVER_AXES}, time_limit=limit)
-
-
-def described(settings: SolverSettings) -> list[tuple[str, object]]:
-    """Settings for a hash; a time limit decides whether there is a result, not the values of the result."""
-    return [item for item in asdict(settings).items() if item[0] != "time_limit"]
 
 
 def n_unknowns_of(n_displacements: int, harmonics: int | Automatic) -> int:

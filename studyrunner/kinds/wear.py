@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, cast
 
@@ -24,7 +24,6 @@ from studyrunner.kinds.task import (
     LastProgress,
     PointResult,
     StartResult,
-    described,
     digest,
     raise_fault,
     up_or_down,
@@ -111,8 +110,7 @@ class _FromRest(JointTask):
 
     def name_of_start(self, identity: Identity, frequency: float) -> str:
         """Hash of a start state, whatever the other frequencies: the steps of a sweep follow from the joint."""
-        followed = None if self.follow is None else astuple(self.follow)
-        loading = (self.excitation_amplitude, self.direction, tuple(described(self.settings)), followed)
+        loading = (self.excitation_amplitude, self.direction, self.settings, self.follow)
         return digest("start", _digest_once("line", identity.joint(self.joint), *loading), frequency)
 
 
@@ -251,12 +249,11 @@ class History(_FromRest):
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the histories: of their start state, and of all that is done with it."""
         start = self.name_of_start(identity, self.frequency)
-        ends = tuple(None if each is None else astuple(each) for each in (self.until, self.to_the_end))
-        kept = _digest_once(identity.record, self.cycles, self.loops, ends)
+        kept = _digest_once(identity.record, self.cycles, self.loops, self.until, self.to_the_end)
         found = []
         for each, number in self.results:
             scheme = "" if each.unworn else each.scheme
-            own = (*each.wear(each.histories[0]), scheme, each.unworn, each.largest_depth, asdict(self.law))
+            own = (*each.wear(each.histories[0]), scheme, each.unworn, each.largest_depth, self.law)
             found.append(digest("history", start, kept, own, number > 0, each.wear(each.histories[number])))
         return tuple(found)
 
