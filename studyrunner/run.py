@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import Store
-from studyrunner.kinds.kind import build_tasks, describe_tasks
 from studyrunner.mpi.ranks import Ranks, job_size
 from studyrunner.mpi.schedule import serve_tasks
-from studyrunner.plan import doubts_of_study
+from studyrunner.plan import build_tasks, describe_tasks, doubts_of_study
 from studyrunner.result.arrays import small_arrays
 from studyrunner.result.provenance import compare_with_archived, describe_run, describe_time_and_commit
 from studyrunner.result.target import Target, identity_of

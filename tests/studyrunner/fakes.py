@@ -10,9 +10,9 @@ import numpy as np
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import Store
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import Index, PointResult, Result, StartResult, Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
+from studyrunner.plan import build_tasks
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study import Study
