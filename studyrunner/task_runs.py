@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error
+from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.kinds.task import Keep, Result, StartResult, Task
+from studyrunner.kinds.task import Keep, PointResult, Result, StartResult, Task
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Office, Run
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task
@@ -54,9 +55,23 @@ def evaluator() -> Run:
         if isinstance(task, SceneTask):
             yield from build_scene_task(task, keep)
             return
-        left = dict.fromkeys(task.places)
+        left, last, is_limited = dict.fromkeys(task.places), task.resume, False
+
+        def keep_last(progress: Packed | str) -> None:
+            nonlocal last
+            last = progress if isinstance(progress, Packed) else last
+            keep(progress)
+
         try:
-            for result in compute_task(replace(task, models=()), own_models(task), keep):
+            for result in compute_task(replace(task, models=()), own_models(task), keep_last):
+                if isinstance(result, PointResult):
+                    outcome, message = result.values["outcome"], result.values["message"]
+                    if outcome == Outcome.EXCEPTION and tells_of_machine(message):
+                        # the solver takes whatever breaks it off for an end
+                        raise MachineFaultError(message)
+                    # a history that its time limit has ended goes on from there when it gets more
+                    is_limited = is_limited or outcome == Outcome.TIME_LIMIT
+                    result = replace(result, progress=last) if is_limited else result
                 left.pop(result.place, None)
                 yield result
         except Exception as error:

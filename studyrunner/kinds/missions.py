@@ -21,7 +21,6 @@ from studyrunner.kinds.task import (
     Index,
     Joint,
     Keep,
-    LastProgress,
     PointResult,
     Task,
     TaskPlan,
@@ -33,7 +32,6 @@ from studyrunner.kinds.task import (
     n_unknowns_of,
     named,
     number_points,
-    raise_fault,
     settings_at,
 )
 from studyrunner.scene.pairs import ContactChange
@@ -120,12 +118,12 @@ class Mission(Task):
             )
             for block in self.blocks
         )
-        reached, n_computed = LastProgress(self, keep), itertools.count(1)
+        n_computed = itertools.count(1)
         # as many again for the reference solution
         n_planned = 2 * max(1, missions_computed(self.missions[-1]))
 
         def note(progress: Packed) -> None:
-            reached(progress)
+            keep(progress)
             keep(f"{next(n_computed)} of about {n_planned} missions that are computed")
 
         kept = {int(number) for number in self.missions}
@@ -134,8 +132,7 @@ class Mission(Task):
         first = cast("Direction", self.first)
         mission = of_solver.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
         history = integrate_missions(mission, note, self.resume)
-        raise_fault(history.outcome, history.message)
-        yield PointResult(self.points(0), _values(self, history), progress=reached.after(history.outcome))
+        yield PointResult(self.points(0), _values(self, history))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""

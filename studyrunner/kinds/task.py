@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
@@ -27,7 +26,7 @@ from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.system.machine import MachineFaultError, package_digest, tells_of_machine
+from studyrunner.system.machine import package_digest
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -262,12 +261,6 @@ def n_unknowns_of(n_displacements: int, harmonics: int | Automatic) -> int:
     return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)
 
 
-def raise_fault(outcome: Outcome, message: str) -> None:
-    """The solver takes whatever breaks it off for an end: raises MachineFaultError where that was not its own."""
-    if outcome is Outcome.EXCEPTION and tells_of_machine(message):
-        raise MachineFaultError(message)
-
-
 def first_harmonic(response: NDArray[np.complex128]) -> dict[str, NDArray[np.float64]]:
     """Variables of the first harmonic of the response, in the shape of the response."""
     return {"response_amplitude": np.abs(response), "response_phase": np.angle(response)}
@@ -283,23 +276,6 @@ def deepest(depth: NDArray[np.float64], error: NDArray[np.float64]) -> dict[str,
 def named(names: Sequence[str], own: Mapping[str, Any], source: object) -> dict[str, Any]:
     """Variables by name: those of `own`, the others as the attributes of what the solver has returned."""
     return {name: own[name] if name in own else getattr(source, name) for name in names}
-
-
-class LastProgress:
-    """Passes the progress of a task on to `keep`, and has the last of it; None where there is none."""
-
-    def __init__(self, task: Task, keep: Keep) -> None:
-        self.last = task.resume
-        self._keep = keep
-
-    def __call__(self, progress: Packed | str) -> None:
-        """Takes progress as `Keep` does."""
-        self.last = progress if isinstance(progress, Packed) else self.last
-        self._keep(progress)
-
-    def after(self, outcome: Outcome) -> Packed | None:
-        """From where a history goes on with more time; None where it has not run out of it."""
-        return self.last if outcome is Outcome.TIME_LIMIT else None
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,13 @@ from studyrunner.kinds.task import (
     Index,
     JointTask,
     Keep,
-    LastProgress,
     PointResult,
     StartResult,
     digest,
-    raise_fault,
     up_or_down,
 )
 from studyrunner.mpi.dispatch import CostKeys
+from studyrunner.system.machine import MachineFaultError, tells_of_machine
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -161,7 +160,8 @@ class Sweep(_FromRest):
             keep=keep,
             resume=self.resume,
         ):
-            raise_fault(start.outcome, start.message)
+            if start.outcome is Outcome.EXCEPTION and tells_of_machine(start.message):
+                raise MachineFaultError(start.message)
             n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
             yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 
@@ -264,20 +264,15 @@ class History(_FromRest):
 
         if self.start is None:
             raise TypeError(f"task without a start state: {self}")
-        reached, progress = LastProgress(self, keep), None
         needed: dict[Integrated, list[int]] = {}
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
         model, friction = self.joint.model(models), self.joint.friction_coefficient
         asked, start = [self._asked(each) for each in needed], unpack(self.start)
-        histories = integrate_together(model, friction, self.settings, start, asked, reached, self.resume)
+        histories = integrate_together(model, friction, self.settings, start, asked, keep, self.resume)
         for (each, places), history in zip(needed.items(), histories, strict=True):
-            raise_fault(history.outcome, history.message)
-            # one that its time limit has ended goes on from there when it gets more
-            progress = progress or reached.after(history.outcome)
             for place in places:
-                result = build_result(self, each, history, self.results[place][1])
-                yield replace(result, place=place, progress=progress)
+                yield replace(build_result(self, each, history, self.results[place][1]), place=place)
 
     def _asked(self, integrated: Integrated) -> WearRequest:
         from solver.wear.integrate import WearRequest
