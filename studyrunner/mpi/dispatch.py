@@ -78,14 +78,6 @@ class CostModel:
         return self._factors[keys]
 
 
-@dataclass(frozen=True)
-class Assignment:
-    """A task on its way to a rank."""
-
-    number: int
-    task: Task
-
-
 @dataclass
 class _Running:
     """A task that a rank has: results still to come, and when the last one came or the task was given."""
@@ -136,14 +128,14 @@ class Dispatcher:
             heapq.heappush(self._first if task.gives_starts else self._others, entry)
             self._n_known += 1
 
-    def assign(self) -> Iterator[tuple[int, Assignment]]:
-        """Ranks that get a task now, and the tasks."""
+    def assign(self) -> Iterator[tuple[int, int, Task]]:
+        """Ranks that get a task now, with the number of the task and the task."""
         while self._free and (self._first or self._others):
             rank, _ = self._free.popitem()
             is_first = self._first and (self.wants_more or not self._others)
             _, number, task, _ = heapq.heappop(self._first if is_first else self._others)
             self._given[number] = _Running(task, task.n_results, self._clock())
-            yield rank, Assignment(number, task)
+            yield rank, number, task
 
     def deliver(self, rank: int, number: int, seconds: float) -> Task:
         """Notes a result, which took so many seconds; returns its task."""

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from studyrunner.mpi.dispatch import Assignment, CostModel, Dispatcher, Task
+from studyrunner.mpi.dispatch import CostModel, Dispatcher, Task
 from studyrunner.mpi.mapped_file import WhetherSeen
 from studyrunner.mpi.ranks import POLL_SECONDS, RankInterrupted, Ranks, wait_for_message
 from studyrunner.system.machine import MachineFaultError
@@ -37,6 +37,14 @@ Result = Any
 
 Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
 """Does a task: gives the results one by one and may hand the progress to the given function."""
+
+
+@dataclass(frozen=True)
+class _Assignment:
+    """A task on its way to a rank."""
+
+    number: int
+    task: Task
 
 
 @dataclass(frozen=True)
@@ -113,14 +121,14 @@ def follow_rank_0(ranks: Ranks, run: Run) -> None:
     while (message := wait_for_message(ranks)[1]) is not None:
         if isinstance(message, WhetherSeen):
             send(message.answer())
-        elif isinstance(message, Assignment):
+        elif isinstance(message, _Assignment):
             _work(message, run, send, ranks.size, raise_ending)
         else:
             raise TypeError(f"rank 0 sent {message!r} instead of a task")
 
 
 def _work(
-    assignment: Assignment, run: Run, send: Callable[[object], None], n_ranks: int, check: Callable[[], None]
+    assignment: _Assignment, run: Run, send: Callable[[object], None], n_ranks: int, check: Callable[[], None]
 ) -> None:
     """Sends the results of a task, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
     task, n_given, began = assignment.task, 0, time.perf_counter()
@@ -148,7 +156,7 @@ class _LocalWorker:
     """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
 
     def __init__(self, run: Run, n_ranks: int) -> None:
-        self._tasks: queue.SimpleQueue[Assignment | None] = queue.SimpleQueue()
+        self._tasks: queue.SimpleQueue[_Assignment | None] = queue.SimpleQueue()
         self._sent: deque[object] = deque()
         self.given_up = False
         self.assign = self._tasks.put
@@ -213,8 +221,8 @@ class _Server:
         """Sends tasks to the ranks that have none."""
         while self.dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
             self.dispatcher.add(more)
-        for rank, assigned in self.dispatcher.assign():
-            assignment = Assignment(assigned.number, self._office.prepare(rank, assigned.task))
+        for rank, number, task in self.dispatcher.assign():
+            assignment = _Assignment(number, self._office.prepare(rank, task))
             if rank == 0:
                 self.local.assign(assignment)
             else:

@@ -109,13 +109,13 @@ def test_what_waits_is_bounded(monkeypatch):
     dispatcher.add([Job("sweep", 1.0, 4, True)] * 50)
     most, n_done, waiting = 0, 0, 0
     while not dispatcher.done:
-        ((rank, assignment),) = dispatcher.assign()
-        for _ in range(assignment.task.n_results):
-            dispatcher.deliver(rank, assignment.number, 1.0)
-            if assignment.task.gives_starts:
+        ((rank, number, task),) = dispatcher.assign()
+        for _ in range(task.n_results):
+            dispatcher.deliver(rank, number, 1.0)
+            if task.gives_starts:
                 dispatcher.add([Job("history", 1.0)])
                 waiting += 1
-        if not assignment.task.gives_starts:
+        if not task.gives_starts:
             n_done, waiting = n_done + 1, waiting - 1
         most = max(most, waiting)
     assert (n_done, waiting) == (200, 0)
@@ -167,11 +167,11 @@ def test_ranks_that_see_a_file_are_found_and_the_file_goes(size, blind, expected
     assert ranks_that_see(Blind(size, blind), tmp_path / "file") == frozenset(expected)
     assert list(tmp_path.iterdir()) == []
 
-    def create(path):
+    def create(path, _):
         path.touch()
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(mapped_file, "create", create)
+    monkeypatch.setattr(mapped_file.Path, "open", create)
     assert ranks_that_see(Blind(size, ()), tmp_path / "file") == frozenset()
     assert list(tmp_path.iterdir()) == []
 
