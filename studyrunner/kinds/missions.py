@@ -25,6 +25,7 @@ from studyrunner.kinds.task import (
     Task,
     TaskPlan,
     deepest,
+    describe_target,
     digest,
     first_harmonic,
     grid,
@@ -37,7 +38,6 @@ from studyrunner.kinds.task import (
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.study import Study
-from studyrunner.units import show_count
 from studyrunner.variables import OF_A_MISSION
 
 if TYPE_CHECKING:
@@ -200,6 +200,9 @@ def _values(task: Mission, history: MissionHistory) -> dict[str, Any]:
     last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
     is_state = np.isfinite(history.worn_volume).any() and np.isfinite(history.response_begin).any()
     depth, depth_error = history.wear_depth[rows], history.wear_depth_error[rows]
+    whole, target = history.last_mission >= task.missions[-1], ""
+    if history.outcome.complete:
+        target = describe_target(task.until, history.missions_to_target, "mission", whole=whole)
     own: Mapping[str, object] = {
         **deepest(depth, depth_error),
         **first_harmonic(history.response_end[rows]),
@@ -224,16 +227,6 @@ def _values(task: Mission, history: MissionHistory) -> dict[str, Any]:
         "error_estimate": history.error_estimate if counts[-1] > 0.0 else 0.0,
         "last_mission": min(history.last_mission, float(counts[-1])) if is_state else math.nan,
         "largest_wear_depth": float(last.max(initial=0.0)) if reached.size else math.nan,
-        "message": "; ".join(filter(None, (history.message, _of_target(task, history)))),
+        "message": "; ".join(filter(None, (history.message, target))),
     }
     return named((*task.variables, *OF_A_MISSION), own, history)
-
-
-def _of_target(task: Mission, history: MissionHistory) -> str:
-    if task.until is None or not history.outcome.complete:
-        return ""
-    if math.isnan(history.missions_to_target):
-        return f"{task.until.quantity} stays below {task.until.value:g}"
-    if history.last_mission < task.missions[-1]:
-        return f"at its target at mission {show_count(round(history.missions_to_target))}: later ones are not computed"
-    return ""

@@ -20,13 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
-from solver.settings import Automatic, SolverSettings
+from solver.settings import Automatic, SolverSettings, WearTarget
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
+from studyrunner.units import show_count
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -271,6 +272,18 @@ def deepest(depth: NDArray[np.float64], error: NDArray[np.float64]) -> dict[str,
     pair = np.nan_to_num(depth).argmax(axis=1)[:, None]
     of_deepest = np.take_along_axis(error, pair, axis=1)[:, 0]
     return {"wear_depth_max": depth.max(axis=1, initial=0.0), "wear_depth_max_error": of_deepest}
+
+
+def describe_target(until: WearTarget | None, reached: float, counted: str, *, whole: bool) -> str:
+    """That the target of a history was not reached, or that what comes after it is not computed; else empty.
+
+    reached: count at which it was reached, else NaN. counted: what that counts. whole: whether all counts are computed.
+    """
+    if until is None or (whole and not math.isnan(reached)):
+        return ""
+    if math.isnan(reached):
+        return f"{until.quantity} stays below {until.value:g}"
+    return f"at its target at {counted} {show_count(round(reached))}: later {counted}s are not computed"
 
 
 def named(names: Sequence[str], own: Mapping[str, Any], source: object) -> dict[str, Any]:

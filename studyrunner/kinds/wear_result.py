@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.results.verdict import describe_cut_off, judge, last_error
-from studyrunner.kinds.task import PointResult, deepest, first_harmonic, named
+from studyrunner.kinds.task import PointResult, deepest, describe_target, first_harmonic, named
 from studyrunner.kinds.wear import History, Integrated
 from studyrunner.units import describe_reach, show_count
 from studyrunner.variables import KEPT
@@ -65,7 +65,7 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
-        "message": message or _of_target(task, history, known, target, life_error, whole=whole),
+        "message": message or (describe_target(task.until, target, "cycle", whole=whole) if known.size else ""),
     }
     values = _at_counts(history, task.variables, slower, rows, reached) | named(tuple(KEPT), own, history)
     return PointResult(scaled.points, values, place)
@@ -84,26 +84,6 @@ def _end_of_shared(
         return describe_cut_off(history.cut_off_cycle / slower)
     worn = float(history.worn_volume_error[known[-1]])
     return describe_reach(last, math.inf if task.to_the_end is not None else task.cycles[-1], worn)
-
-
-def _of_target(
-    task: History, history: WearHistory, known: NDArray[np.intp], target: float, error: float, *, whole: bool
-) -> str:
-    """That the target of a history was not reached, or that the counts after it are not computed; else empty.
-
-    known: its rows that were reached. error: of the count `target`. whole: whether these are all.
-    """
-    if task.until is None or not known.size:
-        return ""
-    if not math.isnan(target):
-        at = f"at its target at cycle {show_count(round(target))} +- {error:.2g}"
-        return "" if whole else f"{at}: later counts are not computed"
-    quantity, below = task.until.quantity, f"{task.until.quantity} stays below {task.until.value:g}"
-    if quantity == "frequency_shift":
-        return below
-    deepest, volume = history.wear_depth[known[-1]].max(initial=0.0), history.worn_volume[known[-1]]
-    value, unit = (deepest, "m") if quantity == "wear_depth" else (volume, "m3")
-    return f"{below} {unit}: it is {value:.3g} {unit} at the last count"
 
 
 def _at_counts(

@@ -143,7 +143,7 @@ def test_a_target_ends_the_missions(blocks):
     assert 100.0 < slow < 200.0
     assert fast == pytest.approx(0.5 * slow, rel=0.05)
     assert (result.missions_to_target_error > 0.0).all()
-    assert all("later ones are not computed" in message for message in result.message.values.ravel())
+    assert all("later missions are not computed" in message for message in result.message.values.ravel())
     assert summary(result).life.count.value == fast
 
 

@@ -79,7 +79,7 @@ def test_points_end_at_their_target_each_at_its_own_count():
     # nothing wears, nothing is reached
     still = run(*SHORT, "axes.wear_coefficient=0", "slow_time.until={worn_volume=1e-12}")
     assert np.isnan(still.cycles_to_target.item())
-    assert "stays below 1e-12 m3: it is 0 m3" in still.message.item()
+    assert "stays below 1e-12" in still.message.item()
 
 
 END = ("axes.frequency=160", "axes.sweep=ramp", "slow_time.cycles=inf", "slow_time.outputs=6", "solver.harmonics=3")
