@@ -130,9 +130,10 @@ class Mission(Task):
         # with those before, for the wear of one
         read = tuple(sorted({0, 1} | kept | {max(number - 1, 0) for number in kept}))
         first = cast("Direction", self.first)
-        mission = of_solver.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
-        history = integrate_missions(mission, note, self.resume)
-        yield PointResult(self.points(0), _values(self, history))
+        asked = of_solver.MissionRequest(
+            blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first
+        )
+        yield PointResult(self.points(0), _values(self, integrate_missions(asked, note, self.resume)))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""

@@ -32,7 +32,7 @@ from studyrunner.system.machine import MachineFaultError, tells_of_machine
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.results.history import StartState
-    from solver.wear.integrate import WearRequest
+    from solver.wear.problem import WearRequest
 
 COST_AT_REST = 0.01
 """Estimated time of a history in which nothing wears, over the time of a history with steps."""
@@ -275,8 +275,7 @@ class History(_FromRest):
                 yield replace(build_result(self, each, history, self.results[place][1]), place=place)
 
     def _asked(self, integrated: Integrated) -> WearRequest:
-        from solver.wear.integrate import WearRequest
-        from solver.wear.step import steps_of
+        from solver.wear.problem import WearRequest, steps_of
 
         counts: NDArray[np.float64] | ToTheEnd
         if self.to_the_end is not None and not integrated.unworn:

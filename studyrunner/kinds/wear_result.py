@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from solver.results.history import WearHistory
-from solver.results.verdict import describe_cut_off, judge, last_error
+from solver.results.history import WearHistory, describe_cut_off, judge, last_error
 from studyrunner.kinds.task import PointResult, deepest, describe_target, first_harmonic, named
 from studyrunner.kinds.wear import History, Integrated
 from studyrunner.units import describe_reach, show_count
