@@ -250,15 +250,13 @@ def _answer(path: Path) -> tuple[str, ...]:
     # where they are used: they take a second to load
     from studyrunner.result.opening import open_result
     from studyrunner.summary.answer import summary
-    from studyrunner.summary.lines import summary_lines
 
     try:
         with open_result(path) as dataset:
-            found = summary(dataset)
+            return summary(dataset).lines
     except UserError as error:
         # the result is there all the same, but larger than what is read
         return (f"no summary: {error}",)
-    return tuple(summary_lines(found))
 
 
 if __name__ == "__main__":

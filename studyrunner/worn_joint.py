@@ -71,7 +71,7 @@ def compute_worn_joint(
     with result.dataset:
         if result.has_modes or result.blocks is not None:
             raise UserError(str(path), "kind of study", None, "give a result of wear histories")
-        shown, common = result.shown_point(), _overrides(result)
+        shown, common = result.shown, _overrides(result)
         last = result.last_reached(shown)
         title = f"worn by {result.cycle_label(last)} at {result.describe(shown, ('frequency', *result.varying))}"
         given, found = {**common, "scene.worn": _depths(result, shown, last)}, {}
@@ -111,7 +111,7 @@ def compute_worn_joint(
 
 def _overrides(result: Result) -> dict[str, Any]:
     """Keys of a study of the shown point alone, new and without wear."""
-    shown, given = result.shown_point(), dict[str, Any]()
+    shown, given = result.shown, dict[str, Any]()
     for name in result.axes:
         value = result.dataset[name].values[shown[name]].item()
         if name == "sample":

@@ -86,7 +86,7 @@ class Entry:
         if isinstance(drawn, str):
             return Missing(self.name, title, drawn)
         named = {"point": ("frequency", "scheme", *shown.varying, *shown.fixed), "course": (axis or "frequency",)}
-        where = shown.describe(shown.shown_point(), named.get(self.at, ()))
+        where = shown.describe(shown.shown, named.get(self.at, ()))
         title = f"{title}: {where}" if where else title
         if isinstance(drawn, Table):
             return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, how))

@@ -111,7 +111,7 @@ class RootSurface:
 
 def read_root(result: Result) -> RootSurface | None:
     """The faces of a file; None where it has no mesh, no positions of pairs, or no pairs on its mesh."""
-    pairs = contact_pairs(result, result.shown_point())
+    pairs = contact_pairs(result, result.shown)
     if not np.isfinite(pairs.position).all() or not result.has(*MESH):
         return None
     nodes, faces, parts = read_mesh(result)

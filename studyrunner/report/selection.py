@@ -40,7 +40,7 @@ def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, 
     The axes `first` are split first, then the others, each whole or not at all; the rest stays at the shown point.
     """
     order = [name for name in dict.fromkeys((*first, *result.axes)) if name in result.varying and name not in free]
-    shown = {name: index for name, index in result.shown_point().items() if name not in free}
+    shown = {name: index for name, index in result.shown.items() if name not in free}
     sizes, split, number = result.dataset.sizes, list[str](), 1
     for name in order:
         if number * sizes[name] <= limit:

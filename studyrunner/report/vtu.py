@@ -50,7 +50,7 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> int:
     """
     import meshio
 
-    shown = result.shown_point()
+    shown = result.shown
     fields = {"wear_depth": depths(result, shown)} if has_depths(result) else {}
     fields |= {name: result.at(name, shown).values for name in FIELDS if name not in fields and result.has(name)}
     units = {name: str(result.dataset[name].attrs.get("units", "1")) for name in fields if result.has(name)}

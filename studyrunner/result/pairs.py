@@ -121,7 +121,7 @@ def of_scene(result: Result, point: Point, names: Collection[str] = OF_PAIRS) ->
 
 def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
     """As `of_scene`, of the point that figures of a single point show."""
-    return of_scene(result, result.shown_point(), names)
+    return of_scene(result, result.shown, names)
 
 
 def pairs_of_scene(result: Result, point: Point) -> NDArray[np.intp]:
@@ -231,7 +231,7 @@ def _parallel_lines(
 def find_scar(result: Result) -> Scar | None:
     """The contact of the shown scene where it is one of a cylinder or a sphere on a flat; None for other scenes."""
     planes = _MIRRORED.get(str(result.study.get("scene", {}).get("model", "")), 0)
-    x, y, _ = contact_pairs(result, result.shown_point()).position.T
+    x, y, _ = contact_pairs(result, result.shown).position.T
     if not planes or not np.isfinite([x, y]).all():
         return None
     pairs, width = np.arange(x.size), 0.0

@@ -248,7 +248,7 @@ class Result:
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
         """Cycle counts that the file holds; where each point has its own those of the shown point."""
-        return self.counts(self._shown) if self.has("cycle_count") else self.counts({})
+        return self.counts(self.shown) if self.has("cycle_count") else self.counts({})
 
     def counts(self, point: Point) -> NDArray[np.float64]:
         """Cycle counts of one point, NaN for outputs that it has not.
@@ -265,7 +265,7 @@ class Result:
     def last_reached(self, point: Point) -> int:
         """Index of the last cycle count at which a point holds values: one at its target has none after it."""
         counts = self.counts(point)
-        last = self.last_cycle[tuple(point[name] for name in self.axes)]
+        last = self.last_cycle[self.place(point)]
         reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))
         return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
 
@@ -273,15 +273,12 @@ class Result:
         """A kept cycle count in words."""
         return show_cycles(float(self.cycles[index]), self.counted)
 
-    def shown_point(self) -> dict[str, int]:
+    @cached_property
+    def shown(self) -> dict[str, int]:
         """The point that figures of a single point show: of `best_known` the one with the largest final worn volume.
 
         Where nothing is worn the one with the largest response at first. Other points count only where there is none.
         """
-        return dict(self._shown)
-
-    @cached_property
-    def _shown(self) -> dict[str, int]:
         measures = [np.ones(self.computed.shape)]
         if self.has_modes:
             amplitude = self.dataset["modal_amplitude"].broadcast_like(self.dataset["outcome"])
@@ -313,6 +310,10 @@ class Result:
     def point_at(self, place: Sequence[Any] | NDArray[np.intp]) -> dict[str, int]:
         """The point at a place in an array of points."""
         return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
+
+    def place(self, point: Point) -> tuple[int, ...]:
+        """The place of a point in an array of points."""
+        return tuple(point[name] for name in self.axes)
 
     def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""

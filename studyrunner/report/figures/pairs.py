@@ -33,7 +33,7 @@ _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _SLENDER, _LONGEST_NAME = 150, 4, 12
 
 def _worn_depth(result: Result) -> FloatArray | None:
     """Wear depths (n_contact,), m, of the shown point at its last count; None where nothing is worn."""
-    depth = last_depth(result, result.shown_point()) if has_depths(result) else np.zeros(1)
+    depth = last_depth(result, result.shown) if has_depths(result) else np.zeros(1)
     return depth if len(result.cycles) > 1 and float(depth.max()) > NO_DEPTH else None
 
 
@@ -43,7 +43,7 @@ def draw_depths(result: Result) -> Drawn:
         return result.lacks("wear_depth")
     if _worn_depth(result) is None or result.dataset.sizes["contact"] == 1:
         return None
-    shown, course = result.shown_point(), course_axis(result)
+    shown, course = result.shown, course_axis(result)
     choice = choose(result, [course] if course else [], _MOST_SERIES)
     series = {label: last_depth(result, {**shown, **point}) for point, label in choice}
     series = {label: depth for label, depth in series.items() if not np.isnan(depth).all()}
@@ -79,7 +79,7 @@ def _name_surfaces(panel: Axes, result: Result) -> None:
 
 def draw_pressure(result: Result) -> Drawn:
     """Mean pressure on each flank at the first and the last cycle count (Figs. 10, 11)."""
-    shown, scar = result.shown_point(), find_scar(result)
+    shown, scar = result.shown, find_scar(result)
     if scar is None and result.dataset.sizes["contact"] == 1:
         return None
     kept = sorted({0, result.last_reached(shown)})
@@ -108,7 +108,7 @@ def draw_profile(result: Result) -> Drawn:
     if not flanks:
         # without positions there is nothing that the wear depth per pair does not show
         return None
-    when, scale = result.cycle_label(result.last_reached(result.shown_point())), scale_for("m", depth)
+    when, scale = result.cycle_label(result.last_reached(result.shown)), scale_for("m", depth)
     if all(flank.cells is not None for flank in flanks):
         figure = _draw_profiles(flanks, depth, scale)
     else:
@@ -170,7 +170,7 @@ def _draw_scar(
 
 def _draw_scar_depth(result: Result, scar: Scar, after: FloatArray) -> Drawn:
     """Depth over x before and after wear, downwards as the surface sinks, with a measured one where there is one."""
-    shown, measured, error = result.shown_point(), result.measured, None
+    shown, measured, error = result.shown, result.measured, None
     last = result.last_reached(shown)
     scale = scale_for("m", after, *([measured.depth] if measured else []))
     if result.has("wear_depth_error"):

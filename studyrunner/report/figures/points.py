@@ -70,7 +70,7 @@ def draw_trends(result: Result) -> Drawn:
                 above.set_xlabel("")
                 above.tick_params(labelbottom=False)
             lowest[name] = panel
-    through = f"Blue: through {result.describe(result.shown_point())}, where most is worn; grey: all other combinations"
+    through = f"Blue: through {result.describe(result.shown)}, where most is worn; grey: all other combinations"
     return figure, through, f"Left out: {', '.join(left)}" if left else ""
 
 
@@ -92,7 +92,7 @@ def find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArr
 
 def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, errors: FloatArray) -> None:
     """A quantity, as shown, along an axis, through the shown point and all others."""
-    axis, shown, places = result.axes.index(name), result.shown_point(), result.dataset[name].values
+    axis, shown, places = result.axes.index(name), result.shown, result.dataset[name].values
     words = places.dtype.kind not in "fiu"
     order = np.arange(len(places)) if words else np.argsort(places, kind="stable")
     at = order.astype(float) if words else places[order].astype(float)

@@ -83,13 +83,13 @@ def _draw_new(
         at, values = course.values, scale(line)
         if result.has("branch"):
             # open where the sweep has jumped
-            jumps = np.flatnonzero(np.diff(course.read(result, "branch", {**result.shown_point(), **point})) != 0) + 1
+            jumps = np.flatnonzero(np.diff(course.read(result, "branch", {**result.shown, **point})) != 0) + 1
             at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
         # the second colour is that of the worn joint
         panel.plot(at, values, **course.line_style(place + (place > 0)), label=text)
         peaks.append(_show_peak(scale, line, course.values, text))
     if result.has("exact_response_amplitude"):
-        exact = course.read(result, "exact_response_amplitude", result.shown_point())[:, 0, number]
+        exact = course.read(result, "exact_response_amplitude", result.shown)[:, 0, number]
         if np.isfinite(exact).any():
             panel.plot(course.values, scale(exact), color="0.5", linewidth=5, alpha=0.45, zorder=1, label="exact")
     fold = result.dataset.get("fold_frequency")
@@ -171,7 +171,7 @@ def draw_fretting(result: Result) -> Drawn:
     """Tangential force over tangential displacement, one row a direction."""
     loops = _read_loops(result)
     if not loops:
-        depth = last_depth(result, result.shown_point()) if has_depths(result) else np.zeros(1)
+        depth = last_depth(result, result.shown) if has_depths(result) else np.zeros(1)
         deepest = int(result.dataset["contact"].values[np.argmax(np.nan_to_num(depth))])
         return f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
     rows: dict[str, _Curves] = {}
@@ -234,7 +234,7 @@ def find_loops(result: Result, point: Point) -> list[int]:
 
 def _read_loops(result: Result) -> dict[int, xr.Dataset]:
     """Loops of the most worn pairs at the first and last count: those computed again, or those of the file."""
-    point, source = result.shown_point(), result.recomputed.get("loops")
+    point, source = result.shown, result.recomputed.get("loops")
     if source is None and find_loops(result, point):
         source = result.dataset[["loop_displacement", "loop_force"]].isel(point)
     if source is None:
@@ -278,7 +278,7 @@ def _how_made(result: Result, loops: Mapping[int, xr.Dataset]) -> str:
     """How loops of a worn joint were computed again, or which of the file are not shown."""
     if "loops" in result.recomputed:
         return str(result.recomputed["loops"].attrs["how"])
-    others = ", ".join(str(pair) for pair in find_loops(result, result.shown_point()) if pair not in loops)
+    others = ", ".join(str(pair) for pair in find_loops(result, result.shown) if pair not in loops)
     return f"The file also holds loops of the pairs {textwrap.shorten(others, 40)}" if others else ""
 
 

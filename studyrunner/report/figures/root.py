@@ -48,7 +48,7 @@ def _read_surface(result: Result) -> RootSurface | None:
 
 def draw_root(result: Result) -> Drawn:
     """The worn shape of the shown point, coloured with its wear depth; the mean pressure where nothing is worn."""
-    shown, surface = result.shown_point(), _read_surface(result)
+    shown, surface = result.shown, _read_surface(result)
     if surface is None or not (has_depths(result) or result.has("mean_pressure")):
         return None
     last = result.last_reached(shown)
@@ -69,7 +69,7 @@ def draw_root(result: Result) -> Drawn:
 
 def draw_fraction(result: Result, name: str) -> Drawn:
     """Fraction of the period in which pairs slip, or are open, at the shown point: a large amplitude."""
-    values, surface = np.asarray(result.at(name, result.shown_point()).values, dtype=float), _read_surface(result)
+    values, surface = np.asarray(result.at(name, result.shown).values, dtype=float), _read_surface(result)
     if surface is None:
         return None
     if not np.isfinite(values).all():
@@ -133,7 +133,7 @@ def draw_sector(result: Result) -> Drawn:
         view = from_aslant(nodes, len(faces))
         paint_faces(panels[0], nodes, faces, rgb(tuple(names.tolist()), body), view)
         draw_scale_bar(panels[0], nodes, view)
-    said = f"Of the sector at {result.describe(result.shown_point(), result.fixed)}" if result.fixed else ""
+    said = f"Of the sector at {result.describe(result.shown, result.fixed)}" if result.fixed else ""
     return figure, _draw_frequencies(result, panels[-1]), said
 
 

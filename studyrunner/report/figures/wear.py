@@ -75,7 +75,7 @@ def _at_the_end(result: Result) -> str:
 def _choose_lines(result: Result, *free: str) -> Choice:
     """Combinations that have a line over slow time each, at the shown point along `free`."""
     choice = choose(result, free, _MOST_LINES)
-    return replace(choice, points=tuple({**result.shown_point(), **point} for point in choice.points))
+    return replace(choice, points=tuple({**result.shown, **point} for point in choice.points))
 
 
 def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: Choice, scale: Scale) -> float:
@@ -102,7 +102,7 @@ def _mark_events(result: Result, panel: Axes, point: Point, cycles: Scale, scale
     if np.isfinite(jump):
         volume = scale(np.interp(jump, counts, worn))
         panel.plot(cycles(jump), volume, "*", markersize=12, label="branch lost, jump", color=colour)
-    if not result.computed[tuple(point[name] for name in result.axes)] and reached.size:
+    if not result.computed[result.place(point)] and reached.size:
         last = reached[-1]
         panel.plot(cycles(float(counts[last])), scale(worn[last]), "X", markersize=9, label="ended early", color=colour)
     if result.has("exact_worn_volume"):
@@ -112,7 +112,7 @@ def _mark_events(result: Result, panel: Axes, point: Point, cycles: Scale, scale
 
 def _with_error(result: Result, point: Point) -> str:
     """The error of a final worn volume in words: " ± 3 %", with what is to be said where it is above rtol."""
-    place = tuple(point[name] for name in result.axes)
+    place = result.place(point)
     if not result.computed[place] or not 0.0 < result.errors[place] < np.inf:
         return ""
     remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
@@ -212,7 +212,7 @@ def draw_map(result: Result, name: str) -> Drawn:
 def _read_blocks(result: Result) -> xr.Dataset:
     """What belongs to blocks at the shown point."""
     assert result.blocks is not None
-    return result.blocks.isel(result.shown_point(), missing_dims="ignore")
+    return result.blocks.isel(result.shown, missing_dims="ignore")
 
 
 def list_blocks(result: Result) -> Drawn:

@@ -15,13 +15,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from studyrunner.coordinates import COORDINATES
 from studyrunner.report.drawing import Drawing, Item, Missing, Table
 from studyrunner.report.page.data import build_page_data, build_root_numbers
-from studyrunner.result.certainty import advise_ended, describe_ended, describe_ends
+from studyrunner.result.certainty import advise_ended, describe_ended
 from studyrunner.result.view import CONVERGED, Result
 from studyrunner.summary.answer import summarise
-from studyrunner.summary.lines import summary_rows
 from studyrunner.system.progress import count
 from studyrunner.units import show_number, units_of
 from studyrunner.user_error import show_text
@@ -96,8 +97,7 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
         title=result.title,
         file=show_text(result.path.name),
         css=own.joinpath("page.css").read_text("utf-8"),
-        answer=summary_rows(summarise(result)),
-        ends=describe_ends(result),
+        answer=summarise(result).rows,
         endings=_endings(result),
         facts=_facts(result),
         study=result.dataset.attrs.get("study"),
@@ -115,14 +115,20 @@ def _endings(result: Result) -> list[tuple[str, list[str]]]:
     numbers, found = Counter(result.dataset["outcome"].values.ravel().tolist()), []
     for number, ending in sorted(result.endings.items()):
         if numbers[number] and number != CONVERGED:
-            meaning = " ".join((ending.sentence, *advise_ended(result, number)))
+            meaning = f"{ending.sentence} {advise_ended(result, number)}".rstrip()
             found.append((f"{count(numbers[number], 'point')}: {meaning}", describe_ended(result, number)))
     return found
 
 
 def _facts(result: Result) -> list[tuple[str, str]]:
-    """Names and values: axes, contact pairs, versions."""
-    facts = []
+    """Names and values: points, axes, contact pairs, versions."""
+    ends = {
+        "computed to the end": result.computed,
+        "ended early with values up to there": result.has_values & ~result.computed,
+        "without a result": ~result.has_values,
+    }
+    ended = ", ".join(f"{np.count_nonzero(where)} {words}" for words, where in ends.items() if where.any())
+    facts = [("points", f"{result.computed.size}: {ended}")]
     for name in result.axes:
         axis = result.dataset[name]
         numbers, units = axis.dtype.kind in "fiu", units_of(axis)

@@ -287,7 +287,7 @@ def test_the_most_worn_of_many_loops_are_shown_about_their_means_and_one_tangent
 
 def test_trends_are_those_of_the_file():
     result = make_result(wear_coefficient=(1e-12, 5e-12, 5e-11), sweep=("up", "down"))
-    last, place = result.dataset.isel(cycle=-1), tuple(result.shown_point()[name] for name in result.axes)
+    last, place = result.dataset.isel(cycle=-1), tuple(result.shown[name] for name in result.axes)
     worn, largest = last["worn_volume"].values, last["response_amplitude"].isel(response=0).max("frequency").values
     panels = draw_figure(result, "trends").figure.axes
     rows = [[panel for panel in panels if panel.get_subplotspec().rowspan.start == row] for row in (0, 1)]

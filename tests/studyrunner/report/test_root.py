@@ -106,7 +106,7 @@ def test_the_faces_near_the_contact_are_kept(tmp_path):
 def test_the_figures_of_the_dovetail(result, surface):
     worn, numbers = draw_figure(result, "worn_root"), draw_figure(result, "pair_numbers")
     assert draw_figure(result, "whole_disk").figure.axes
-    depth = result.at("wear_depth", result.shown_point(), -1).values
+    depth = result.at("wear_depth", result.shown, -1).values
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
     assert f"{surface.exaggeration(float(depth.max())):g} times" in worn.caption.replace("\u00a0", "")
     written = [text.get_text() for panel in numbers.figure.axes for text in panel.texts]
@@ -146,7 +146,7 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder, result, cycle):
     for name in vtu.FIELDS:
         units = dataset[name].attrs["units"]
         field = mesh.point_data[name if units == "1" else f"{name} ({units})"]
-        np.testing.assert_array_equal(field[there], result.at(name, result.shown_point(), cycle).values[pair])
+        np.testing.assert_array_equal(field[there], result.at(name, result.shown, cycle).values[pair])
     depth, moved = mesh.point_data["wear_depth (m)"][there], mesh.point_data["worn_displacement (m)"]
     # into the blade on one side of the joint, into the disk on the other
     along = np.einsum("ij,ij->i", moved[there], pairs.frames[pair, 0])

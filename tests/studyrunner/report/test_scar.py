@@ -28,7 +28,7 @@ def half_space(model):
 )
 def test_the_scar_is_symmetric_and_that_of_the_pairs(model, place, row):
     result = half_space(model)
-    depth = result.dataset["wear_depth"].isel(result.shown_point()).isel(cycle=-1).values
+    depth = result.dataset["wear_depth"].isel(result.shown).isel(cycle=-1).values
     panel = draw_figure(result, "worn_profile").figure.axes[place]
     (line,) = [each for each in panel.lines if str(each.get_label()).startswith("after")]
     at, drawn = np.array(line.get_xdata()), np.array(line.get_ydata())

@@ -44,13 +44,11 @@ def samples():
 
 def test_a_scene_has_its_own_pairs(meshes):
     shown = of_shown_scene(meshes)
-    assert shown.shown_point() == meshes.shown_point() | {"mesh": 0}
+    assert shown.shown == meshes.shown | {"mesh": 0}
     assert [shown.dataset.sizes["contact"], sum(len(flank.pairs) for flank in find_flanks(shown))] == [FEW, FEW]
-    assert of_scene(meshes, {**meshes.shown_point(), "mesh": 1}).dataset.sizes["contact"] == MANY
+    assert of_scene(meshes, {**meshes.shown, "mesh": 1}).dataset.sizes["contact"] == MANY
     assert read_root(shown) is not None
-    np.testing.assert_array_equal(
-        shown.at("wear_depth", shown.shown_point()), meshes.at("wear_depth", meshes.shown_point())[:, :FEW]
-    )
+    np.testing.assert_array_equal(shown.at("wear_depth", shown.shown), meshes.at("wear_depth", meshes.shown)[:, :FEW])
 
 
 def test_figures_show_the_pairs_of_the_shown_scene_and_the_depth_of_the_last_count(meshes, samples):
@@ -59,7 +57,7 @@ def test_figures_show_the_pairs_of_the_shown_scene_and_the_depth_of_the_last_cou
     assert "mesh 1" in items["worn_profile"].title
     items = {item.name: item for item in draw_report(samples)}
     assert "worn_profile" in items
-    deepest = int(np.argmax(samples.at(LAST_DEPTH, samples.shown_point()).values))
+    deepest = int(np.argmax(samples.at(LAST_DEPTH, samples.shown).values))
     assert f"at pair {deepest}" in items["wear_depth"].caption
 
 
@@ -80,5 +78,5 @@ def test_the_root_of_one_scene_is_written(kind, n_files, request, tmp_path):
     result = request.getfixturevalue(kind)
     assert find_writer(result)(tmp_path) == n_files
     mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
-    expected = last_depth(result, result.shown_point())
+    expected = last_depth(result, result.shown)
     assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)
