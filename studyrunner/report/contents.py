@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, cast
@@ -25,7 +25,7 @@ _QUANTILES = (
 )
 CAPTIONS = {
     "blocks": "Cycles of one mission. A passage whose rate is far below (zeta f)² wears as its steady states do",
-    "block_shares": f"Above, shares of the blocks in the volume worn in one mission; below, worn volumes. {_BANDS}",
+    "block_shares": f"Above, shares of the blocks in the volume worn in one mission. {_BANDS}",
     "block_responses": f"Amplitude of the first harmonic in the mission that ends at the number. {_BANDS}",
     "natural_frequency": _BARS,
     "damping_ratio": _BARS,
@@ -39,8 +39,6 @@ CAPTIONS = {
     "final_worn_volume": f"{_OTHERS}. Bars: estimated errors; of a point that ended early, what was worn by then",
     "worn_volume_map": f"{_OTHERS}. Hatched: no result",
     "wear_rate_map": f"{_OTHERS}. Hatched: no result",
-    "response_after_own_wear": "Each mark is another joint, which wore at its own frequency: the marks are no response"
-    " curve. That they are low where the new joint resonates does not mean that wear protects",
     "excitation_frequency": _BANDS,
     "trends": "Bars: estimated error of the worn volume",
     "wear_depth": "Of both surfaces together",
@@ -105,8 +103,6 @@ class Entry:
 
 _ONE: dict[str, Any] = {"scene": OF_PAIRS, "at": "point"}
 _BLOCK: dict[str, Any] = {"kinds": (MISSIONS,), "at": "point"}
-_SHARES: dict[str, Any] = {**_BLOCK, "needs": ("block_worn_volume", "block_share")}
-_OF_BLOCKS: dict[str, Any] = {**_BLOCK, "needs": ("response_amplitude",)}
 _MODE: dict[str, Any] = {"kinds": (MODES,)}
 _WEAR: dict[str, Any] = {"kinds": (WEAR,)}
 _OF_ONE = {**_WEAR, **_ONE}
@@ -122,10 +118,14 @@ def _of(draw: Callable[..., Drawn], name: str, title: str, **options: Any) -> En
     return Entry(name, title, partial(draw, name=options["needs"][-1]), **options)
 
 
+def _of_blocks(name: str, title: str, names: Mapping[str, str]) -> Entry:
+    return Entry(name, title, partial(wear.draw_blocks, names=names), needs=tuple(names), **_BLOCK)
+
+
 FIGURES = (
-    Entry("blocks", "Blocks of the mission with their wear (table)", wear.list_blocks, **_BLOCK),
-    Entry("block_shares", "Wear by block over the missions", wear.draw_shares, **_SHARES),
-    Entry("block_responses", "Vibration of each block over the missions", wear.draw_block_responses, **_OF_BLOCKS),
+    Entry("blocks", "Blocks of the mission with their wear (table)", wear.list_blocks, needs=wear.LISTED, **_BLOCK),
+    _of_blocks("block_shares", "Wear by block over the missions", wear.SHARES),
+    _of_blocks("block_responses", "Vibration of each block over the missions", wear.RESPONSES),
     _of(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude", **_MODE),
     _of(response.draw_mode, "damping_ratio", "Damping ratio of a mode over its amplitude", **_MODE),
     Entry("worn_volume_bands", "Worn volume of the samples over {slow}", points.draw_bands),
@@ -138,12 +138,6 @@ FIGURES = (
     _of(wear.draw_map, "wear_rate_map", "Wear rate over {over} and {slow}", **_WORN),
     Entry("frequency_response", "Frequency response of one joint, new and worn", response.draw_responses, **_RESPONSE),
     Entry(
-        "response_after_own_wear",
-        "Response of different joints, each after wear at its own frequency",
-        response.draw_after_wear,
-        **_RESPONSE,
-    ),
-    Entry(
         "excitation_frequency", "Frequency of an excitation that follows the resonance", wear.draw_excitation, **_WEAR
     ),
     Entry("trends", "Trends along the axes of the study", points.draw_trends),
@@ -152,9 +146,14 @@ FIGURES = (
     Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, **_ONE),
     Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, **_ONE),
     Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, **_OF_ONE, needs=("mean_pressure",)),
-    Entry("fretting_loops", "Fretting loops", response.draw_fretting, **_OF_ONE),
-    Entry("normal_load", "Normal force through a period", response.draw_normal, **_OF_ONE),
-    Entry("pair_motion", "Motion of the pairs in the contact plane", response.draw_motion, **_OF_ONE),
+    Entry("fretting_loops", "Fretting loops", partial(response.draw_loops, name="fretting_loops"), **_OF_ONE),
+    Entry("normal_load", "Normal force through a period", partial(response.draw_loops, name="normal_load"), **_OF_ONE),
+    Entry(
+        "pair_motion",
+        "Motion of the pairs in the contact plane",
+        partial(response.draw_loops, name="pair_motion"),
+        **_OF_ONE,
+    ),
     _of(root.draw_fraction, "slip_fraction", "Where the joint slips", **_MODE, **_ONE),
     _of(root.draw_fraction, "open_fraction", "Where the joint opens", **_MODE, **_ONE),
     Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS, **_ALL),

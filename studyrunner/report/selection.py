@@ -35,12 +35,13 @@ class Choice:
 
 
 def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:
-    """At most `limit` combinations of the axes that are not `free`; that of the shown point is among them.
+    """At most `limit` combinations of the axes that are not `free`, along which each is the shown point.
 
-    The axes `first` are split first, then the others, each whole or not at all; the rest stays at the shown point.
+    The combination of the shown point is among them. The axes `first` are split first, then the others, each whole or
+    not at all; the rest stays at the shown point.
     """
     order = [name for name in dict.fromkeys((*first, *result.axes)) if name in result.varying and name not in free]
-    shown = {name: index for name, index in result.shown.items() if name not in free}
+    shown = result.shown
     sizes, split, number = result.dataset.sizes, list[str](), 1
     for name in order:
         if number * sizes[name] <= limit:

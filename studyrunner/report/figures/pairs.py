@@ -45,7 +45,7 @@ def draw_depths(result: Result) -> Drawn:
         return None
     shown, course = result.shown, course_axis(result)
     choice = choose(result, [course] if course else [], _MOST_SERIES)
-    series = {label: last_depth(result, {**shown, **point}) for point, label in choice}
+    series = {label: last_depth(result, point) for point, label in choice}
     series = {label: depth for label, depth in series.items() if not np.isnan(depth).all()}
     (figure, panel), pairs = plot.new_panel(3.3), result.dataset["contact"].values
     scale, apart = scale_for("m", *series.values()), 0.8 / len(series) if len(pairs) <= _MANY_PAIRS else 0.0

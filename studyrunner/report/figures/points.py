@@ -144,11 +144,9 @@ def _choose(
 ) -> tuple[list[xr.Dataset], list[str], str]:
     """Statistics of combinations of the axes beside samples and `free`, their labels, a sentence on the others."""
     choice = choose(result, [SAMPLE, *free], limit)
-    return (
-        [statistics.isel(point, missing_dims="ignore") for point in choice.points],
-        list(choice.labels),
-        choice.sentence,
-    )
+    others = [name for name in result.axes if name not in free]
+    points = [statistics.isel({name: point[name] for name in others}, missing_dims="ignore") for point in choice.points]
+    return points, list(choice.labels), choice.sentence
 
 
 def draw_bands(result: Result) -> Drawn:

@@ -97,7 +97,6 @@ def test_each_kind_of_result_has_its_figures_and_they_can_be_read(case):
 LINES = {
     "worn_volume": ("worn_volume", 1e9, {"frequency": 2}),
     "final_worn_volume": ("worn_volume", 1e9, {"cycle": -1}),
-    "response_after_own_wear": ("response_amplitude", 1e3, {"cycle": -1}),
     "wear_depth": ("wear_depth", 1e6, {"frequency": 2, "cycle": -1}),
 }
 LOOPS = {
@@ -205,7 +204,7 @@ def test_final_volumes_have_bars_and_marks():
 
 def test_frequency_response_of_both_sweeps_is_open_at_the_fold():
     result = make_result(sweep=["up", "down"], scheme=["implicit"])
-    result.dataset["branch"][2:, ..., 0], result.dataset["fold_frequency"][2, ..., 0] = 1, 201.4
+    result.dataset["branch"][2:, ..., 0] = 1
     lines = numbers_of(draw_figure(result, "frequency_response"))
     for number, sweep in enumerate(("up", "down")):
         x, y, _ = lines[f"|sweep {sweep}, new joint"].T
@@ -213,20 +212,15 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold():
         expected = 1e3 * values_of(result, "response_amplitude", sweep=number, cycle=0)
         np.testing.assert_allclose([x[known], y[known]], [result.dataset["frequency"].values, expected], rtol=1e-8)
         assert np.flatnonzero(~known).tolist() == ([2] if number == 0 else [])
-    (fold,) = [line for label, line in lines.items() if label.startswith("|fold, sweep up")]
-    assert set(fold[:, 0]) == {201.4}
 
 
-def test_worn_joints_have_response_curves_and_joints_that_wore_differently_are_marks():
+def test_worn_joints_have_response_curves():
     made = make_result(scheme=["implicit"], wear_coefficient=[0.0, 1e5])
     worn = Result(made.path, made.dataset.rename(wear_coefficient="worn_cycle"))
     lines = numbers_of(draw_figure(worn, "frequency_response"))
     for number, label in enumerate(("|worn cycle 0 1/Pa", "|worn cycle 100 000 1/Pa")):
         expected = 1e3 * values_of(worn, "response_amplitude", worn_cycle=number, cycle=0)
         np.testing.assert_allclose(lines[label][:, 1], expected, rtol=1e-8)
-    drawn = draw_figure(make_result(), "response_after_own_wear").figure.axes[0].get_lines()
-    (own,) = [line for line in drawn if str(line.get_label()).startswith("implicit")]
-    assert own.get_linestyle() == "None"
 
 
 def test_an_exact_answer_is_drawn_beside_the_computed_one():
@@ -279,7 +273,6 @@ def test_the_most_worn_of_many_loops_are_shown_about_their_means_and_one_tangent
     assert [panel.get_title() for panel in drawing.figure.axes[:3]] == ["pair 9", "pair 10", "pair 11"]
     for line in drawing.figure.axes[0].lines[:2]:
         assert abs(np.mean(np.array(line.get_xdata())[:-1])) < 1e-9 * np.ptp(line.get_xdata())
-    assert "pair 9 3 mm " in drawing.caption
     only = result.dataset["loop_displacement"].where(result.dataset["component"] != "tangent_2")
     changed = replace(result, dataset=result.dataset.assign(loop_displacement=only))
     assert "pair_motion" not in {item.name for item in draw_report(changed)}
