@@ -128,8 +128,10 @@ FIGURES = (
     _of_blocks("block_responses", "Vibration of each block over the missions", wear.RESPONSES),
     _of(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude", **_MODE),
     _of(response.draw_mode, "damping_ratio", "Damping ratio of a mode over its amplitude", **_MODE),
-    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", points.draw_bands),
-    Entry("worn_volume_bands_course", "Worn volume of the samples over {over}", points.draw_bands_over_course),
+    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", partial(points.draw_bands, over="cycle")),
+    Entry(
+        "worn_volume_bands_course", "Worn volume of the samples over {over}", partial(points.draw_bands, over="course")
+    ),
     Entry("exceedance", "Probability of more wear", points.draw_exceedance),
     Entry("deciding_inputs", "What decides the worn volume", points.draw_deciding_inputs),
     Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, **_WORN, at="course"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -143,16 +143,14 @@ class Result:
     def over_points(
         self, name: str, reduce: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
-        """A number of each point, read some at a time. reduce: from values (n_points, ...) to (n_points,)."""
-
-        def reduced(part: xr.DataArray) -> NDArray[np.float64]:
-            values = np.asarray(part.transpose(*self.axes, ...).values, dtype=float)
+        """A number of each point, read some at a time. reduce: from values (..., n) of what follows the axes."""
+        values, axis = self.dataset[name].transpose(*self.axes, ...), max(self.axes, key=self.dataset.sizes.__getitem__)
+        length, parts = max(1, _AT_ONCE * values.sizes[axis] // values.size), []
+        for start in range(0, values.sizes[axis], length):
+            part = np.asarray(values.isel({axis: slice(start, start + length)}).values, dtype=float)
             # a copy: a view would keep the whole part in memory
-            return np.array(reduce(values.reshape(-1, *values.shape[len(self.axes) :])))
-
-        # in a function of its own, so that no part is in memory while the next one is read; `map` holds none either
-        parts = map(reduced, _in_slabs(self.dataset[name], self.axes))
-        return np.concatenate(list(parts)).reshape(self.computed.shape)
+            parts.append(np.array(reduce(part.reshape(*part.shape[: len(self.axes)], -1))))
+        return np.concatenate(parts, axis=self.axes.index(axis))
 
     @cached_property
     def endings(self) -> dict[int, Ending]:
@@ -241,7 +239,7 @@ class Result:
         """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
 
         def last(values: NDArray[np.float64]) -> NDArray[np.float64]:
-            return np.where(np.isnan(values[:, -1]), np.fmax.reduce(values, axis=1), values[:, -1])
+            return np.where(np.isnan(values[..., -1]), np.fmax.reduce(values, axis=-1), values[..., -1])
 
         return self.over_points("worn_volume", last)
 
@@ -279,23 +277,22 @@ class Result:
 
         Where nothing is worn the one with the largest response at first. Other points count only where there is none.
         """
-        measures = [np.ones(self.computed.shape)]
+        everywhere = has_slow_time = np.ones(self.computed.shape, np.bool_)
+        measures, outcome = [everywhere.astype(float)], self.dataset["outcome"]
         if self.has_modes:
-            amplitude = self.dataset["modal_amplitude"].broadcast_like(self.dataset["outcome"])
-            measures.insert(0, amplitude.transpose(*self.axes).values)
+            measures.insert(0, self.dataset["modal_amplitude"].broadcast_like(outcome).transpose(*self.axes).values)
         elif self.has("response_amplitude"):
-            amplitude = self.dataset["response_amplitude"].isel(cycle=0)
-            measures.insert(0, amplitude.max("response", skipna=False).transpose(*self.axes).values)
+            amplitude = self.dataset["response_amplitude"].isel(cycle=0).max("response", skipna=False)
+            measures.insert(0, amplitude.transpose(*self.axes).values)
         if not self.has_modes and self.has("worn_volume"):
             measures.insert(0, self.worn)
-        all_points = has_slow_time = np.ones(self.computed.shape, np.bool_)
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
-        wanted = xr.ones_like(self.dataset["outcome"], dtype=bool)
+        wanted = xr.ones_like(outcome, dtype=bool)
         for name in set(self.chosen) & set(self.varying):
             wanted = wanted & (self.dataset[name] == self.chosen[name])
         allowed, best = np.asarray(wanted.transpose(*self.axes).values), self.best_known
-        sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, all_points)
+        sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, everywhere)
         points = next(each & allowed for each in sets if (each & allowed).any())
         for measure in measures:
             known = np.where(points & np.isfinite(measure), measure, 0.0)
@@ -324,17 +321,6 @@ class Result:
             for name in self.axes
             if name in kept and name in point
         )
-
-
-def _in_slabs(values: xr.DataArray, axes: Sequence[str]) -> Iterator[xr.DataArray]:
-    """Parts of a variable along its axes, in their order, of which none is much larger than `_AT_ONCE`."""
-    if values.size <= _AT_ONCE or not axes:
-        yield values
-        return
-    axis, *others = axes
-    length = max(1, _AT_ONCE // (values.size // values.sizes[axis]))
-    for start in range(0, values.sizes[axis], length):
-        yield from _in_slabs(values.isel({axis: slice(start, start + length)}), others if length == 1 else [])
 
 
 def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -> Result:

@@ -266,7 +266,7 @@ def _deepest(result: Result, point: Point, at: int) -> Deepest:
 def _nothing(result: Result, best: NDArray[np.bool_]) -> NothingWore:
     slip = math.nan
     if result.has("slip_range"):
-        largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=(1, 2)))
+        largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=-1))
         slip = float(largest[best].max())
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
     where = f"at all {n_points} points" if n_points > 1 else f"at {where_is(result, result.shown)}"

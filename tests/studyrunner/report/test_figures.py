@@ -280,13 +280,11 @@ def test_the_most_worn_of_many_loops_are_shown_about_their_means_and_one_tangent
 
 def test_trends_are_those_of_the_file():
     result = make_result(wear_coefficient=(1e-12, 5e-12, 5e-11), sweep=("up", "down"))
-    last, place = result.dataset.isel(cycle=-1), tuple(result.shown[name] for name in result.axes)
-    worn, largest = last["worn_volume"].values, last["response_amplitude"].isel(response=0).max("frequency").values
+    last, at = result.dataset.isel(cycle=-1), tuple(result.shown[name] for name in result.axes)
     panels = draw_figure(result, "trends").figure.axes
-    rows = [[panel for panel in panels if panel.get_subplotspec().rowspan.start == row] for row in (0, 1)]
-    for row, axes, values in ((rows[0], (0, 1, 4, 5), worn), (rows[1], (1, 4, 5), largest[None])):
-        at = place if values is worn else (0, *place[1:])
-        for panel, axis in zip(row, axes, strict=True):
+    for number, values in enumerate((last["worn_volume"].values, last["response_amplitude"].isel(response=0).values)):
+        row = [panel for panel in panels if panel.get_subplotspec().rowspan.start == number]
+        for panel, axis in zip(row, (0, 1, 4, 5), strict=True):
             own = values[(*at[:axis], slice(None), *at[axis + 1 :])]
             (drawn,) = [np.asarray(line.get_ydata(), float) for line in panel.get_lines() if line.get_marker() == "o"]
             np.testing.assert_allclose(drawn / drawn.max(), own / own.max(), rtol=1e-12)
