@@ -135,11 +135,9 @@ def _report(options: argparse.Namespace) -> int:
             result = _compute(result, folder, options)
             status.start()
             page = folder / "index.html"
-            written = write_page(result, draw(draw_report(result), status), page)
+            shown = write_page(result, draw(draw_report(result), status), page)
             n_files = write_series(folder) if write_series else 0
-    shown = f"{count(written.n_drawings, 'figure')}, {count(written.n_tables, 'table')}, {written.n_missing} left out"
-    seconds = format_seconds(time.monotonic() - began)
-    print(f"{page}: {shown}, {written.n_bytes / 1e6:.1f} MB, {seconds}; open it in a browser")
+    print(f"{page}: {shown}, {format_seconds(time.monotonic() - began)}; open it in a browser")
     if options.vtu:
         print(f"{folder / SERIES}: time series of {count(n_files, 'VTU file')}; open it in ParaView")
     return WRITTEN
