@@ -53,17 +53,16 @@ def compute_worn_joint(
     point: Mapping[str, str] | None = None,
     progress: bool = True,
 ) -> dict[str, xr.Dataset]:
-    """What a result does not hold of one worn joint, from the wear depths that it holds.
-
-    path: result file with `wear_depth` or `wear_depth_last`, of wear histories. folder: for the result files of what is
-    computed; what is there already is not computed twice. point: values of axes, as text; by default the point that
-    wears most. The entries that are asked for:
+    """What a result does not hold of one worn joint, from the wear depths that it holds; what is asked for of:
 
     - "loops" of contact pairs: `loop_displacement`, m, and `loop_force`, N, (cycle, contact, phase, component), at the
       first count where the file holds its depths and at the last count;
     - "response": `response_amplitude`, m (cycle, frequency, response), and its relative error at the frequencies of the
       study; with a followed frequency over its range, and of the new joint as well;
     - "natural_frequencies": those of the sector with the joint stuck, Hz (nodal_diameter, mode).
+
+    path: result file of wear histories. folder: for the result files of what is computed; what is there already is not
+    computed twice. point: values of axes, as text; by default the point that wears most.
 
     Raises UserError where the file does not hold the depths, or the study has no such pairs or frequencies.
     """
@@ -98,13 +97,7 @@ def compute_worn_joint(
         if natural_frequencies:
             # nothing slips, and no state takes time
             asked = {**common, "axes.excitation_amplitude": 1e-9, "outputs.variables": ["natural_frequency", "mesh"]}
-            try:
-                states = _run(result, asked, folder / "worn_joint_frequencies.nc", progress)
-            except UserError as error:
-                if error.key != "outputs.variables":
-                    raise
-                model, remedy = result.study["scene"]["model"], "ask for none: this scene has none over nodal diameters"
-                raise UserError(str(path), "natural frequencies of scene.model", model, remedy) from None
+            states = _run(result, asked, folder / "worn_joint_frequencies.nc", progress)
             found["natural_frequencies"] = states[["natural_frequency"]].isel(cycle=0, drop=True)
     return {name: each.assign_attrs(title=title, how=_HOW) for name, each in found.items()}
 

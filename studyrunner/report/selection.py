@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from studyrunner.report.panels import FloatArray, line_style, set_log
 from studyrunner.result.view import Result
 from studyrunner.statistics.samples import SAMPLE
-from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, units_of
 
 _DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
@@ -23,14 +22,13 @@ _MANY = 60  # points from which markers are small
 
 @dataclass(frozen=True)
 class Choice:
-    """Points that a figure shows, with labels, and a sentence on combinations that are left out, or nothing."""
+    """Points that a figure shows, with labels, and a sentence where there are others. It iterates over both."""
 
     points: tuple[dict[str, int], ...]
     labels: tuple[str, ...]
     sentence: str
 
     def __iter__(self) -> Iterator[tuple[dict[str, int], str]]:
-        """Points with their labels."""
         return iter(zip(self.points, self.labels, strict=True))
 
 
@@ -50,19 +48,9 @@ def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, 
     split.sort(key=result.axes.index)
     places = itertools.product(*(range(sizes[name]) for name in split))
     points = tuple({**shown, **dict(zip(split, place, strict=True))} for place in places)
-    labels = tuple(result.describe(point, split) for point in points)
-    left = {name: sizes[name] for name in order if name not in split}
-    left |= {name: size for name, size in result.fixed.items() if name not in free}
-    fixed = [name for name in result.axes if name in left]
-    if not fixed:
-        return Choice(points, labels, "")
-    others = " and ".join(
-        count(left[name] - 1, "other sample")
-        if name == SAMPLE
-        else f"{count(left[name] - 1, 'other value')} of {name.replace('_', ' ')}"
-        for name in fixed
-    )
-    return Choice(points, labels, f"Shown for {result.describe(shown, fixed)}; the file also holds {others}.")
+    fixed = [name for name in result.axes if name in {*order, *result.fixed} - {*split, *free}]
+    sentence = f"Shown for {result.describe(shown, fixed)} alone" if fixed else ""
+    return Choice(points, tuple(result.describe(point, split) for point in points), sentence)
 
 
 @dataclass(frozen=True)

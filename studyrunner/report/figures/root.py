@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
 from studyrunner.report.figures.flanks import largest_pair
-from studyrunner.report.panels import COLOURS, MAP, FloatArray
+from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.root import (
     MESH,
     RootSurface,
@@ -87,9 +87,9 @@ def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale:
     figure, (panels,) = plot.new_panels(1, len(ratios), 3.4, width_ratios=ratios)
     norm = Normalize(0.0, scale(float(of_pairs.max())).item() or 1.0)
     at_nodes = np.full(len(nodes), np.nan)
-    at_nodes[surface.contact.nodes] = scale(of_pairs[surface.contact.pairs])
-    colours, own = rgb(surface.bodies, surface.body), surface.contact.flank >= 0
-    colours[own] = mpl.colormaps[MAP](norm(at_nodes[surface.faces[own]].mean(axis=1)))[:, :3]
+    at_nodes[surface.own] = scale(of_pairs[surface.pairs])
+    colours, own = rgb(surface.bodies, surface.body), surface.flank >= 0
+    colours[own] = mpl.colormaps[mpl.rcParams["image.cmap"]](norm(at_nodes[surface.faces[own]].mean(axis=1)))[:, :3]
     for panel, view in zip(panels, [views[-1], *close_ups], strict=True):
         faces = surface.faces[view.faces]
         paint_faces(panel, nodes, faces, colours[view.faces], view)

@@ -125,15 +125,6 @@ def _with_error(result: Result, point: Point) -> str:
 # --- over an axis of the study ---
 
 
-def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[Choice, list[FloatArray]]:
-    """Combinations with a result anywhere along the course, and their values (course, cycle)."""
-    choice = choose(result, [course.axis], limit)
-    found = [(point, label, course.read(result, name, point)) for point, label in choice]
-    # the shown point has a result: there is at least one
-    points, labels, fields = zip(*(one for one in found if not np.isnan(one[2]).all()), strict=True)
-    return Choice(points, labels, choice.sentence), list(fields)
-
-
 def _worn_over(result: Result) -> Course | None:
     """The course of figures of the worn volume; None where there is none, or nothing wears."""
     wears = len(result.cycles) > 1 and float(np.nanmax(result.worn, initial=0.0)) > NO_VOLUME
@@ -145,30 +136,28 @@ def draw_final(result: Result) -> Drawn:
     course = _worn_over(result)
     if course is None:
         return None
-    choice, fields = _read_known(result, course, "worn_volume", _MOST_LINES)
-    every = choose(result, [course.axis], _MOST_LINES).points
-    failed = np.array([np.isnan(course.read(result, "worn_volume", point)[:, 0]) for point in every])
+    choice = choose(result, [course.axis], _MOST_LINES)
+    fields = np.array([course.read(result, "worn_volume", point) for point in choice.points])
+    name = "error_estimate"
+    known = [course.read(result, name, point) if result.has(name) else fields[0, :, 0] * 0.0 for point in choice.points]
+    failed = np.isnan(fields[..., 0])
     # of a point that ended early, what was worn by then
-    reached = [np.where(np.isnan(field).all(axis=1), np.nan, np.nan_to_num(field).max(axis=1)) for field in fields]
-    largest = [float(np.nanmax(each, initial=0.0)) for each in reached]
-    scale, (figure, panel) = scale_for("m3", largest), plot.new_panel(3.4)
-    top, errors = scale(max(largest)).item(), []
-    highest = top
-    for number, ((point, label), field) in enumerate(zip(choice, fields, strict=True)):
-        error = course.read(result, "error_estimate", point) if result.has("error_estimate") else np.zeros(len(field))
-        errors.append(error)
-        look = course.line_style(number) | {"label": label or "computed"}
-        reach = plot.add_line(panel, course.values, scale(field[:, -1]), scale(error * field[:, -1]), **look)
-        highest = max(highest, min(reach, 2.0 * top))
+    reached = np.where(np.isnan(fields).all(axis=-1), np.nan, np.nan_to_num(fields).max(axis=-1))
+    number, place = map(int, np.unravel_index(int(np.nanargmax(reached)), reached.shape))
+    scale, (figure, panel) = scale_for("m3", reached), plot.new_panel(3.4)
+    highest = top = float(scale(reached[number, place]))
+    for line, (label, values, error) in enumerate(zip(choice.labels, fields[..., -1], known, strict=True)):
+        if not failed[line].all():
+            look = course.line_style(line) | {"label": label or "computed"}
+            reach = plot.add_line(panel, course.values, scale(values), scale(error * values), **look)
+            highest = max(highest, min(reach, 2.0 * top))
     _mark_care(result, panel, course, choice, scale(reached))
     plot.set_from_zero(panel, highest)
     crosses = plot.mark_failed(panel, course.values, failed)
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume {_at_the_end(result)}"))
-    number = int(np.argmax(largest))
-    place = int(np.nanargmax(reached[number]))
-    known = f" ± {show_percent(errors[number][place])}" if errors[number][place] > 0.0 else ""
-    text = f"Largest: {scale.show(largest[number], 4)}{known} at {course.at(result, place)}"
+    wrong = f" ± {show_percent(known[number][place])}" if known[number][place] > 0.0 else ""
+    text = f"Largest: {scale.show(float(reached[number, place]), 4)}{wrong} at {course.at(result, place)}"
     return figure, labelled(text, choice.labels[number]), crosses, choice.sentence
 
 
@@ -188,12 +177,12 @@ def draw_map(result: Result, name: str) -> Drawn:
     course = _worn_over(result)
     if course is None or result.has("cycle_count"):
         return None
-    cycles = scale_for(result.counted, result.cycles)
-    choice, fields = _read_known(result, course, name, _MOST_MAPS)
-    largest = [float(np.nanmax(field, initial=0.0)) for field in fields]
-    scale = scale_for("m3" if name == "worn_volume" else f"m3 per {result.counted[:-1]}", largest)
+    cycles, choice = scale_for(result.counted, result.cycles), choose(result, [course.axis], _MOST_MAPS)
+    fields = np.array([course.read(result, name, point) for point in choice.points])
+    place = tuple(map(int, np.unravel_index(int(np.nanargmax(fields)), fields.shape)))
+    scale = scale_for("m3" if name == "worn_volume" else f"m3 per {result.counted[:-1]}", fields)
     figure, panels = plot.panel_grid(choice.labels, 2.7, sharex=True)
-    norm = Normalize(0.0, scale(max(largest)).item() or 1.0)
+    norm = Normalize(0.0, scale(fields[place]).item() or 1.0)
     # half a cell at both ends: nothing is known beyond
     rows = np.clip(cell_edges(cycles(result.cycles)), cycles(result.cycles[0]), cycles(result.cycles[-1]))
     for panel, field in zip(panels.flat, fields, strict=True):
@@ -203,10 +192,8 @@ def draw_map(result: Result, name: str) -> Drawn:
     for panel in panels[-1]:
         course.set_axis(panel)
     plot.add_colour_bar(figure, panels, norm, scale.label(name.replace("_", " ")))
-    number = int(np.argmax(largest))
-    place, cycle = map(int, np.unravel_index(int(np.nanargmax(fields[number])), fields[number].shape))
-    text = f"{scale.show(largest[number], 4)} at {course.at(result, place)}, {result.cycle_label(cycle)}"
-    return figure, labelled(f"Largest: {text}", choice.labels[number]), choice.sentence
+    text = f"{scale.show(float(fields[place]), 4)} at {course.at(result, place[1])}, {result.cycle_label(place[2])}"
+    return figure, labelled(f"Largest: {text}", choice.labels[place[0]]), choice.sentence
 
 
 # --- of missions, by block ---

@@ -196,11 +196,11 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
         notes.append(
             f"In three dimensions are {len(surface.faces)} of {len(whole.faces)} faces, those near the contact."
         )
-    views, contact, shown = find_views(surface), surface.contact, result.shown
+    views, shown = find_views(surface), result.shown
     seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
-    of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": contact.flank}
-    pairs = pairs_of_scene(result, shown)[contact.pairs]
-    of_contact = {"nodes": contact.nodes, "pairs": pairs, "normals": contact.normals}
+    of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": surface.flank}
+    pairs = pairs_of_scene(result, shown)[surface.pairs]
+    of_contact = {"nodes": surface.own, "pairs": pairs, "normals": surface.normals}
     directions = [{"eye": view.to_eye, "up": view.up} for view in views]
     return {
         **{name: encode_floats(values) for name, values in (of_faces | {"seen": np.asarray(seen)}).items()},

@@ -47,15 +47,15 @@ def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(
     half = len(pairs.area) // 2
     for body, outwards in ((0, -1.0), (1, 1.0)):
         for flank, own in ((0, slice(None, half)), (1, slice(half, None))):
-            chosen = (surface.body == body) & (surface.contact.flank == flank)
+            chosen = (surface.body == body) & (surface.flank == flank)
             assert areas[chosen].sum() == pytest.approx(pairs.area[own].sum(), rel=1e-9)
-            at = np.isin(surface.contact.nodes, surface.faces[chosen])
-            found = surface.contact.pairs[at]
+            at = np.isin(surface.own, surface.faces[chosen])
+            found = surface.pairs[at]
             assert sorted(found) == list(range(len(pairs.area)))[own]
-            places = surface.nodes[surface.contact.nodes[at]]
+            places = surface.nodes[surface.own[at]]
             np.testing.assert_allclose(places, pairs.position[found], atol=1e-12)
             # normals of pairs point out of the moving body, the blade
-            normals = outwards * surface.contact.normals[at]
+            normals = outwards * surface.normals[at]
             np.testing.assert_allclose(normals, pairs.frames[found, 0], atol=1e-9)
 
 
@@ -98,8 +98,8 @@ def test_the_faces_near_the_contact_are_kept(tmp_path):
     surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
     fewer = surface.near_contact(1000)
     assert len(fewer.faces) == 1000
-    assert (fewer.contact.flank >= 0).sum() == (surface.contact.flank >= 0).sum()
-    np.testing.assert_array_equal(fewer.nodes[fewer.contact.nodes], surface.nodes[surface.contact.nodes])
+    assert (fewer.flank >= 0).sum() == (surface.flank >= 0).sum()
+    np.testing.assert_array_equal(fewer.nodes[fewer.own], surface.nodes[surface.own])
     assert surface.near_contact(len(surface.faces)) is surface
 
 
