@@ -39,6 +39,8 @@ CAPTIONS = {
     "final_worn_volume": f"{_OTHERS}. Bars: estimated errors; of a point that ended early, what was worn by then",
     "worn_volume_map": f"{_OTHERS}. Hatched: no result",
     "wear_rate_map": f"{_OTHERS}. Hatched: no result",
+    "response_after_own_wear": "Each mark is another joint, which wore at its own frequency: the marks are no response"
+    " curve. That they are low where the new joint resonates does not mean that wear protects",
     "excitation_frequency": _BANDS,
     "trends": "Bars: estimated error of the worn volume",
     "wear_depth": "Of both surfaces together",
@@ -139,6 +141,12 @@ FIGURES = (
     _of(wear.draw_map, "worn_volume_map", "Worn volume over {over} and {slow}"),
     _of(wear.draw_map, "wear_rate_map", "Wear rate over {over} and {slow}", **_WORN),
     Entry("frequency_response", "Frequency response of one joint, new and worn", response.draw_responses, **_RESPONSE),
+    Entry(
+        "response_after_own_wear",
+        "Response of different joints, each after wear at its own frequency",
+        response.draw_after_wear,
+        **_RESPONSE,
+    ),
     Entry(
         "excitation_frequency", "Frequency of an excitation that follows the resonance", wear.draw_excitation, **_WEAR
     ),

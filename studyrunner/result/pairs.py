@@ -97,24 +97,18 @@ def axes_of_scenes(result: Result, names: Collection[str] = OF_PAIRS) -> tuple[s
     return tuple(axis for axis in result.axes if axis in found)
 
 
-def of_scene(result: Result, point: Point, names: Collection[str] = OF_PAIRS) -> Result:
-    """The points whose scene is the one of `point` as far as these variables say, with its contact pairs alone."""
-    axes = axes_of_scenes(result, names)
+def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
+    """The points whose scene is that of the shown point as far as these variables say, with its contact pairs alone."""
+    axes, point = axes_of_scenes(result, names), result.shown
     if not axes and not result.has(_EXISTS):
         return result
     dataset = result.dataset.isel({axis: [point[axis]] for axis in axes})
     for name in filter(result.has, names):
         variable = dataset[name]
         dataset[name] = variable.isel({axis: 0 for axis in axes if axis in variable.dims}, drop=True)
-    fixed = {axis: result.dataset.sizes[axis] for axis in axes if axis in result.varying}
     if _EXISTS in names and result.has(_EXISTS):
         dataset = dataset.isel(contact=pairs_of_scene(result, point)).drop_vars(_EXISTS)
-    return replace(result, dataset=dataset, fixed={**result.fixed, **fixed})
-
-
-def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
-    """As `of_scene`, of the point that figures of a single point show."""
-    return of_scene(result, result.shown, names)
+    return replace(result, dataset=dataset, fixed=(*result.fixed, *(axis for axis in axes if axis in result.varying)))
 
 
 def pairs_of_scene(result: Result, point: Point) -> NDArray[np.intp]:

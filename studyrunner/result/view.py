@@ -53,7 +53,7 @@ class Result:
     """A result file, each point one combination of the axes. Arrays of points have the shape of the axes.
 
     dataset: read lazily; a variable that was read as a whole stays in memory. fixed: axes of which this holds one value
-    of several, and how many the file has. blocks: of missions what belongs to single blocks; in `dataset` missions then
+    of several. blocks: of missions what belongs to single blocks; in `dataset` missions then
     have the name of cycles. chosen: values of axes of the point that figures of a single point show. measured: a worn
     profile to compare with. recomputed: of the worn joint of the shown point, by `studyrunner.worn_joint`.
     no_worn_response: why its response curve is not among them.
@@ -61,7 +61,7 @@ class Result:
 
     path: Path
     dataset: xr.Dataset
-    fixed: Mapping[str, int] = field(default_factory=dict)
+    fixed: tuple[str, ...] = ()
     blocks: xr.Dataset | None = None
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None

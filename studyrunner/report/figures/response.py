@@ -18,7 +18,7 @@ from studyrunner.report.figures.flanks import JOINT_WORDS
 from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.selection import Course, choose, find_course, labelled
 from studyrunner.result.pairs import has_depths, last_depth
-from studyrunner.result.view import Point, Result
+from studyrunner.result.view import NO_VOLUME, Point, Result
 from studyrunner.units import scale_for
 
 _MOST_LINES, _MOST_RESPONSES, _MOST_MODES, _MOST_PAIRS = 3, 3, 6, 3
@@ -125,6 +125,27 @@ def _recomputed(curves: xr.Dataset) -> list[_Line]:
         values, error = (own[f"response_{each}"].values for each in ("amplitude", "error"))
         lines.append(_Line(label, curves["frequency"].values, values, look, error))
     return lines
+
+
+def draw_after_wear(result: Result) -> Drawn:
+    """Amplitude of each point after its own wear, beside that of the new joint; nothing where no point wears."""
+    course = find_course(result, "frequency")
+    wears = not result.has("worn_volume") or float(np.nanmax(result.worn, initial=0.0)) > NO_VOLUME
+    if course is None or len(result.cycles) == 1 or not wears:
+        return None
+    choice = choose(result, ["frequency"], _MOST_LINES)
+    fields = np.array([course.read(result, "response_amplitude", point)[..., 0] for point in choice.points])
+    scale, (figure, panel) = scale_for("m", fields), plot.new_panel(3.4)
+    own = [f"each after its own {result.cycle_label(cycle)}" for cycle in (0, -1)]
+    new = "new joint" if result.cycles[0] == 0.0 else own[0]
+    panel.plot(course.values, scale(fields[0, :, 0]), color="0.5", linewidth=1.0, label=new)
+    for number, (label, field) in enumerate(zip(choice.labels, fields, strict=True)):
+        look = course.line_style(number) | {"linestyle": "none", "label": ", ".join(filter(None, (label, own[1])))}
+        panel.plot(course.values, scale(field[:, -1]), **look)
+    plot.set_from_zero(panel)
+    panel.set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
+    course.set_axis(panel)
+    return figure, choice.sentence
 
 
 def draw_mode(result: Result, name: str) -> Drawn:

@@ -97,6 +97,7 @@ def test_each_kind_of_result_has_its_figures_and_they_can_be_read(case):
 LINES = {
     "worn_volume": ("worn_volume", 1e9, {"frequency": 2}),
     "final_worn_volume": ("worn_volume", 1e9, {"cycle": -1}),
+    "response_after_own_wear": ("response_amplitude", 1e3, {"cycle": -1}),
     "wear_depth": ("wear_depth", 1e6, {"frequency": 2, "cycle": -1}),
 }
 LOOPS = {
@@ -214,13 +215,17 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold():
         assert np.flatnonzero(~known).tolist() == ([2] if number == 0 else [])
 
 
-def test_worn_joints_have_response_curves():
+def test_worn_joints_have_response_curves_and_joints_that_wore_differently_are_marks():
     made = make_result(scheme=["implicit"], wear_coefficient=[0.0, 1e5])
     worn = Result(made.path, made.dataset.rename(wear_coefficient="worn_cycle"))
     lines = numbers_of(draw_figure(worn, "frequency_response"))
     for number, label in enumerate(("|worn cycle 0 1/Pa", "|worn cycle 100 000 1/Pa")):
         expected = 1e3 * values_of(worn, "response_amplitude", worn_cycle=number, cycle=0)
         np.testing.assert_allclose(lines[label][:, 1], expected, rtol=1e-8)
+
+    drawn = draw_figure(make_result(), "response_after_own_wear").figure.axes[0].get_lines()
+    (own,) = [line for line in drawn if str(line.get_label()).startswith("implicit")]
+    assert own.get_linestyle() == "None"
 
 
 def test_an_exact_answer_is_drawn_beside_the_computed_one():
