@@ -1,4 +1,4 @@
-"""The worn joint of a result computed again: its response curve, loops and natural frequencies, without its history.
+"""The worn joint of a result computed again: its response curve and loops, without its history.
 
 The depths of the pairs in the result are those of a joint that is mounted worn, see `[scene] worn` of a study: a study
 of zero cycles gives its states.
@@ -49,7 +49,6 @@ def compute_worn_joint(
     *,
     loops: Sequence[int] = (),
     response: bool = False,
-    natural_frequencies: bool = False,
     point: Mapping[str, str] | None = None,
     progress: bool = True,
 ) -> dict[str, xr.Dataset]:
@@ -58,8 +57,7 @@ def compute_worn_joint(
     - "loops" of contact pairs: `loop_displacement`, m, and `loop_force`, N, (cycle, contact, phase, component), at the
       first count where the file holds its depths and at the last count;
     - "response": `response_amplitude`, m (cycle, frequency, response), and its relative error at the frequencies of the
-      study; with a followed frequency over its range, and of the new joint as well;
-    - "natural_frequencies": those of the sector with the joint stuck, Hz (nodal_diameter, mode).
+      study; with a followed frequency over its range, and of the new joint as well.
 
     path: result file of wear histories. folder: for the result files of what is computed; what is there already is not
     computed twice. point: values of axes, as text; by default the point that wears most.
@@ -94,11 +92,6 @@ def compute_worn_joint(
             asked["outputs.variables"] = ["response_amplitude", "response_error"]
             states = _run(result, asked, folder / "worn_joint_response.nc", progress)
             found["response"] = states[["response_amplitude", "response_error"]].transpose("cycle", "frequency", ...)
-        if natural_frequencies:
-            # nothing slips, and no state takes time
-            asked = {**common, "axes.excitation_amplitude": 1e-9, "outputs.variables": ["natural_frequency", "mesh"]}
-            states = _run(result, asked, folder / "worn_joint_frequencies.nc", progress)
-            found["natural_frequencies"] = states[["natural_frequency"]].isel(cycle=0, drop=True)
     return {name: each.assign_attrs(title=title, how=_HOW) for name, each in found.items()}
 
 

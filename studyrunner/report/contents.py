@@ -111,7 +111,7 @@ _OF_ONE = {**_WEAR, **_ONE}
 _WORN: dict[str, Any] = {"needs": ("worn_volume",)}
 _RESPONSE: dict[str, Any] = {**_WEAR, "needs": ("response_amplitude",)}
 _ALL: dict[str, Any] = {"kinds": (WEAR, MISSIONS, MODES)}
-_SECTOR: dict[str, Any] = {"scene": root.OF_SECTOR, "always": True}
+_SECTOR: dict[str, Any] = {"scene": root.OF_SECTOR, "always": True, "needs": ("natural_frequency",)}
 
 
 def _of(draw: Callable[..., Drawn], name: str, title: str, **options: Any) -> Entry:

@@ -32,10 +32,8 @@ Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 _DEEPEST = 0.04  # worn depth as it is drawn, over the size of the contact surfaces
-_CORNERS = 4
+_CORNERS, _MOST_CLOSE_UPS = 4, 7
 _SAME = 1e-6  # distance of a node and its pair, over the size of the mesh
-
-MOST_VIEWS = 8
 
 _AROUND = 0.16  # of a close-up: how much is seen around the contact surfaces, over their size
 _BEFORE = 0.06  # what stands before a contact surface is cut off from here on, over the same size
@@ -189,19 +187,16 @@ class View:
 
 
 def find_views(surface: RootSurface) -> tuple[View, ...]:
-    """Close-ups of each contact surface of each body, the outermost body first, then the whole."""
+    """Close-ups of the contact surfaces of the outermost body, then the whole."""
     up, contact = _upwards(surface.nodes), surface.flank >= 0
-    # by where they are along the direction upwards
+    # outermost by where it is along the direction upwards
     height = {
         body: float((surface.nodes[np.unique(surface.faces[surface.body == body])] @ up).mean())
         for body in np.unique(surface.body[contact]).tolist()
     }
-    closer = [
-        _close_up(surface, body, flank, up)
-        for body in sorted(height, key=lambda body: -height[body])
-        for flank in np.unique(surface.flank[(surface.body == body) & contact]).tolist()
-    ]
-    return (*closer[: MOST_VIEWS - 1], from_aslant(surface.nodes, len(surface.faces)))
+    outer = max(height, key=lambda body: height[body])
+    flanks = np.unique(surface.flank[(surface.body == outer) & contact]).tolist()[:_MOST_CLOSE_UPS]
+    return (*(_close_up(surface, outer, flank, up) for flank in flanks), from_aslant(surface.nodes, len(surface.faces)))
 
 
 def from_aslant(nodes: Floats, n_faces: int) -> View:

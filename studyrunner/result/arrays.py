@@ -150,7 +150,7 @@ def _sample_coordinate(study: Study, name: str, names: Sequence[str], values: ND
     for place, axis in reversed(list(enumerate(names))):
         same = np.broadcast_to(values.take([0], axis=place), values.shape)
         if axis not in ("sample", "contact") and np.array_equal(same, values, equal_nan=True):
-            values = values.take(0, axis=place)
+            values = np.asarray(values.take(0, axis=place))
         else:
             dimensions = (axis, *dimensions)
     if name in COORDINATES:

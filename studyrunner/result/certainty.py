@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -114,32 +115,27 @@ def show_error(result: Result, point: Point) -> str:
 # --- points that ended otherwise ---
 
 
-def list_ended(result: Result, number: int) -> dict[str, list[dict[str, int]]]:
-    """Points that ended in this way, by what is to be said of each beside the outcome; the text may be empty."""
-    messages = result.dataset["message"].values if result.has("message") else None
-    found: dict[str, list[dict[str, int]]] = {}
+def ended_points(result: Result, number: int) -> Iterator[tuple[dict[str, int], str]]:
+    """Points that ended in this way, each with what is to be said beside the outcome, which may be nothing."""
     for index in np.argwhere(result.dataset["outcome"].values == number):
         place, point = tuple(index.tolist()), result.point_at(index)
-        said = "" if messages is None else str(messages[place])
+        said = str(result.dataset["message"].values[place]) if result.has("message") else ""
         if result.has_values[place] and result.counted[:-1] not in said:
             last = show_cycles(float(result.last_cycle[place]), result.counted)
             end = "" if result.computed[place] else f"computed up to {last}"
             is_known = 0.0 < result.errors[place] <= WELL_ENOUGH
             known = f"worn volume known within {show_error(result, point)}" if is_known else ""
             said = ", ".join(filter(None, (end, known, said)))
-        found.setdefault(said, []).append(point)
-    return found
+        yield point, said
 
 
 def describe_ended(result: Result, number: int) -> list[str]:
-    """The first points that ended in this way, with cycle, error and message; points with the same text in one line."""
-    axes, texts, lines = (*result.varying, *result.fixed), list_ended(result, number), list[str]()
-    for said, points in list(texts.items())[:_MOST_NAMED]:
-        named = [result.describe(point, axes) for point in points[:_MOST_NAMED]]
-        named += [f"{count(len(points) - _MOST_NAMED, 'more point')}"] if len(points) > _MOST_NAMED else []
-        lines.append(": ".join(filter(None, ("; ".join(named), said))))
-    left = sum(map(len, list(texts.values())[_MOST_NAMED:]))
-    return [line for line in (*lines, f"and {count(left, 'more point')}" if left else "") if line]
+    """The first points that ended in this way, with cycle, error and message, and how many more there are."""
+    first = itertools.islice(ended_points(result, number), _MOST_NAMED)
+    named = [(result.describe(point, (*result.varying, *result.fixed)), said) for point, said in first]
+    left = int(np.count_nonzero(result.dataset["outcome"].values == number)) - len(named)
+    lines = [*(": ".join(filter(None, each)) for each in named), f"and {count(left, 'more point')}" if left else ""]
+    return [line for line in lines if line]
 
 
 # --- advice: what was used already is never named, nor what the scheme does not use ---

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, list_ended
+from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, ended_points
 from studyrunner.result.opening import as_history
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import COMPLETE_WORDS, Result
@@ -162,7 +162,7 @@ def _failures(result: Result) -> tuple[Failure, ...]:
         ending = result.endings[number]
         if ending.word == "converged":
             continue
-        reason, (point, *_) = next(iter(list_ended(result, number).items()))
+        point, reason = next(ended_points(result, number))
         sentence = re.split(r"[.:](?:\s|$)", ending.sentence)[0] or ending.word
         where = where_is(result, point) if result.varying else ""
         # what the message of a sensitive one holds is no result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 from collections.abc import Collection
 from typing import Any
@@ -254,18 +255,15 @@ def draw_outcomes(result: Result) -> Drawn:
         return None
     choice = choose(result, [course.axis], _MOST_ROWS)
     field = np.array([course.read(result, "outcome", point) for point in choice.points])
-    present = np.unique(field).astype(int)
-    special = [number for number in present.tolist() if number != CONVERGED]
-    colours = {number: _OTHERS[place % len(_OTHERS)] for place, number in enumerate(special)}
-    cells = [colours.get(number, _CONVERGED_COLOUR) for number in present.tolist()]
+    present = np.unique(field).astype(int).tolist()
+    others = itertools.cycle(_OTHERS)
+    cells = {number: _CONVERGED_COLOUR if number == CONVERGED else next(others) for number in present}
     labels = [textwrap.fill(label, _LABEL_WIDTH) if plot.is_narrow() else label for label in choice.labels]
-    height = 1.4 + 0.32 * len(field)
-    figure, panel = plot.new_panel(height)
-    figure.set_figheight(height + 0.15 * sum(label.count("\n") for label in labels))
-    norm = BoundaryNorm([*(present - 0.5), present[-1] + 0.5], len(present))
+    figure, panel = plot.new_panel(1.4 + 0.32 * len(field) + 0.15 * sum(label.count("\n") for label in labels))
+    norm = BoundaryNorm([*(np.array(present) - 0.5), present[-1] + 0.5], len(present))
     look: dict[str, Any] = {"edgecolors": "white", "linewidth": 0.8} if field.size <= _MOST_CELLS else {}
     across, down = (np.arange(size + 1) - 0.5 for size in field.shape[::-1])
-    plot.add_map(panel, across, down, field, norm, cmap=ListedColormap(cells), **look)
+    plot.add_map(panel, across, down, field, norm, cmap=ListedColormap(list(cells.values())), **look)
     panel.invert_yaxis()
     kept = np.arange(0, course.values.size, -(-course.values.size // (4 if plot.is_narrow() else 9)))
     panel.set_xticks(kept, [f"{course.values[index]:.6g}" for index in kept])
@@ -273,9 +271,9 @@ def draw_outcomes(result: Result) -> Drawn:
     panel.set_yticks(np.arange(len(labels)), labels)
     panel.tick_params(length=0)
     panel.spines[:].set_visible(False)
-    words = {number: result.endings[number].word.replace("_", " ") for number in present.tolist()}
-    plot.add_legend(figure, [Patch(facecolor=cell, label=words[n]) for n, cell in zip(words, cells, strict=True)])
-    meaning = [f"{words[number].capitalize()}: {result.endings[number].sentence}" for number in special]
+    words = {number: result.endings[number].word.replace("_", " ") for number in present}
+    plot.add_legend(figure, [Patch(facecolor=cells[number], label=words[number]) for number in present])
+    meaning = (f"{words[number].capitalize()}: {result.endings[number].sentence}" for number in present if number)
     return figure, as_sentences(*meaning), choice.sentence
 
 

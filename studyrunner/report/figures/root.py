@@ -6,7 +6,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -82,7 +81,7 @@ def draw_fraction(result: Result, name: str) -> Drawn:
 def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale: Scale, label: str) -> Figure:
     """The root with these nodes, and its contact surfaces from close by, coloured by values of the pairs in SI."""
     views = find_views(surface)
-    close_ups = [view for view in views[:-1] if view.body == views[0].body][:_MOST_CLOSE_UPS]
+    close_ups = views[:-1][:_MOST_CLOSE_UPS]
     ratios = [1.0] + [2.0] * len(close_ups)
     figure, (panels,) = plot.new_panels(1, len(ratios), 3.4, width_ratios=ratios)
     norm = Normalize(0.0, scale(float(of_pairs.max())).item() or 1.0)
@@ -121,9 +120,7 @@ def draw_disk(result: Result) -> Drawn:
 
 
 def draw_sector(result: Result) -> Drawn:
-    """The natural frequencies over the nodal diameter, and the mesh beside them where the file holds one."""
-    if not result.has("natural_frequency") and "natural_frequencies" not in result.recomputed:
-        return "Use study-report --natural-frequencies, or add natural_frequency to [outputs] variables."
+    """The natural frequencies over the nodal diameter, a line a mode, and the mesh beside them where there is one."""
     has_mesh = result.has(*MESH)
     ratios = [1.0, 1.7] if has_mesh else [1.0]
     figure, (panels,) = plot.new_panels(1, len(ratios), 4.0, width_ratios=ratios)
@@ -133,27 +130,21 @@ def draw_sector(result: Result) -> Drawn:
         view = from_aslant(nodes, len(faces))
         paint_faces(panels[0], nodes, faces, rgb(tuple(names.tolist()), body), view)
         draw_scale_bar(panels[0], nodes, view)
-    said = f"Of the sector at {result.describe(result.shown, result.fixed)}" if result.fixed else ""
-    return figure, _draw_frequencies(result, panels[-1]), said
-
-
-def _draw_frequencies(result: Result, panel: Axes) -> str:
-    """Frequencies (nodal_diameter, mode) over the nodal diameter, one line a mode; what is seen."""
-    source = result.recomputed.get("natural_frequencies", result.dataset)
-    frequencies = source["natural_frequency"].transpose("nodal_diameter", "mode").values
-    for number, mode in enumerate(frequencies.T):
+    panel, own = panels[-1], result.dataset["natural_frequency"].transpose("nodal_diameter", "mode")
+    for number, mode in enumerate(own.values.T):
         style = {"linewidth": 0.8, "markersize": 3.5, "marker": plot.line_style(number)["marker"], "color": "0.35"}
-        label = f"_mode {number + 1}"
-        panel.plot(source["nodal_diameter"].values, mode, markerfacecolor=COLOURS[0], label=label, **style)
-    plot.set_from_zero(panel, float(np.nanmax(frequencies)))
+        style |= {"markerfacecolor": COLOURS[0], "label": f"_mode {number + 1}"}
+        panel.plot(own["nodal_diameter"].values, mode, **style)
+    plot.set_from_zero(panel, float(np.nanmax(own.values)))
     panel.set(xlabel="nodal diameter", ylabel="natural frequency (Hz)")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+    said = f"With the joint stuck, {own.sizes['mode']} modes, the lowest at {np.nanmin(own.values):.4g} Hz"
+    of = f"Of the sector at {result.describe(result.shown, result.fixed)}" if result.fixed else ""
     diameter = result.study.get("scene", {}).get("nodal_diameter")
-    text = f"With the joint stuck, {frequencies.shape[1]} modes, the lowest at {np.nanmin(frequencies):.4g} Hz"
     if not isinstance(diameter, int) or "frequency" not in result.dataset.coords:
-        return text
+        return figure, said, of
     ends = [float(end(result.dataset["frequency"].values)) for end in (np.min, np.max)]
     star: dict[str, Any] = {"marker": "*", "markersize": 11, "label": "this study", "clip_on": False, "zorder": 5}
     panel.plot([diameter, diameter], ends, color=COLOURS[1], **star)
     span = " to ".join(dict.fromkeys(f"{each:.6g}" for each in ends))
-    return f"{text}. Star: this study, {span} Hz at nodal diameter {diameter}"
+    return figure, f"{said}. Star: this study, {span} Hz at nodal diameter {diameter}", of
