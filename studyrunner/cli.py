@@ -224,11 +224,10 @@ def _answer(path: Path) -> Sequence[str]:
     # where they are used: they take a second to load
     from studyrunner.result.opening import open_result
     from studyrunner.summary.answer import summary
-    from studyrunner.summary.lines import summary_lines
 
     try:
         with open_result(path) as dataset:
-            return summary_lines(summary(dataset))
+            return summary(dataset).lines
     except UserError as error:
         # the result is there all the same, but larger than what is read
         return (f"no summary: {error}",)
