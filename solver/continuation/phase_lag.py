@@ -80,7 +80,7 @@ class _AtLag:
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         # of the equation times |F^H x|, whose derivative is linear in the motion
-        return self._errors(_changes(here.balance.joint, tangent.transmit(step)[0])[0], here.extra)
+        return self._errors(_changes(here.balance.joint, tangent.motion(step))[0], here.extra)
 
     def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
         return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
@@ -146,7 +146,7 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     fixed = Balance(joint, at.history, at.wear_depth)
     by_frequency = frequency_derivative(fixed, at)
     step = run.step(fixed, at, -by_frequency.force, min(FORCING, 0.1 * accuracy))
-    product, response = _changes(joint, fixed.linearise(at).transmit(step)[0])
+    product, response = _changes(joint, fixed.linearise(at).motion(step))
     amplitude = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
     rise = (by_frequency.response[0] + response[0]) / amplitude
     turn = (by_frequency.product + product) / excitation_product(joint, at.displacement_h)

@@ -85,7 +85,7 @@ class NonlinearMode(Path[ModeState]):
     def case_of(self, values: FloatArray) -> Case:
         """Case of the modal model at a frequency, rad/s, and a damping ratio, the first two values."""
         model = modal_model(self.model, self.linear, 2.0 * float(values[1]) * float(values[0]))
-        return replace(self.case, model=model, _structures={})
+        return replace(self.case, model=model)
 
     def joint_with(self, values: FloatArray) -> Joint:
         """Joint of the modal model at some values (3,)."""
@@ -199,7 +199,7 @@ class _AtAmplitude:
         return slopes, np.stack(errors, axis=1)
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
-        return self._products(here.extra, _shape(here.balance.joint, tangent.transmit(step)[0], 0.0))
+        return self._products(here.extra, _shape(here.balance.joint, tangent.motion(step), 0.0))
 
     def fraction(self, _: Bordered, __: FloatArray, ___: FloatArray) -> float:
         return 1.0
@@ -255,7 +255,7 @@ class Rest:
         for attempt in range(SLIDING_STARTS):
             size = amplitude * TOP_BASE**attempt
             joint = self.mode.case.joint(linear.omega, size)
-            amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
+            amplitudes = np.zeros((dofs.size, len(joint.basis.orders)), complex)
             amplitudes[:, 0] = np.where(dofs.ravel() >= 0, size * linear.shape[dofs.ravel()], 0.0)
             motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
             start = self.state.evaluation.predicted_h + joint.to_relative(joint.law.force(motion))
