@@ -48,9 +48,9 @@ SMALL_JOINT = 40
 """Relative displacements up to which a joint is small and its Jacobian is factorised: impacts couple most harmonics,
 and products with any other factorisation are in vain (three pairs with 115 harmonics in the tests)."""
 
-# Shift of the eigenvalues, which are 1 for a pair that sticks. The position of a joint that slips as a whole is
-# arbitrary along its slip: round-off in a zero eigenvalue would give the determinant any sign.
-_NEUTRAL_SHIFT = 1e-8
+NEUTRAL_SHIFT = 1e-8
+"""Shift of the eigenvalues, which are 1 for a pair that sticks, where the sign of the determinant counts. The position
+of a joint that slips as a whole is arbitrary: round-off in a zero eigenvalue would give the determinant any sign."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +85,12 @@ class DenseFactor:
 Factor = DenseFactor | PeriodFactor
 
 
-def build_dense_factor(tangent: Linearisation) -> DenseFactor:
+def build_dense_factor(tangent: Linearisation, shift: float) -> DenseFactor:
     """Factorisation of a Jacobian. Singular ones give infinities: Newton's method judges by the residual."""
     rows, m = tangent.active_rows, tangent.joint.basis.synthesis.shape[0]
     width = min(m, 2 * (LARGEST_DENSE // max(rows.size, 1) // 2) + 1)
     matrix = tangent.dense(tangent.active, width)
-    matrix[np.diag_indices_from(matrix)] += _NEUTRAL_SHIFT
+    matrix[np.diag_indices_from(matrix)] += shift
     factor = matrix, np.zeros(0, np.int64)
     if rows.size:
         factor = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)[:2]
@@ -100,7 +100,7 @@ def build_dense_factor(tangent: Linearisation) -> DenseFactor:
 def build_factor(tangent: Linearisation) -> Factor:
     """A march through the period, or dense factors for small joints, masses, and where a sample is singular."""
     small = tangent.joint.component_index.size <= SMALL_JOINT
-    return (None if small else build_period_factor(tangent)) or build_dense_factor(tangent)
+    return (None if small else build_period_factor(tangent)) or build_dense_factor(tangent, NEUTRAL_SHIFT)
 
 
 @dataclass
@@ -116,7 +116,8 @@ class JacobianSolver:
         """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
         rows, rest = tangent.active_rows, tangent.passive_rows
         steps = np.zeros((len(rights), *rights[0].shape))
-        direct = build_dense_factor(tangent) if rows.size * steps.shape[2] <= DENSE_UNKNOWNS else None
+        # without the shift: a joint that hardly resists slip has eigenvalues as small
+        direct = build_dense_factor(tangent, 0.0) if rows.size * steps.shape[2] <= DENSE_UNKNOWNS else None
         for step, right in zip(steps, rights, strict=True):
             if rows.size:
                 step[rows] = (direct.solve(right) if direct else self._solve_kept(tangent, right, rtol))[rows]
