@@ -116,8 +116,11 @@ class JacobianSolver:
         """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
         rows, rest = tangent.active_rows, tangent.passive_rows
         steps = np.zeros((len(rights), *rights[0].shape))
-        # without the shift: a joint that hardly resists slip has eigenvalues as small
-        direct = build_dense_factor(tangent, 0.0) if rows.size * steps.shape[2] <= DENSE_UNKNOWNS else None
+        direct = None
+        if rows.size * steps.shape[2] <= DENSE_UNKNOWNS:
+            # without the shift: a joint that hardly resists slip has eigenvalues as small
+            direct = build_dense_factor(tangent, 0.0)
+            direct = direct if direct.sign else build_dense_factor(tangent, NEUTRAL_SHIFT)
         for step, right in zip(steps, rights, strict=True):
             if rows.size:
                 step[rows] = (direct.solve(right) if direct else self._solve_kept(tangent, right, rtol))[rows]
