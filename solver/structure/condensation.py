@@ -21,7 +21,7 @@ from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 DENSE_BYTES = 2e6
 """Bytes of the matrices of all harmonics up to which a product with each matrix is fastest."""
 
-KEPT_STRUCTURES = 12
+KEPT_STRUCTURES = 8
 """Condensed structures in the cache. A wear history with its errors uses six."""
 
 
