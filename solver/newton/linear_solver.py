@@ -1,6 +1,6 @@
 """Newton directions: solves with the exact Jacobian, Eqs. (16) and (17), and the sign of its determinant.
 
-A small Jacobian is factorised. A large one is solved by GMRES. Its preconditioner is kept from solve to solve: a
+A small Jacobian is factorised. A large one is solved by GMRES. Its preconditioner serves for many solves: a
 factorisation, corrected where GMRES has been.
 """
 
@@ -20,8 +20,8 @@ from solver.newton.period_preconditioner import PeriodFactor, build_period_facto
 FORCING = 1e-3
 """Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
 
-KEPT_PRODUCTS = 25
-"""Most products of a solve with a kept factorisation, before a new one is built, which takes as long as 20 products
+REUSE_PRODUCTS = 25
+"""Most products of a solve with an earlier factorisation, before a new one is built, which takes as long as 20 products
 with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 12 to 80."""
 
 MOST_CORRECTED = 60
@@ -123,16 +123,16 @@ class JacobianSolver:
             direct = direct if direct.sign else build_dense_factor(tangent, NEUTRAL_SHIFT)
         for step, right in zip(steps, rights, strict=True):
             if rows.size:
-                step[rows] = (direct.solve(right) if direct else self._solve_kept(tangent, right, rtol))[rows]
+                step[rows] = (direct.solve(right) if direct else self._solve_large(tangent, right, rtol))[rows]
             if rest.size:
                 # the columns of all other unknowns are those of the identity
                 step[rest] = (right - tangent.apply(step, roughly=True))[rest]
         return steps
 
-    def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
-        """Solution in the rows of the active pairs, with the kept factorisation while products are few."""
+    def _solve_large(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
+        """Solution in the rows of the active pairs, with an earlier factorisation while products are few."""
         if self._factor is not None:
-            solution, found = self._iterate(self._factor, tangent, right, rtol, KEPT_PRODUCTS)
+            solution, found = self._iterate(self._factor, tangent, right, rtol, REUSE_PRODUCTS)
             if found:
                 return solution
         self._factor, self._corrections = build_factor(tangent), ()
@@ -171,7 +171,7 @@ class JacobianSolver:
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
-        For a large joint, that of the kept factorisation P times (-1)^k, with k real negative eigenvalues of J P^-1.
+        For a large joint, that of an earlier factorisation P times (-1)^k, with k real negative eigenvalues of J P^-1.
         Where these outliers do not converge, this Jacobian is factorised instead.
         """
         if self._factor is not None and not self._factor.exact:

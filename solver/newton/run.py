@@ -194,7 +194,7 @@ class Run:
     solver: JacobianSolver = field(default_factory=JacobianSolver, repr=False)
 
     def fresh(self) -> Run:
-        """A part of the computation whose results do not depend on the factorisation kept so far."""
+        """A part of the computation whose results do not depend on an earlier factorisation."""
         return Run(self.tolerance, self.budget)
 
     def with_tolerance(self, tolerance: float) -> Run:

@@ -21,7 +21,7 @@ from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 DENSE_BYTES = 2e6
 """Bytes of the matrices of all harmonics up to which a product with each matrix is fastest."""
 
-KEPT_STRUCTURES = 8
+CACHED_STRUCTURES = 8
 """Condensed structures in the cache. A wear history with its errors uses six."""
 
 
@@ -100,14 +100,14 @@ class CondensedStructure:
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
 
-@lru_cache(maxsize=KEPT_STRUCTURES)
+@lru_cache(maxsize=CACHED_STRUCTURES)
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
     """Condense the structure at a frequency, rad/s, with an excitation amplitude, N, in harmonic 1.
 
     orders: harmonics above the static one, ascending.
-    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
+    Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular at a harmonic.
     """
     relative, _ = relative_indices(model.contact)
     still = model.linear[0]
@@ -177,9 +177,9 @@ def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray,
     compliance = cast("ComplexArray", np.linalg.inv(_block(linear, rates, others, others)))
     rows = np.vstack([linear.response, load.conj()])
     by_pairs = rows[:, relative] - rows[:, others] @ compliance @ _block(linear, rates, others, relative)
-    held = compliance[0] @ load[others]
-    force = load[relative] - _block(linear, rates[:1], relative, others)[0] @ held
-    return SharedStiffness(linear, relative, others, rates, compliance), force, by_pairs, rows[:, others] @ held
+    behind = compliance[0] @ load[others]
+    force = load[relative] - _block(linear, rates[:1], relative, others)[0] @ behind
+    return SharedStiffness(linear, relative, others, rates, compliance), force, by_pairs, rows[:, others] @ behind
 
 
 class Condensed(NamedTuple):
@@ -224,7 +224,7 @@ def whole_motion(
     """All displacements (n, ...), m, whose relative ones are `moved` (n_rel, ...), m, under a load (n, ...), N.
 
     Both change with exp(s t); exponent: s, 1/s, `i n w` in harmonic n.
-    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular.
+    Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular.
     """
     n_rel, others, whole = relative.size, _others(len(linear.mass), relative), np.zeros(load.shape, complex)
     whole[relative] = moved
