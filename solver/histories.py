@@ -10,8 +10,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.arguments import check_case, check_number, check_numbers, check_word, worn_model
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
-from solver.forced_response import check_case, check_number, check_numbers, check_word, worn_model
 from solver.loading_history.start_states import follow_branch
 from solver.missions.history import integrate_missions
 from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest, Passage

@@ -12,7 +12,7 @@ from solver.accuracy.history_error import HISTORY_SAFETY
 from solver.clock import computing_time
 from solver.contact.wear_law import WearLaw
 from solver.continuation.first_state import solve_first_state
-from solver.continuation.natural import SMOOTH_CHANGE
+from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
@@ -32,6 +32,9 @@ from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearState
+
+LARGEST_CHANGE = 2.0
+"""Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
 
 NEW_SWEEP_CHANGE = 0.5
 """Largest change of the vibration at the end of such a sweep since the sweep that has chosen its nodes. Above, a new
@@ -279,12 +282,17 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
     if not isinstance(found, State):
         return None
     states: tuple[State, ...] = (replace(found, parameter=first),)
-    rough = run.with_tolerance(coarse.case.settings.rough_tolerance)
-    for parameter in (*nodes, target):
-        after = coarse.solve(states, parameter, run if parameter == target else rough)
-        if after is None:
+    ahead, halvings, rough = [*nodes, target], 0, run.with_tolerance(coarse.case.settings.rough_tolerance)
+    while ahead:
+        after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
+        if after is not None and coarse.change(states[-1], after, float(stride)) <= LARGEST_CHANGE:
+            states = (*states, after)[-KEPT_NODES:]
+            ahead.pop(0)
+        elif (halvings := halvings + 1) > ATTEMPTS:
             return None
-        states = (*states, after)[-KEPT_NODES:]
+        else:
+            # past a corner at the resonance: without, half of the sweeps up to 212.6 Hz of the dovetail begin anew
+            ahead.insert(0, 0.5 * (states[-1].parameter + ahead[0]))
     return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
 
 

@@ -18,7 +18,7 @@ from solver.missions.mission import MissionHistory, MissionRequest, Passage
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
-from solver.newton.run import Budget
+from solver.newton.run import Budget, guarded
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, packable
 from solver.results.history import describe_cut_off, describe_uncertain
@@ -33,7 +33,6 @@ from solver.wear.slow_time import (
     Node,
     Solution,
     Solutions,
-    guarded,
 )
 
 STEP_ERROR_FRACTION = 0.5

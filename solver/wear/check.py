@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, Certificate, certify
-from solver.accuracy.error_estimate import UNKNOWN
 from solver.accuracy.harmonic_levels import lacks_even, left_out
 from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
+from solver.accuracy.resolved_state import UNKNOWN
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome, in_digits
@@ -115,7 +115,7 @@ def needs_new_choice(setup: WearingJoint, state: WearState) -> bool:
 
 def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    refined = refine(setup.case_and_joint(state)[0], state.omega, setup.excitation_amplitude, state.point, setup.run)
+    refined = refine(*setup.case_and_joint(state), state.point, setup.run)
     resolution, point = refined.case.resolution, refined.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
     return setup.at_followed(replace(state, estimate=refined.estimate, accurate=refined.accurate))

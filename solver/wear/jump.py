@@ -49,7 +49,7 @@ def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bo
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    joint = case.held(hold).joint(state.omega, setup.excitation_amplitude)
+    joint = replace(case, hold=hold).joint(state.omega, setup.excitation_amplitude)
 
     def balance_at(fraction: float, _: FloatArray) -> Balance:
         return Balance(joint, state.point.history, state.depth + fraction * (worn - state.depth))

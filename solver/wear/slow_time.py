@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,12 +17,10 @@ from solver.accuracy.certificate import Certificate
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, IntArray
-from solver.newton.run import Budget, OutOfTimeError
-from solver.outcome import Outcome, describe_error
+from solver.newton.run import Budget, guarded
+from solver.outcome import Outcome
 from solver.packing import Packed, in_rows, pack, packable, unpack
 from solver.settings import Resolution, WearTarget
-
-T = TypeVar("T")
 
 AS_ASKED, UNFINISHED = Failure(Outcome.CONVERGED), Failure(Outcome.NOT_COMPUTED)
 """The regular end of a history, and that of one that goes on."""
@@ -319,16 +317,3 @@ class Integrator:
                 if self._keep is not None:
                     # what its time limit has ended is not complete
                     self._keep(pack({key: s for key, s in self._known.items() if s.failure.outcome not in ENDS_ALL}))
-
-
-def guarded(compute: Callable[[], T]) -> T | Failure:
-    """Result of a computation, or its error as a failure."""
-    try:
-        return compute()
-    except np.linalg.LinAlgError:
-        return Failure(Outcome.SINGULAR)
-    except OutOfTimeError:
-        return Failure(Outcome.TIME_LIMIT)
-    except Exception as error:
-        # an error spoils one point only: the study goes on
-        return Failure(Outcome.EXCEPTION, describe_error(error))

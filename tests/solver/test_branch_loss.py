@@ -113,7 +113,7 @@ def test_a_hold_moves_no_state_and_takes_up_what_drives_it():
     hold = free_slide(joint, at)
     axial = hold.direction.reshape(-1, 3)
     np.testing.assert_allclose(np.abs(axial[:, 1]), 0.25, rtol=1e-6)
-    held = case.held(hold).joint(joint.omega, joint.excitation_amplitude).structure
+    held = replace(case, hold=hold).joint(joint.omega, joint.excitation_amplitude).structure
     motion = joint.to_relative(at.displacement_h)
     elastic = at.residual - joint.to_relative(at.force_h)
     np.testing.assert_allclose(held.apply(motion) - held.force_h(), elastic, atol=1e-6)
