@@ -285,7 +285,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
     ahead, halvings, rough = [*nodes, target], 0, run.with_tolerance(coarse.case.settings.rough_tolerance)
     while ahead:
         after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
-        if after is not None and coarse.change(states[-1], after, float(stride)) <= LARGEST_CHANGE:
+        if after is not None and coarse.change(states[-1], after) <= LARGEST_CHANGE * stride:
             states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > ATTEMPTS:
