@@ -40,7 +40,7 @@ _MOST_MADE = 4_000_000  # nodes or elements that one keyword may make
 def read_mesh_keyword(draft: Draft, block: Block) -> None:
     """Acts on a keyword of the mesh; others are put aside, as all keywords of a part are until it has an instance."""
     block = replace(block, scope=draft.scope)
-    if draft.part and block.keyword not in ("PART", "ENDPART", "INSTANCE"):
+    if draft.part and block.keyword not in ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE"):
         draft.parts[draft.part].append(block)
     elif block.keyword in KEYWORDS and KEYWORDS[block.keyword].of_mesh:
         find_keyword(block).reader(draft, block)
