@@ -100,10 +100,7 @@ def _share_element(deck: Deck, one: IntArray, other: IntArray) -> NDArray[np.boo
 
 
 def translation(deck: Deck, matrices: Matrices, direction: FloatArray) -> FloatArray:
-    """A rigid translation (n_dof,) by the vector (3,), at the nodes of the mesh.
-
-    Rows of other nodes are amplitudes inside of elements (C3D8I), which take no part.
-    """
+    """A rigid translation (n_dof,) by the vector (3,); rows of nodes inside of elements (C3D8I) take no part."""
     return np.where(np.isin(matrices.node, deck.node_numbers), direction[matrices.direction], 0.0)
 
 

@@ -64,10 +64,7 @@ def checked(parameters: BaseModel) -> Parameters:
 
 
 def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
-    """The files of a model, whose names are relative to a folder.
-
-    Raises SceneError where there are none of these names.
-    """
+    """The files of a model, whose names are relative to a folder. Raises SceneError where one is missing."""
     mesh, recovery = folder / model, None
     matrices = () if parameters.matrices is None else find_matrix_files(folder / parameters.matrices)
     if parameters.recovery is not None:
@@ -82,10 +79,7 @@ def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
 
 
 def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: Progress = silent) -> ReducedModel:
-    """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see.
-
-    Raises SceneError where the files or parameters describe no possible joint.
-    """
+    """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see. Raises SceneError."""
     own = checked(parameters)
 
     def reduced() -> ReducedModel:
@@ -110,10 +104,7 @@ def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh
 
 
 def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
-    """Attributes of a scene or result file: the files with their SHA-256, their units, and what reduced them.
-
-    Raises SceneError or OSError where a file cannot be read.
-    """
+    """Attributes of a scene or result file: the files with their SHA-256, their units, and what reduced them."""
     mesh, *others = files.all
     paths = (mesh, *(mesh.parent / name for name in read_mesh_file(mesh).included), *others)
     return {
@@ -124,10 +115,7 @@ def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
 
 
 def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = silent) -> LoadedModel:
-    """Reads the files and puts the model together.
-
-    Raises SceneError where a file cannot be read, the study names what is not there, or what was exported is of no use.
-    """
+    """Reads the files and puts the model together. Raises SceneError."""
     units = find_units(parameters.units)
     progress(f"reading {files.mesh.name}")
     deck = read_mesh_file(files.mesh)
