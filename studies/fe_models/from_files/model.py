@@ -21,7 +21,7 @@ from studies.fe_models.from_files.selections import Selections, find_clamped, fi
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_cyclic_axis, find_rotation
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
-from studies.fe_models.model_files import ModelFiles, Units, file_digest, find_units
+from studies.fe_models.model_files import UNITS, ModelFiles, Units, file_digest
 from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.joint_model import (
@@ -100,7 +100,7 @@ def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, 
 def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:
     """Outer faces of the mesh. Raises SceneError."""
     own = checked(parameters)
-    return describe_mesh(build_solid_mesh(read_mesh_file(files.mesh), own, find_units(own.units)))
+    return describe_mesh(build_solid_mesh(read_mesh_file(files.mesh), own, UNITS[own.units]))
 
 
 def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
@@ -116,7 +116,7 @@ def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
 
 def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = silent) -> LoadedModel:
     """Reads the files and puts the model together. Raises SceneError."""
-    units = find_units(parameters.units)
+    units = UNITS[parameters.units]
     progress(f"reading {files.mesh.name}")
     deck = read_mesh_file(files.mesh)
     mesh = build_solid_mesh(deck, parameters, units)
