@@ -16,10 +16,8 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to
 from solver.presentation import Presented
-from solver.results.history import StartState
-from solver.results.periodic_motion import PeriodicMotion, periodic_motion
-from solver.results.state_report import evaluated
-from solver.results.verdict import describe_cut_off, first_cut_off
+from solver.results.history import StartState, describe_cut_off, first_cut_off
+from solver.results.state_report import PeriodicMotion, evaluated, periodic_motion
 from solver.settings import Direction, SolverSettings
 from solver.structure.joint import Case, build_case
 

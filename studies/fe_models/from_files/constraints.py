@@ -228,11 +228,11 @@ class _Builder:
         """Displacement and force, N, of each component."""
         for force in self.deck.forces:
             for node in force.nodes:
-                if int(node) not in self.rows or force.dof > 3:
+                if int(node) not in self.rows or force.first_dof > 3:
                     if force.value == 0.0:
                         continue
-                    found = f"{force.place}: node {node} has no dof {force.dof}"
+                    found = f"{force.place}: node {node} has no dof {force.first_dof}"
                     raise SceneError("model", found, "give forces on nodes of elements, or of reference nodes")
-                for k, share in enumerate(self._frame(int(node))[force.dof - 1]):
+                for k, share in enumerate(self._frame(int(node))[force.first_dof - 1]):
                     if share:
                         yield 3 * self.rows[int(node)] + k, self.units.force * force.value * float(share)

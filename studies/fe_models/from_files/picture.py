@@ -39,8 +39,7 @@ def _draw_surface(
     moving, opposite = pairs.moving_name[place], pairs.opposite_name[place]
     both = {each.name: each for each in (contact.first, contact.second)}
     for name, colour in zip((opposite, moving), _SHADES[::-1], strict=True):
-        corners = loaded.mesh.coordinates
-        facets = [corners[facet] for sort in (both[name].triangles, both[name].quads) for facet in sort]
+        facets = loaded.mesh.coordinates[both[name].facets]
         drawn = Poly3DCollection(facets, facecolors=colour, edgecolors=colour, alpha=0.15, label=f"facets of {name}")
         axes.add_collection3d(drawn)
     points = position + pairs.distance[own, None] * pairs.frames[own, 0]
