@@ -39,7 +39,9 @@ class ElementGroup:
 
 @dataclass(frozen=True)
 class SolidMesh:
-    """coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. groups: the elements."""
+    """coordinates (n_nodes, 3): m, NaN for nodes without a place. numbers (n_nodes,): of the nodes in the file, for
+    messages. groups: the elements.
+    """
 
     coordinates: FloatArray
     numbers: IntArray
@@ -49,6 +51,11 @@ class SolidMesh:
     def n_nodes(self) -> int:
         """Number of nodes."""
         return len(self.coordinates)
+
+    def with_nodes(self, numbers: IntArray) -> SolidMesh:
+        """The mesh with further nodes (m,), without elements or a place: others follow them."""
+        coordinates = np.vstack([self.coordinates, np.full((len(numbers), 3), np.nan)])
+        return SolidMesh(coordinates, np.concatenate([self.numbers, numbers]), self.groups)
 
     @property
     def bodies(self) -> IntArray:
@@ -86,7 +93,7 @@ def check_elements(mesh: SolidMesh) -> None:
             wrong = np.flatnonzero(~(smallest_jacobians(kind, mesh.coordinates[group.nodes[chosen]]) > 0.0))
             if len(wrong):
                 found = f"element {group.numbers[chosen][wrong[0]]} ({group.kind}) is turned inside out"
-                remedy = "give its nodes in the order of CalculiX and Abaqus, or mend the mesh"
+                remedy = "give its nodes in the order of CalculiX and Abaqus, or change the geometry"
                 raise SceneError("model", found, remedy)
 
 

@@ -14,7 +14,7 @@ from scipy import sparse
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel
+from studies.finite_element.joint_model import FeModel, JointDefinition
 from studies.finite_element.pairing import ContactPairs, build_contact_pairs
 from studies.scene_error import SceneError
 
@@ -79,9 +79,9 @@ class Structure:
         return Coordinates((total @ constraints.axes[:, free]).tocsr(), (total @ driven).tocsr(), free // 3)
 
 
-def build_structure(model: MeshModel | MatrixModel, joint: JointDefinition) -> Structure:
+def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
     """The structure of a joint, with its pairs. Raises SceneError where the model describes no possible joint."""
-    numbers, coordinates, cut = model.numbers, model.coordinates, joint.cut
+    numbers, coordinates, cut = model.mesh.numbers, model.mesh.coordinates, joint.cut
     constraints = joint.constraints or eliminate((), joint.held, {}, numbers, len(numbers))[0]
     axis = None if cut is None else cut.axis
     # first tangents lie along the axis

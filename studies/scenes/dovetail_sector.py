@@ -20,11 +20,9 @@ import numpy as np
 
 from solver.model import FloatArray, IntArray
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import JointDefinition, MeshModel, Retainer, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer, mean_motion
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
-from studies.finite_element.solid_mesh import check_elements
 from studies.finite_element.surfaces import surface_of_nodes
-from studies.scene_error import SceneError
 from studies.scenes.dovetail_parameters import DovetailParameters
 from studies.scenes.sector import AXIS, block_of, graded, mesh_of_bodies
 
@@ -35,7 +33,7 @@ class Parameters(DovetailParameters):
     Radii of the dovetail and of the blade are measured along the centre line.
     """
 
-    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:
         """The sector as a finite-element model, and what is done with it.
 
         The retainer is a spring on the mean axial relative displacement. A prismatic slot holds the root along its axis
@@ -50,10 +48,6 @@ class Parameters(DovetailParameters):
         m, material = self.mesh, self.material
         bodies = [(_disk_blocks(self), ("disk",) * 3, material), (_blade_blocks(self), ("blade",) * 3, material)]
         solid, (web, post_right, post_left, blade, *_) = mesh_of_bodies(bodies)
-        try:
-            check_elements(solid)
-        except SceneError as error:
-            raise SceneError("mesh", str(m), f"change the geometry: {error.value}") from error
         # Coincident nodes, from the leading to the trailing edge, then from the inner to the outer end. Above the slot
         # bottom and above the root bottom there are m rows of elements before the flank begins.
         flank = slice(m, 2 * m + 1)
@@ -72,7 +66,7 @@ class Parameters(DovetailParameters):
         # The number of axial stations is even: mid-chord lies halfway between the two middle ones.
         n_across, n_axial = blade[-1].shape
         middle = blade[-1][n_across // 2, n_axial // 2 - 1 : n_axial // 2 + 1]
-        tip = SetMotion(middle, _chord_directions(self.tip_stagger)[1])
+        tip = mean_motion(middle, _chord_directions(self.tip_stagger)[1], solid.n_nodes)
         left, right = (
             np.concatenate([web[:, side], post[1:, side]]).ravel() for side, post in ((0, post_left), (-1, post_right))
         )

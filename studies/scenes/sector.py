@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.element_matrices import Material
-from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions
+from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.finite_element.surfaces import describe_mesh
@@ -62,7 +62,7 @@ class SectorParameters(Scene):
         """That of disk and blades."""
         return Material(self.young_modulus, self.poisson_ratio, self.density)
 
-    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:
         """The sector as a finite-element model, and what is done with it.
 
         Raises SceneError where the parameters do not go together.
@@ -75,8 +75,6 @@ class SectorParameters(Scene):
 
     def check(self) -> None:
         """Raises SceneError where parameters do not go together."""
-        most = f"use at most n_sectors // 2 = {self.n_sectors // 2}; more is the same wave turning the other way"
-        wave = (self.nodal_diameter > self.n_sectors // 2, "nodal_diameter", most)
         radii = (
             (
                 getattr(self, inner) >= getattr(self, outer),
@@ -85,14 +83,14 @@ class SectorParameters(Scene):
             )
             for inner, outer in pairwise(self.ASCENDING)
         )
-        for wrong, key, remedy in (wave, *radii, *self.impossible()):
+        for wrong, key, remedy in (*radii, *self.impossible()):
             if wrong:
                 raise SceneError(key, str(getattr(self, key)), remedy)
 
-    def model_of(self, mesh: SolidMesh) -> MeshModel:
+    def model_of(self, mesh: SolidMesh) -> FeModel:
         """The turning mesh."""
         rotation = Rotation((pi * self.rotation_speed / 30.0) ** 2, ORIGIN, AXIS) if self.rotation_speed else None
-        return MeshModel(mesh, rotation, self.stress_stiffening)
+        return FeModel(mesh, rotation, self.stress_stiffening)
 
     def build(self, n_harmonics: int) -> ReducedModel:
         """As `build_fe_scene`.

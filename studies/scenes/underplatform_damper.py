@@ -24,7 +24,7 @@ from solver.model import FloatArray
 from studies.finite_element import surfaces
 from studies.finite_element.cut_faces import CutFaces
 from studies.finite_element.element_matrices import Material
-from studies.finite_element.joint_model import JointDefinition, MeshModel, Retainer, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer, mean_motion
 from studies.finite_element.pairing import ContactSurfaces
 from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
 
@@ -58,7 +58,7 @@ class Parameters(SectorParameters):
         """Radial height of the roof over the sides of the wedge, m."""
         return (self.damper_half_width - 0.5 * self.platform_gap) * tan(radians(self.roof_angle))
 
-    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:
         """The sector as a finite-element model, and what is done with it.
 
         Raises SceneError where the parameters do not go together.
@@ -71,7 +71,8 @@ class Parameters(SectorParameters):
         disk, _, platform, blade, wedge = grids
         held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
         held[disk[0].ravel()] = True
-        tip = SetMotion(blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)]))
+        middle, across = blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)])
+        tip = mean_motion(middle, across, solid.n_nodes)
 
         def contact(label: str, own: slice, other: slice, sector: int) -> ContactSurfaces:
             first = surfaces.surface_of_nodes(solid, f"roof, {label}", wedge[-1, own].ravel())

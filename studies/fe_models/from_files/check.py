@@ -12,7 +12,6 @@ from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
 from studies.fe_models.from_files.model import LoadedModel
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
-from studies.finite_element.joint_model import MatrixModel
 from studies.finite_element.reduced_joint import FeScene, Progress, glued_frequencies, prepare_model, silent
 from studies.scene import make_compliant
 
@@ -29,7 +28,7 @@ def describe_model(
     loaded: LoadedModel, scene: FeScene, parameters: Parameters, progress: Progress = silent
 ) -> list[tuple[str, str]]:
     """Label and text of each line. scene: the reduced model. Raises SceneError."""
-    deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.coordinates
+    deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.mesh.coordinates
     prepared = prepare_model(loaded.model, joint)
     free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
     if joint.cut is not None:
@@ -56,7 +55,7 @@ def describe_model(
     k = parameters.nodal_diameter
     turning = glued_frequencies(prepared, k, N_FREQUENCIES)
     where = f"nodal diameter {k}: " if joint.cut is not None else ""
-    if isinstance(loaded.model, MatrixModel):
+    if loaded.model.forms is not None:
         rows.append(("glued", f"{where}{_frequencies(turning)} Hz, with what the matrices hold"))
     elif prepared.at_rest is None:
         rows.append(("glued", f"{where}{_frequencies(turning)} Hz without prestress"))
@@ -172,7 +171,7 @@ def _sum(forces: FloatArray) -> str:
 
 
 def _held(loaded: LoadedModel) -> str:
-    if not isinstance(loaded.model, MatrixModel):
+    if loaded.model.forms is None:
         return ""
     if loaded.omega_squared_held is None:
         return "; the matrices do not tell theirs"

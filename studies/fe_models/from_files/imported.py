@@ -28,7 +28,6 @@ from studies.fe_models.library_errors import library_errors
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.model_files import ModelFiles, Units
-from studies.finite_element.joint_model import MatrixModel, RowMotion
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.scene_error import SceneError
 
@@ -38,21 +37,22 @@ _OF_ELEMENTS = ("material", "rotation_speed")
 
 @dataclass(frozen=True)
 class NodalMatrices:
-    """A model of matrices with displacements node by node in x, y, z: nodes of the mesh, then those of the matrices
-    alone.
+    """Matrices by name with displacements node by node in x, y, z: nodes of the mesh, then those of the matrices alone.
 
     Rows that are no displacement of a node, as modal coordinates, stand three by three at the end, as if of nodes
     without a place. missing (n_nodes, 3): displacements that the matrices do not have, which must be held. place
     (n_dof,): of each row of the matrices in the displacements of the model.
     """
 
-    model: MatrixModel
+    mesh: SolidMesh
+    forms: Mapping[str, sparse.csr_matrix]
     missing: BoolArray
     place: IntArray
 
 
-def order_by_nodes(matrices: Matrices, units: Units, numbers: IntArray, coordinates: FloatArray) -> NodalMatrices:
-    """Matrices in the order of the nodes of a mesh. numbers (n_mesh,), coordinates (n_mesh, 3), m: its nodes."""
+def order_by_nodes(matrices: Matrices, units: Units, mesh: SolidMesh) -> NodalMatrices:
+    """Matrices in the order of the nodes of a mesh."""
+    numbers = mesh.numbers
     node, direction = matrices.node.copy(), matrices.direction.copy()
     other = np.flatnonzero((direction < 0) | (direction > 2))
     first = min(0, int(node.min(initial=0)), int(numbers.min(initial=0))) - 1
@@ -69,15 +69,11 @@ def order_by_nodes(matrices: Matrices, units: Units, numbers: IntArray, coordina
 
     missing = np.ones(n, dtype=np.bool_)
     missing[place] = False
-    model = MatrixModel(
-        coordinates=np.vstack([coordinates, np.full((len(extra), 3), np.nan)]),
-        numbers=everything,
-        stiffness=ordered(matrices.stiffness),
-        mass=ordered(matrices.mass),
+    forms = {"stiffness": ordered(matrices.stiffness), "mass": ordered(matrices.mass)}
+    if matrices.damping is not None:
         # seconds in all systems of units: N s/m from a damping as N/m from a stiffness
-        damping=None if matrices.damping is None else ordered(matrices.damping),
-    )
-    return NodalMatrices(model, missing.reshape(-1, 3), place)
+        forms["damping"] = ordered(matrices.damping)
+    return NodalMatrices(mesh.with_nodes(extra), forms, missing.reshape(-1, 3), place)
 
 
 @dataclass(frozen=True)
@@ -121,7 +117,7 @@ def import_matrices(
             check_contact_removed(deck, matrices, nodes, (each.first.name, each.second.name), units)
         if rotation is not None:
             held_speed = check_speed(deck, matrices, rotation, of_study=parameters.rotation_speed is not None)
-    return Imported(matrices, order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates), held_speed)
+    return Imported(matrices, order_by_nodes(matrices, units, mesh), held_speed)
 
 
 def check_table(deck: Deck, matrices: Matrices, parameters: Parameters, on_cut: IntArray) -> None:
@@ -155,7 +151,7 @@ def constant_forces(matrices: Matrices, nodal: NodalMatrices, units: Units, n_no
 
 def read_recovery(
     path: Path, matrices: Matrices, nodal: NodalMatrices, units: Units, taken: Collection[str]
-) -> Mapping[str, RowMotion]:
+) -> Mapping[str, FloatArray]:
     """Quantities by name, as sums over the displacements of a model.
 
     A quantity with a unit in its name, as "root stress [MPa]", has this unit; one without is a displacement, m. taken:
@@ -178,7 +174,7 @@ def read_recovery(
         raise SceneError("recovery", f"{path.name}: a response has the name {twice[0]} as well", "give another name")
     motions = {}
     for name, column in zip(names, values.T, strict=True):
-        weights = np.zeros(nodal.missing.size)
+        weights = np.zeros(nodal.forms["mass"].shape[0])
         np.add.at(weights, nodal.place[own], column / (units.length if name.endswith("]") else 1.0))
-        motions[name] = RowMotion(weights)
+        motions[name] = weights
     return motions

@@ -30,7 +30,7 @@ from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
 from studies.fe_models.model_files import ModelFiles, Units, find_units
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, RowMotion, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer, mean_motion
 from studies.finite_element.pairing import ContactPairs, match_nodes
 from studies.finite_element.reduced_joint import Progress, silent
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
@@ -49,7 +49,7 @@ class LoadedModel:
     deck: Deck
     units: Units
     mesh: SolidMesh
-    model: MeshModel | MatrixModel
+    model: FeModel
     joint: JointDefinition
     omega_squared_held: float | None
 
@@ -100,35 +100,37 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     if files.matrices:
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
         imported = import_matrices(files, parameters, deck, mesh, surfaces, units, rotation)
-    numbers = mesh.numbers if imported is None else imported.nodal.model.numbers
+    nodes = mesh if imported is None else imported.nodal.mesh
+    numbers = nodes.numbers
     if clamped is not None:
         clamped = np.pad(clamped, ((0, len(numbers) - len(clamped)), (0, 0)))
     supported = find_constraints(deck, numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     preload = _preload(selections, parameters, units, supported)
     gravity = None if deck.gravity is None else deck.gravity * units.length
-    responses: dict[str, SetMotion | RowMotion] = {
-        name: _motion(selections, each, f"response.{name}.set") for name, each in parameters.responses.items()
+    n_nodes, forms = len(supported.held), None
+    responses = {
+        name: _motion(selections, each, f"response.{name}.set", n_nodes) for name, each in parameters.responses.items()
     }
-    model: MeshModel | MatrixModel
-    if imported is None:
-        model = MeshModel(mesh, rotation, parameters.stress_stiffening, preload, gravity, extra=supported.extra)
-    else:
+    if imported is not None:
         matrices, nodal = imported.matrices, imported.nodal
         if deck.contact_nodes is not None:
             check_table(deck, matrices, parameters, mesh.numbers[on_cut])
-            preload = preload + constant_forces(matrices, nodal, units, len(supported.held))
+            preload = preload + constant_forces(matrices, nodal, units, n_nodes)
         else:
             free = mesh.numbers[~supported.own[: mesh.n_nodes].all(axis=1)]
             check_nodes_have_dofs(matrices, free, "the mesh without its clamps")
         supported.held[: len(nodal.missing)] |= nodal.missing
-        model = replace(nodal.model.with_nodes(supported.extra), rotation=rotation, preload=preload, gravity=gravity)
+        forms = nodal.forms
+        for form in forms.values():
+            form.resize((3 * n_nodes, 3 * n_nodes))
         if files.recovery is not None:
             responses |= read_recovery(files.recovery, matrices, nodal, units, responses)
+    model = FeModel(nodes.with_nodes(supported.extra), rotation, parameters.stress_stiffening, preload, gravity, forms)
     joint = JointDefinition(
         contacts=surfaces.contacts,
         held=supported.held,
-        load=_motion(selections, parameters.load, "load.set"),
+        load=_motion(selections, parameters.load, "load.set", n_nodes),
         responses=responses,
         cut=cut,
         retainer=_retainer(parameters, None if cut is None else cut.axis.axis, rotation),
@@ -150,16 +152,16 @@ def _check_assembled(deck: Deck, units: Units) -> None:
 
 
 def _pairs_of_table(
-    deck: Deck, model: MeshModel | MatrixModel, surfaces: Surfaces, units: Units, axis: CyclicAxis | None
+    deck: Deck, model: FeModel, surfaces: Surfaces, units: Units, axis: CyclicAxis | None
 ) -> ContactPairs | None:
     """Pairs of a table of nodes; None of a mesh, whose facets make them."""
     if deck.contact_nodes is None:
         return None
-    others = len(model.numbers) - len(deck.node_numbers)
+    others = model.mesh.n_nodes - len(deck.node_numbers)
     scales = (deck.contact_nodes.area * units.length**2, deck.contact_nodes.gap * units.length)
     area, gap = (np.pad(each, (0, others), constant_values=np.nan) for each in scales)
     normals = np.pad(deck.contact_nodes.normals, ((0, others), (0, 0)), constant_values=np.nan)
-    return match_nodes(model.coordinates, model.numbers, surfaces.contacts, (area, normals, gap), axis)
+    return match_nodes(model.mesh.coordinates, model.mesh.numbers, surfaces.contacts, (area, normals, gap), axis)
 
 
 def _preload(selections: Selections, parameters: Parameters, units: Units, supported: Supported) -> FloatArray:
@@ -167,7 +169,7 @@ def _preload(selections: Selections, parameters: Parameters, units: Units, suppo
     n_nodes = len(supported.held)
     if not parameters.preload:
         return np.asarray(supported.forces + _pressed(selections.deck, selections.mesh, n_nodes, units))
-    rows = [each.force * _motion(selections, each, "preload.set").row(n_nodes) for each in parameters.preload]
+    rows = [each.force * _motion(selections, each, "preload.set", n_nodes) for each in parameters.preload]
     return np.asarray(np.sum(rows, axis=0))
 
 
@@ -180,8 +182,8 @@ def _check_there(path: Path, key: str) -> None:
         raise SceneError(key, f"there is no file {path.name}", "give a path relative to the study file")
 
 
-def _motion(selections: Selections, given: SetDirection, key: str) -> SetMotion:
-    return SetMotion(selections.nodes(given.set, key), np.array(given.direction))
+def _motion(selections: Selections, given: SetDirection, key: str, n_nodes: int) -> FloatArray:
+    return mean_motion(selections.nodes(given.set, key), np.array(given.direction), n_nodes)
 
 
 def _pressed(deck: Deck, mesh: SolidMesh, n_nodes: int, units: Units) -> FloatArray:
