@@ -9,7 +9,7 @@ import pytest
 from solver.model import ContactInterface, needed_nodal_diameters
 from solver.packing import Packed, pack
 from studies import build_scene, read_scene
-from studies.fe_models.from_files import scene as from_files
+from studies.fe_models.from_files import model as from_files
 from studies.scene_file import write_scene
 from studies.scenes import sector as sector_room
 from studyrunner.cli import main
