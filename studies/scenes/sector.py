@@ -15,10 +15,9 @@ from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
-from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
+from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.finite_element.surfaces import describe_mesh
 from studies.scene import N_MODES, NaturalFrequencies, Scene, SurfaceMesh
 from studies.scene_error import SceneError

@@ -16,9 +16,8 @@ from studies.fe_models.from_files.solid import SPEED_AGREES
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.model_files import Units
 from studies.fe_models.text import FloatArray, IntArray
-from studies.finite_element.element_matrices import element_volumes
 from studies.finite_element.elements import ELEMENT_KINDS
-from studies.finite_element.solid_mesh import Rotation
+from studies.finite_element.solid_mesh import Rotation, volumes_of_points
 from studies.scene_error import SceneError
 
 # of each program: to export free nodes, to take contact out, to keep the prestress
@@ -145,7 +144,7 @@ def mass_by_density(deck: Deck) -> float | None:
             if found is not None and found.density is not None:
                 density[np.isin(block.numbers, section.elements)] = found.density
         places = deck.coordinates[deck.rows_of_nodes(block.nodes)]
-        mass += float(density @ element_volumes(ELEMENT_KINDS[block.kind], places))
+        mass += float((density @ volumes_of_points(ELEMENT_KINDS[block.kind], places)).sum())
     return None if math.isnan(mass) else mass
 
 
