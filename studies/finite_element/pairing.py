@@ -110,10 +110,8 @@ def build_contact_pairs(
     """Pairs of all surfaces, those of the first ones first, each by its moving nodes in ascending order.
 
     coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. contacts: at least one.
-    along (3,): see `local_frames`. axis: of the cyclic structure, for contacts between sectors.
-
-    Raises SceneError where nodes find no point of the other surface, do not face it, or find it behind their own body,
-    and where nodes belong to two pairs.
+    along (3,): see `local_frames`. axis: of the cyclic structure, for contacts between sectors. Raises SceneError where
+    nodes find no point of the other surface, do not face it, or find it behind their own body, or move in two pairs.
     """
     parts = []
     for place, contact in enumerate(contacts):

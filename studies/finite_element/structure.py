@@ -138,8 +138,7 @@ def _check_followers(
 def _hold_cut_faces(held: BoolArray, cut: CutFaces | None, numbers: IntArray) -> BoolArray:
     """Held displacements (n_nodes, 3), those of nodes on one cut face as those of their images.
 
-    numbers (n_nodes,): of the nodes in the file. Raises SceneError where an image does not have the directions in which
-    a node is held.
+    Raises SceneError where an image does not have the directions in which a node is held.
     """
     if cut is None:
         return held

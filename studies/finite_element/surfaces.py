@@ -133,9 +133,7 @@ def loops_of_faces(
     """Nodes of faces, corners anticlockwise from outside, then mid-side nodes; and all nodes of their elements.
 
     name: for messages. elements (n_faces,): element numbers. faces (n_faces,): 1 to 6, the faces S1 to S6 of CalculiX
-    and Abaqus.
-
-    Raises SceneError where there is no such element or face.
+    and Abaqus. Raises SceneError where there is no such element or face.
     """
     loops: list[IntArray] = []
     behind: list[IntArray] = []

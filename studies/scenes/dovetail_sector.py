@@ -19,8 +19,7 @@ from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan
 import numpy as np
 
 from solver.model import FloatArray, IntArray
-from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer, mean_motion
+from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
 from studies.finite_element.surfaces import surface_of_nodes
 from studies.scenes.dovetail_parameters import DovetailParameters
@@ -61,26 +60,16 @@ class Parameters(DovetailParameters):
             )
             for name, moving, opposite in zip(("intrados", "extrados"), blade_flanks, disk_flanks, strict=True)
         )
-        held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
-        held[web[0].ravel()] = True
         # The number of axial stations is even: mid-chord lies halfway between the two middle ones.
         n_across, n_axial = blade[-1].shape
         middle = blade[-1][n_across // 2, n_axial // 2 - 1 : n_axial // 2 + 1]
-        tip = mean_motion(middle, _chord_directions(self.tip_stagger)[1], solid.n_nodes)
-        left, right = (
-            np.concatenate([web[:, side], post[1:, side]]).ravel() for side, post in ((0, post_left), (-1, post_right))
-        )
+        tip = middle, _chord_directions(self.tip_stagger)[1]
+        left = np.concatenate([web[:, 0], post_left[1:, 0]]).ravel()
+        right = np.concatenate([web[:, -1], post_right[1:, -1]]).ravel()
         pairs = build_contact_pairs(solid.coordinates, solid.numbers, contacts, AXIS)
-        joint = JointDefinition(
-            contacts=contacts,
-            held=held,
-            load=tip,
-            responses={"tip": tip},
-            cut=CutFaces(self.axis, left, right),
-            retainer=Retainer(self.retainer, AXIS),
-            pairs=_arranged(pairs, np.concatenate(blade_flanks), solid.n_nodes),
-        )
-        return self.model_of(solid), joint
+        pairs = _arranged(pairs, np.concatenate(blade_flanks), solid.n_nodes)
+        retainer = Retainer(self.retainer, AXIS)
+        return self.sector_of(solid, contacts, web[0].ravel(), (left, right), tip, retainer, pairs)
 
 
 def _arranged(pairs: ContactPairs, flanks: IntArray, n_nodes: int) -> ContactPairs:

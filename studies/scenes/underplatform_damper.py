@@ -22,8 +22,7 @@ from pydantic import Field
 
 from solver.model import FloatArray
 from studies.finite_element import surfaces
-from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer, mean_motion
+from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Material
 from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
@@ -69,28 +68,19 @@ class Parameters(SectorParameters):
         wedge_material = Material(self.young_modulus, self.poisson_ratio, self.damper_density)
         solid, grids = mesh_of_bodies([blade_body, ([self._wedge()], ("wedge",), wedge_material)])
         disk, _, platform, blade, wedge = grids
-        held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
-        held[disk[0].ravel()] = True
-        middle, across = blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)])
-        tip = mean_motion(middle, across, solid.n_nodes)
 
         def contact(label: str, own: slice, other: slice, sector: int) -> ContactSurfaces:
             first = surfaces.surface_of_nodes(solid, f"roof, {label}", wedge[-1, own].ravel())
             second = surfaces.surface_of_nodes(solid, f"underside, {label}", platform[0, other].ravel())
             return ContactSurfaces(first, second, label=label, sector=sector)
 
-        joint = JointDefinition(
-            contacts=(
-                contact("this platform", slice(m + 1), slice(-m - 1, None), 0),
-                contact("next platform", slice(-m - 1, None), slice(m + 1), 1),
-            ),
-            held=held,
-            load=tip,
-            responses={"tip": tip},
-            cut=CutFaces(self.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
-            retainer=Retainer(self.retention_stiffness, AXIS),
+        contacts = (
+            contact("this platform", slice(m + 1), slice(-m - 1, None), 0),
+            contact("next platform", slice(-m - 1, None), slice(m + 1), 1),
         )
-        return self.model_of(solid), joint
+        middle, across = blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)])
+        cut, retainer = (disk[:, 0].ravel(), disk[:, -1].ravel()), Retainer(self.retention_stiffness, AXIS)
+        return self.sector_of(solid, contacts, disk[0].ravel(), cut, (middle, across), retainer)
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """As `SectorParameters.impossible`."""
