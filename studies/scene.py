@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, with_contact_stiffness
-from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.scene_error import SceneError
 
@@ -58,36 +57,6 @@ class ExpectedWear:
     depth: float = math.inf
 
 
-@dataclass(frozen=True)
-class WearQuestion:
-    """What an exact answer is asked for: wear and vibration at one frequency and excitation amplitude.
-
-    frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts. law: wear
-    law. worn_depth: m, of each pair at the count 0. changed: keys of a study that differ from their defaults, as
-    "wear.law"; there is no answer where a closed form does not know one of them.
-    """
-
-    frequency: float
-    excitation_amplitude: float
-    wear_coefficients: FloatArray
-    cycles: FloatArray
-    law: WearLaw = ARCHARD
-    worn_depth: float = 0.0
-    changed: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True)
-class ExactAnswer:
-    """Exact answer to a `WearQuestion`, NaN where it does not hold.
-
-    worn_volume (n_wear, n_cycles): m3, since the count 0. response_amplitude (n_wear, n_cycles, n_response):
-    amplitude of the first harmonic, m.
-    """
-
-    worn_volume: FloatArray
-    response_amplitude: FloatArray
-
-
 def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
     """Lowest frequencies of every nodal diameter of a model with its joint stuck: no relative displacement moves.
 
@@ -127,7 +96,7 @@ class Scene(BaseModel):
     """Parameters of a bundled scene, and what follows from them. Units stand in the descriptions.
 
     FRICTION_IN_MODEL: whether the reduced model depends on the friction coefficient. OFFERS: what a study may ask for
-    among `outputs.variables` that not every scene knows: "mesh", "exact".
+    among `outputs.variables` that not every scene knows: "mesh", "exact" (a method `exact_answer`).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -156,10 +125,6 @@ class Scene(BaseModel):
 
     def describe_mesh(self) -> SurfaceMesh:
         """Outer faces of its mesh, of a scene that offers one. Raises SceneError."""
-        raise NotImplementedError
-
-    def exact_answer(self, asked: WearQuestion) -> ExactAnswer:
-        """The exact answer of a scene that offers one."""
         raise NotImplementedError
 
     def with_room_for_wear(self, expected: ExpectedWear) -> Scene:

@@ -16,10 +16,10 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from solver.contact.wear_law import WearingWork, wearing_work
+from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.model import FloatArray, ReducedModel
 from solver.model_from_matrices import build_model
-from studies.scene import ExactAnswer, Scene, WearQuestion
+from studies.scene import Scene
 
 _SINGULAR = 1e-9  # 1/r beside an odd number, where G has no bound
 _POINTS = 4001  # in a half period, among which the slowest moment of the motion is sought
@@ -203,22 +203,36 @@ class Parameters(Scene):
             response_names=("mass",),
         )
 
-    def exact_answer(self, asked: WearQuestion) -> ExactAnswer:
-        """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
+    def exact_answer(
+        self,
+        frequency: float,
+        excitation_amplitude: float,
+        wear_coefficients: FloatArray,
+        cycles: FloatArray,
+        law: WearLaw = ARCHARD,
+        worn_depth: float = 0.0,
+        changed: frozenset[str] = frozenset(),
+    ) -> tuple[FloatArray, FloatArray]:
+        """Wear and vibration by Den Hartog's closed form and the differential equation of the wear depth.
 
-        NaN where the mass stops on its way, the frequency is one of the singular ones of the form, the mount is damped
-        or the contact compliant, or a key of the study is changed that the form does not know.
+        The volume worn since the count 0 (n_wear, n_cycles), m3, and the amplitude of the first harmonic of the
+        response (n_wear, n_cycles, 1), m. NaN where the mass stops on its way, the frequency is one of the singular
+        ones of the form, the mount is damped, the contact compliant, or `changed`, keys of a study that differ from
+        their defaults, has one that the form does not know.
+
+        frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts.
+        worn_depth: m, at the count 0.
         """
-        mu, load = self.friction_coefficient, self.normal_load - self.normal_stiffness * asked.worn_depth
-        slider = DenHartogSlider(self.mass, self.stiffness, asked.excitation_amplitude, 2.0 * np.pi * asked.frequency)
+        mu, load = self.friction_coefficient, self.normal_load - self.normal_stiffness * worn_depth
+        slider = DenHartogSlider(self.mass, self.stiffness, excitation_amplitude, 2.0 * np.pi * frequency)
         # the worn state depends on wear coefficient and cycle count through their product alone
-        sliding = np.multiply.outer(asked.wear_coefficients, asked.cycles)
-        known = self.damping == 0.0 and self.contact_stiffness is None and asked.changed <= _KNOWN
+        sliding = np.multiply.outer(wear_coefficients, cycles)
+        known = self.damping == 0.0 and self.contact_stiffness is None and changed <= _KNOWN
         if not (known and slider.holds(mu * max(load, 0.0))):
-            return ExactAnswer(np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan))
-        law, contact = asked.law.begun_at(np.array([asked.worn_depth])), self.reduced_model().contact
+            return np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan)
+        begun, contact = law.begun_at(np.array([worn_depth])), self.reduced_model().contact
         different, places = np.unique(sliding, return_inverse=True)
-        work = wearing_work(law, contact, np.array([mu]))
+        work = wearing_work(begun, contact, np.array([mu]))
         depth, force = WearingSlider(slider, mu, load, self.normal_stiffness, self.area, work).worn(different)
         response, places = slider.first_harmonic(mu * force), places.reshape(sliding.shape)
-        return ExactAnswer(self.area * depth[places], response[places][..., np.newaxis])
+        return self.area * depth[places], response[places][..., np.newaxis]
