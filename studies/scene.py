@@ -32,18 +32,6 @@ class SurfaceMesh:
 
 
 @dataclass(frozen=True)
-class NaturalFrequencies:
-    """Natural frequencies with the joint stuck, undamped.
-
-    nodal_diameters: ascending; 0 only where the structure is no cyclic sector. frequencies (n_nodal_diameters,
-    N_MODES): Hz, ascending; NaN where there are fewer modes.
-    """
-
-    nodal_diameters: tuple[int, ...]
-    frequencies: FloatArray
-
-
-@dataclass(frozen=True)
 class ExpectedWear:
     """What a study wears at most.
 
@@ -57,16 +45,16 @@ class ExpectedWear:
     depth: float = math.inf
 
 
-def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
-    """Lowest frequencies of every nodal diameter of a model with its joint stuck: no relative displacement moves.
+def stuck_frequencies(model: ReducedModel) -> dict[int, FloatArray]:
+    """Lowest frequencies (N_MODES,), Hz, ascending, of each nodal diameter of a model with its joint stuck, undamped.
 
-    Raises SceneError where nothing else moves, or nothing holds the stuck structure.
+    No relative displacement moves; NaN where there are fewer modes. Raises SceneError where nothing else moves, or
+    nothing holds the stuck structure.
     """
     from scipy.linalg import LinAlgError, eigh  # where it is used: it takes a while to load
 
-    dofs = model.contact.dofs
-    frequencies = np.full((len(model.linear), N_MODES), np.nan)
-    for row, (k, linear) in enumerate(sorted(model.linear.items())):
+    dofs, frequencies = model.contact.dofs, {}
+    for k, linear in sorted(model.linear.items()):
         free = np.setdiff1d(np.arange(len(linear.stiffness)), dofs[dofs >= 0])
         if len(free) == 0:
             raise SceneError("variables", "natural_frequency", "leave it out: nothing moves where the joint sticks")
@@ -77,9 +65,15 @@ def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
         except LinAlgError:
             remedy = f"leave it out: nothing holds the stuck structure at nodal diameter {k}"
             raise SceneError("variables", "natural_frequency", remedy) from None
-        moving = inverse[inverse > np.finfo(np.float64).eps * len(free) * inverse[0]][:N_MODES]
-        frequencies[row, : len(moving)] = 1.0 / (2.0 * np.pi * np.sqrt(moving))
-    return NaturalFrequencies(tuple(sorted(model.linear)), frequencies)
+        moving = inverse[inverse > np.finfo(np.float64).eps * len(free) * inverse[0]]
+        frequencies[k] = lowest(1.0 / (2.0 * np.pi * np.sqrt(moving)))
+    return frequencies
+
+
+def lowest(frequencies: FloatArray) -> FloatArray:
+    """The first N_MODES of ascending frequencies, NaN where there are fewer."""
+    own = frequencies[:N_MODES]
+    return np.append(own, np.full(N_MODES - len(own), np.nan))
 
 
 ContactStiffness = Annotated[
@@ -119,8 +113,8 @@ class Scene(BaseModel):
         """The same of a scene whose harmonics all see one structure."""
         raise NotImplementedError
 
-    def natural_frequencies(self, model: ReducedModel) -> NaturalFrequencies:
-        """Those that the scene knows; model: its reduced model. Raises SceneError."""
+    def natural_frequencies(self, model: ReducedModel) -> dict[int, FloatArray]:
+        """As `stuck_frequencies`, of all nodal diameters that the scene knows; model: its reduced model."""
         return stuck_frequencies(model)
 
     def describe_mesh(self) -> SurfaceMesh:

@@ -20,7 +20,7 @@ from studies.finite_element.pairing import ContactPairs, ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.finite_element.surfaces import describe_mesh
-from studies.scene import N_MODES, NaturalFrequencies, Scene, SurfaceMesh
+from studies.scene import N_MODES, Scene, SurfaceMesh, lowest
 from studies.scene_error import SceneError
 
 _SAME_NODE = 1e-9  # points closer than this, in m, are one node
@@ -116,15 +116,12 @@ class SectorParameters(Scene):
         """Outer faces of the sector."""
         return describe_mesh(self.define_sector()[0].mesh)
 
-    def natural_frequencies(self, model: ReducedModel) -> NaturalFrequencies:
+    def natural_frequencies(self, model: ReducedModel) -> dict[int, FloatArray]:
         """With all contacts glued, at all nodal diameters 0..N/2; of a compliant contact those of the model."""
         if self.contact_stiffness is not None:
             return super().natural_frequencies(model)
-        prepared, found = prepare_model(*self.define_sector()), np.full((self.n_sectors // 2 + 1, N_MODES), np.nan)
-        for k, row in enumerate(found):
-            own = glued_frequencies(prepared, k, N_MODES)
-            row[: len(own)] = own
-        return NaturalFrequencies(tuple(range(len(found))), found)
+        prepared = prepare_model(*self.define_sector())
+        return {k: lowest(glued_frequencies(prepared, k, N_MODES)) for k in range(self.n_sectors // 2 + 1)}
 
 
 def mesh_of_bodies(

@@ -69,10 +69,11 @@ def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
     bundled = scene.is_bundled and as_scene(scene.parameters)
     found = bundled.natural_frequencies(model) if bundled else stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()
-    labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
-    yield SmallArray("natural_frequency", entry.dimensions, found.frequencies, entry)
-    for name, values in labels.items():
-        yield SmallArray(name, (name,), np.array(values, dtype=np.int32), COORDINATES[name])
+    values = np.array(list(found.values()))
+    labels = {"nodal_diameter": list(found), "mode": range(1, values.shape[1] + 1)}
+    yield SmallArray("natural_frequency", entry.dimensions, values, entry)
+    for name, numbers in labels.items():
+        yield SmallArray(name, (name,), np.array(numbers, dtype=np.int32), COORDINATES[name])
 
 
 @dataclass(frozen=True)

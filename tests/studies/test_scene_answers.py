@@ -121,9 +121,10 @@ def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector(
     parameters = dovetail(nodal_diameter=4, n_sectors=12)
     model = build_scene("dovetail_sector", parameters, 3)
     whole, own = parameters.natural_frequencies(model), stuck_frequencies(model)
-    assert whole.nodal_diameters == (0, 1, 2, 3, 4, 5, 6)
-    assert own.nodal_diameters == tuple(model.linear) == (0, 4)
-    assert own.frequencies == pytest.approx(whole.frequencies[[0, 4]], rel=1e-9, abs=0.0)
+    assert list(whole) == list(range(7))
+    assert list(own) == list(model.linear) == [0, 4]
+    for k, found in own.items():
+        assert found == pytest.approx(whole[k], rel=1e-9, abs=0.0)
 
 
 def test_a_displacement_without_mass_has_no_frequency():
@@ -134,7 +135,7 @@ def test_a_displacement_without_mass_has_no_frequency():
     # the two masses with others behind them
     model, rest = build_scene("two_masses", scene_parameters("two_masses")(), 1), (np.zeros(9), np.zeros(9, complex))
     linear = LinearModel(mass, np.zeros((9, 9)), stiffness, *rest, np.zeros((2, 9)))
-    found = stuck_frequencies(replace(model, linear={0: linear})).frequencies[0]
+    found = stuck_frequencies(replace(model, linear={0: linear}))[0]
     keep, gone = [0, 2, 4, 6, 7], [3, 5, 8]
     condensed = stiffness[np.ix_(keep, keep)] - stiffness[np.ix_(keep, gone)] @ np.linalg.solve(
         stiffness[np.ix_(gone, gone)], stiffness[np.ix_(gone, keep)]
