@@ -81,7 +81,7 @@ class Structure:
 
 def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
     """The structure of a joint, with its pairs. Raises SceneError where the model describes no possible joint."""
-    numbers, coordinates, cut = model.mesh.numbers, model.mesh.coordinates, joint.cut
+    numbers, cut = model.mesh.numbers, joint.cut
     constraints = joint.constraints or eliminate((), joint.held, {}, numbers, len(numbers))[0]
     axis = None if cut is None else cut.axis
     # first tangents lie along the axis
@@ -94,8 +94,8 @@ def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
             each.turned_round if follow[each.first.nodes].any() and not follow[each.second.nodes].any() else each
             for each in joint.contacts
         ]
-        pairs = build_contact_pairs(coordinates, numbers, contacts, along, axis)
-    ties = build_contact_pairs(coordinates, numbers, joint.ties, along) if joint.ties else None
+        pairs = build_contact_pairs(model.mesh, contacts, along, axis)
+    ties = build_contact_pairs(model.mesh, joint.ties, along) if joint.ties else None
     _check_followers(constraints, numbers, cut, pairs, ties)
     held = _hold_cut_faces(joint.held, cut, numbers)
     pairs = _merge_cut_pairs(_hold_pairs(pairs, numbers, held, constraints, cut), cut, numbers)

@@ -66,7 +66,7 @@ class Parameters(DovetailParameters):
         tip = middle, _chord_directions(self.tip_stagger)[1]
         left = np.concatenate([web[:, 0], post_left[1:, 0]]).ravel()
         right = np.concatenate([web[:, -1], post_right[1:, -1]]).ravel()
-        pairs = build_contact_pairs(solid.coordinates, solid.numbers, contacts, AXIS)
+        pairs = build_contact_pairs(solid, contacts, AXIS)
         pairs = _arranged(pairs, np.concatenate(blade_flanks), solid.n_nodes)
         retainer = Retainer(self.retainer, AXIS)
         return self.sector_of(solid, contacts, web[0].ravel(), (left, right), tip, retainer, pairs)

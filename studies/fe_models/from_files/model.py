@@ -198,7 +198,7 @@ def _pairs_of_table(
         np.pad(each, (0, others), constant_values=np.nan) for each in (table.area * length**2, table.gap * length)
     )
     normals = np.pad(table.normals, ((0, others), (0, 0)), constant_values=np.nan)
-    return match_nodes(mesh.coordinates, mesh.numbers, contacts, (area, normals, gap), axis)
+    return match_nodes(mesh, contacts, (area, normals, gap), axis)
 
 
 def _preload(selections: Selections, supported: Supported) -> FloatArray:
