@@ -109,13 +109,7 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
 def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
     """The mesh of a scene file, None where it has none. Raises what `read_scene` raises."""
     with _open_scene(Path(path), group) as (_, datasets):
-        return _read_mesh(datasets) if _holds_mesh(datasets) else None
-
-
-def has_mesh(path: str | Path, group: str = "") -> bool:
-    """Whether a scene file has a mesh. Raises what `read_scene` raises."""
-    with _open_scene(Path(path), group) as (_, datasets):
-        return _holds_mesh(datasets)
+        return _read_mesh(datasets) if any(key.startswith("mesh/") for key in datasets) else None
 
 
 def read_origin(path: str | Path) -> dict[str, str]:
@@ -147,10 +141,6 @@ def _prefixes(datasets: Datasets) -> dict[int, str]:
     """Beginnings of the names of the datasets of each nodal diameter; of 0 alone where the file has no groups `nd`."""
     found = {int(match[1]) for key in datasets if (match := re.match(r"nd/(0|[1-9][0-9]*)/", key))}
     return {k: f"nd/{k}/" for k in sorted(found)} or {0: ""}
-
-
-def _holds_mesh(datasets: Datasets) -> bool:
-    return any(key.startswith("mesh/") for key in datasets)
 
 
 def _read_mesh(datasets: Datasets) -> SurfaceMesh:
