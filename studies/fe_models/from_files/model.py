@@ -27,7 +27,7 @@ from studies.finite_element.joint_model import FeModel, JointDefinition, Reducti
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
 from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
-from studies.finite_element.surfaces import describe_mesh, loops_of_faces, pressure_forces
+from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
 from studies.scene import SurfaceMesh, build_compliant
 from studies.scene_error import SceneError
 
@@ -210,9 +210,9 @@ def _preload(selections: Selections, supported: Supported) -> FloatArray:
     forces = np.zeros(3 * n_nodes)
     for each in selections.deck.pressures:
         kept = np.isin(each.elements, np.concatenate([group.numbers for group in mesh.groups]))
-        loops, _ = loops_of_faces(mesh, each.place, each.elements[kept], each.faces[kept])
+        faces = faces_of_elements(mesh, each.place, each.elements[kept], each.faces[kept])
         pressure = each.value * selections.units.stress
-        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, loops, pressure)
+        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, faces, pressure)
     return np.asarray(supported.forces + forces)
 
 

@@ -10,7 +10,7 @@ from studies.finite_element.closest_points import closest_points
 from studies.finite_element.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
-from studies.finite_element.surfaces import loops_of_faces, pressure_forces, surface_of_faces, surface_of_nodes
+from studies.finite_element.surfaces import faces_of_elements, pressure_forces, surface_of_faces, surface_of_nodes
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, surface_where
 from tests.studies.fe_models.solid_meshes import block, joined
@@ -31,7 +31,7 @@ def test_forces_of_a_pressure(kind):
     """5 Pa on a face of 2 by 3 m: its resultant and moments, of quadratic faces the second moment as well."""
     mesh, _ = block(kind, (2, 2, 2), lambda points: points * [2.0, 3.0, 1.0])
     faces = faces_where(mesh, np.abs(mesh.coordinates[:, 2] - 1.0) < 1e-9)
-    forces = pressure_forces(mesh.coordinates, loops_of_faces(mesh, "TOP", *faces)[0], 5.0).reshape(-1, 3)
+    forces = pressure_forces(mesh.coordinates, faces_of_elements(mesh, "TOP", *faces), 5.0).reshape(-1, 3)
     np.testing.assert_allclose(forces.sum(axis=0), [0.0, 0.0, -30.0], atol=1e-12)
     np.testing.assert_allclose(np.cross(mesh.coordinates, forces).sum(axis=0), [-45.0, 30.0, 0.0], atol=1e-12)
     if ELEMENT_KINDS[kind].reference.edges:
