@@ -209,10 +209,10 @@ def _find_scene(model: str, parameters: BaseModel, given: Mapping[str, Any], ori
 
 def _in_file(path: Path, group: str, origin: Origin) -> dict[str, Any]:
     """Where the scene stands and what it offers, once it is known that it can be read at all."""
-    from studies.scene_file import has_mesh
+    from studies.scene_file import read_mesh
 
     with scene_errors(origin.source, path):
-        return {"path": path, "group": group, "offers": ("mesh",) if has_mesh(path, group) else ()}
+        return {"path": path, "group": group, "offers": ("mesh",) if read_mesh(path, group) is not None else ()}
 
 
 class _OfResult(Section):
