@@ -73,7 +73,7 @@ class Mode(JointTask):
                 "outcome": int(found.outcome),
             }
             values = named((*self.variables, *OF_A_MODE_POINT), own, found)
-            yield PointResult(self.points(wanted[place]), values, wanted[place])
+            yield PointResult(values, wanted[place])
 
     def describe(self, place: int) -> str:
         """Where along the amplitude."""

@@ -95,12 +95,10 @@ class StartResult:
 class PointResult:
     """The result of one point, or of several points that share it.
 
-    points: indices along the dimensions of the study. values: variables of the result by name, with the dimensions
-    after the axes; NaN, or 0 in whole numbers, where not reached, as are missing variables in the file. progress: of a
-    history that was ended by its time limit.
+    values: variables of the result by name, with the dimensions after the axes; NaN, or 0 in whole numbers, where not
+    reached, as are missing variables in the file. progress: of a history that was ended by its time limit.
     """
 
-    points: tuple[Index, ...]
     values: Mapping[str, Any]
     place: int = 0
     progress: Packed | None = None
@@ -162,9 +160,9 @@ class Task(ABC):
         """Numbers of the scenes whose models the task needs."""
 
     @property
-    @abstractmethod
     def order(self) -> tuple[int, ...]:
         """Places of all results, in the order in which they are given."""
+        return tuple(range(len(self.indices)))
 
     @property
     def places(self) -> tuple[int, ...]:
@@ -209,7 +207,7 @@ class Task(ABC):
 
     def failed(self, place: int, outcome: int, message: str) -> Result:
         """In place of a result that was not computed."""
-        return PointResult(self.points(place), {"outcome": outcome, "message": message}, place)
+        return PointResult({"outcome": outcome, "message": message}, place)
 
     @abstractmethod
     def describe(self, place: int) -> str:

@@ -28,10 +28,9 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
     the end of the integrated history. What was computed of a history that ends early is kept. Effort is that of the
     integrated history.
     """
-    scaled = integrated.histories[place]
-    slower = scaled.wear_coefficient / integrated.wear_coefficient if place else 1.0
+    slower = integrated.wear_coefficients[place] / integrated.wear_coefficients[0] if place else 1.0
     endless = task.to_the_end is not None and not integrated.unworn
-    counts = history.cycles if endless else np.array(integrated.counts(task.cycles, scaled))
+    counts = history.cycles if endless else np.array(integrated.counts(task.cycles, place))
     rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
     known = rows[reached]
@@ -68,7 +67,7 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
         "message": message or (describe_target(task.until, target, "cycle", whole=whole) if known.size else ""),
     }
     values = _at_counts(history, task.variables, slower, rows, reached) | named(tuple(KEPT), own, history)
-    return PointResult(scaled.points, values, place)
+    return PointResult(values, place)
 
 
 def _at_counts(
