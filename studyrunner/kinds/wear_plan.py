@@ -97,21 +97,21 @@ def build_tasks(
 
 def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) -> dict[_Case, _Starts]:
     """Points that one sweep reaches."""
-    cases: dict[_Case, _Starts] = {}
+    cases, own_axes = dict[_Case, _Starts](), study.own_axes
     lines = [(at, settings_at(study, at)) for at in grid(study, "excitation_amplitude", "sweep")]
     for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
         axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
-        choices = list(itertools.product(*(range(len(getattr(axes, name))) for name in _OF_HISTORY)))
+        sizes = (range(len(getattr(axes, name))) for name in _OF_HISTORY)
+        choices = [dict(zip(_OF_HISTORY, choice, strict=True)) for choice in itertools.product(*sizes)]
         for at, settings in lines:
             amplitude, direction = axes.excitation_amplitude[at["excitation_amplitude"]], axes.sweep[at["sweep"]]
             starts = cases.setdefault(_Case(joint, amplitude, direction, settings), {})
             for place, frequency in enumerate(axes.frequency):
                 points = starts.setdefault(frequency, {}).setdefault(law, [])
                 for choice in choices:
-                    wear, step, scheme = choice
-                    places = {**at, "frequency": place, **dict(zip(_OF_HISTORY, choice, strict=True))}
-                    index = (*(places[name] for name in study.own_axes), *part.place)
-                    points.append(_Point(axes.wear_coefficient[wear], axes.step[step], axes.scheme[scheme], index))
+                    places = {**at, "frequency": place, **choice}
+                    own = (getattr(axes, name)[index] for name, index in choice.items())
+                    points.append(_Point(*own, (*(places[name] for name in own_axes), *part.place)))
     return cases
 
 
