@@ -224,11 +224,10 @@ def _answer(path: Path) -> Sequence[str]:
     # where they are used: they take a second to load
     from studyrunner.result.opening import open_result
     from studyrunner.summary.answer import summary
-    from studyrunner.summary.lines import summary_lines
 
     try:
         with open_result(path) as dataset:
-            return summary_lines(summary(dataset))
+            return summary(dataset).lines
     except UserError as error:
         # the result is there all the same, but larger than what is read
         return (f"no summary: {error}",)
@@ -282,8 +281,7 @@ def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _scene_help(scene: str) -> str:
-    from studies.scene_help import scene_help
-    from studies.scenes import BUNDLED
+    from studies.scenes import BUNDLED, scene_help
 
     if scene not in BUNDLED:
         raise UserError("command line", "--scene-help", scene, f"give one of {', '.join(BUNDLED)}")

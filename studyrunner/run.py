@@ -14,7 +14,7 @@ from studyrunner.mpi.ranks import Ranks, job_size
 from studyrunner.mpi.schedule import serve_tasks
 from studyrunner.plan import build_tasks, describe_tasks, doubts_of_study
 from studyrunner.result.arrays import small_arrays
-from studyrunner.result.provenance import compare_with_archived, describe_run, describe_time_and_commit
+from studyrunner.result.provenance import compare_with_archived, describe_date, describe_run
 from studyrunner.result.target import Target, identity_of
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
@@ -72,9 +72,8 @@ def compute_study(
     """
     scenes = build_scenes(ranks, study, store, display.step)
     facts = merge_facts(scenes.facts)
-    # the software is described when the run begins: a checkout may have changed at the end of the run
     attributes = {**describe_run(study, facts), **({} if scenes.kept is None else scenes.kept.origin)}
-    attributes |= describe_time_and_commit(options.date)
+    attributes |= describe_date(options.date)
     completion = _open_completion(study, scenes, store, facts, options)
 
     def write() -> Counter[int]:

@@ -110,7 +110,7 @@ def test_points_to_the_end_have_counts_of_their_own_in_file_report_and_archive()
     with open_result("out.nc") as opened:
         assert np.array_equal(opened.cycle_count.values, result.cycle_count.values)
     shown = open_for_report("out.nc")
-    assert np.array_equal(shown.cycles, shown.counts(shown.shown_point()))
+    assert np.array_equal(shown.cycles, shown.counts(shown.shown))
     assert shown.cycles[-1] in counts[:, :, -1]
     shown.dataset.close()
     with pytest.raises(ValueError, match="joins only those"):
@@ -152,7 +152,7 @@ def test_the_frequency_of_each_count_is_in_the_result_and_in_the_report(capsys):
     for line, expected in zip(figure.axes[0].get_lines(), followed.values, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), expected)
     # the middle of the range is no frequency of the point
-    assert "205" not in shown.describe(shown.shown_point(), ["frequency"])
+    assert "205" not in shown.describe(shown.shown, ["frequency"])
     shown.dataset.close()
 
 
