@@ -110,8 +110,9 @@ def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) ->
                 points = starts.setdefault(frequency, {}).setdefault(law, [])
                 for choice in choices:
                     places = {**at, "frequency": place, **choice}
-                    own = (getattr(axes, name)[index] for name, index in choice.items())
-                    points.append(_Point(*own, (*(places[name] for name in own_axes), *part.place)))
+                    wear, step, scheme = (getattr(axes, name)[index] for name, index in choice.items())
+                    at_axes = (*(places[name] for name in own_axes), *part.place)
+                    points.append(_Point(wear, step, scheme, at_axes))
     return cases
 
 
