@@ -89,7 +89,7 @@ class Mission(Task):
         """Those of the blocks."""
         return tuple(sorted({block.joint.scene for block in self.blocks}))
 
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hash of the history: of all blocks with their scenes."""
         blocks = [(identity.joint(block.joint), replace(block, joint=_NO_JOINT)) for block in self.blocks]
         wear = (self.wear_coefficient, self.law, self.first, self.settings)

@@ -50,7 +50,7 @@ class Mode(JointTask):
         """Indices of the amplitudes in the order in which they are computed."""
         return up_or_down(len(self.amplitudes), self.direction)
 
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
         own = (identity.joint(self.joint), self.mode, self.direction, self.settings, identity.record)
         return tuple(digest("mode", *own, amplitude) for amplitude in self.amplitudes)

@@ -109,7 +109,7 @@ class Sweep(_FromRest):
         """Indices of the frequencies in the order of the sweep."""
         return up_or_down(len(self.frequencies), self.direction)
 
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the start states."""
         return tuple(self.name_of_start(identity, frequency) for frequency in self.frequencies)
 
@@ -216,7 +216,7 @@ class History(_FromRest):
         cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else COST_AT_REST))
         return replace(self, start=result.start, cost=cost, n_unknowns=n_unknowns, moves=result.moves)
 
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the histories: of their start state, and of all that is done with it."""
         start = self.name_of_start(identity, self.frequency)
         kept = _digest_once(identity.record, self.cycles, self.loops, self.until, self.to_the_end)
