@@ -9,6 +9,7 @@ import errno
 import json
 import re
 from collections.abc import Mapping
+from datetime import date, time
 from pathlib import Path
 
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
@@ -112,6 +113,8 @@ def toml_value(value: object) -> str:
         return "{" + ", ".join(items) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(toml_value, value)) + "]"
+    if isinstance(value, date | time):
+        return value.isoformat()
     return json.dumps(value, ensure_ascii=False) if isinstance(value, bool | str) else repr(value)
 
 
