@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import NotNegative, Positive, Section, Whole, Wrong
@@ -42,12 +42,11 @@ class Distribution(Section):
     LOCATION: ClassVar[str]
     WIDTHS: ClassVar[tuple[tuple[str, ...], ...]]
 
-    @model_validator(mode="after")
-    def _check(self) -> Distribution:
-        given = {key for key in type(self).model_fields if getattr(self, key) is not None} - {self.LOCATION}
-        if given not in [{*keys} - {self.LOCATION} for keys in self.WIDTHS]:
-            raise ValueError(f"give either {', or '.join(' and '.join(keys) for keys in self.WIDTHS)}")
-        return self
+    def rules(self) -> Iterator[Wrong]:
+        """One of the widths is given."""
+        given = self.model_dump(exclude_none=True)
+        if given.keys() - {self.LOCATION} not in [{*keys} - {self.LOCATION} for keys in self.WIDTHS]:
+            yield Wrong("", given, f"give either {', or '.join(' and '.join(keys) for keys in self.WIDTHS)}")
 
     @property
     def is_absolute(self) -> bool:
@@ -104,12 +103,12 @@ class Uniform(Distribution):
     high: float | None = None
     half_width: NotNegative | None = None
 
-    @model_validator(mode="after")
-    def _check_ends(self) -> Uniform:
+    def rules(self) -> Iterator[Wrong]:
+        """With both ends, in their order, or none."""
+        yield from super().rules()
         ends = [each for each in (self.low, self.high) if each is not None]
         if len(ends) == 1 or (ends and ends[0] >= ends[1]):
-            raise ValueError("give a low, and a high above it")
-        return self
+            yield Wrong("", self.model_dump(exclude_none=True), "give a low, and a high above it")
 
     def at(self, own: Array, score: Array) -> Array:
         """As `Distribution.at`."""
@@ -129,13 +128,11 @@ class Scattered(Section):
     of: Of = "all pairs"
     correlation_length: Positive | None = Field(None, description="m")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _has_one_distribution(cls, table: object) -> object:
-        if not isinstance(table, Mapping) or len(table.keys() & {"normal", "lognormal", "uniform"}) != 1:
-            remedy = "give a table with one distribution, normal or lognormal or uniform, as {normal = {std = 0.03}}"
-            raise ValueError(remedy)
-        return table
+    def rules(self) -> Iterator[Wrong]:
+        """It has one distribution."""
+        if sum(each is not None for each in (self.normal, self.lognormal, self.uniform)) != 1:
+            remedy = "give one distribution, normal or lognormal or uniform, as {normal = {std = 0.03}}"
+            yield Wrong("", self.model_dump(exclude_unset=True), remedy)
 
     @property
     def distribution(self) -> Distribution:

@@ -31,7 +31,8 @@ from studyrunner.scene.answers import (
 )
 from studyrunner.scene.scene import InMemory, SceneFacts, build_study_scene, describe_scene, model_key
 from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
-from studyrunner.study.scene_axes import keys_as_given
+from studyrunner.study.mistakes import keys_as_given
+from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
 from studyrunner.system.files import new_partial
 from studyrunner.user_error import UserError
@@ -149,7 +150,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
     scenes = find_scenes(study)
     seeing = ranks_that_see(ranks, new_partial(store.path))
     kept, notes = None, tuple[str, ...]()
-    with keys_as_given(study.scene_axes):
+    with keys_as_given(keys_below_axes(study.scene_axes)):
         if len(scenes.studies) > 1:
             building = _Building(scenes, store, say)
             serve_tasks(ranks, building, build_scene_task)

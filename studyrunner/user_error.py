@@ -84,7 +84,7 @@ class WrongValueError(ValueError):
     """A value that a check of one key refuses; the reader of the study adds the file and the key.
 
     value: the offending part of what stands there. remedy: what would be right.
-    key: dotted name where the check knows it better than the reader (a rule between two keys).
+    key: dotted name below that key, where a rule between keys refuses it.
     """
 
     def __init__(self, value: object, remedy: str, key: str | None = None) -> None:

@@ -8,9 +8,9 @@ from __future__ import annotations
 import decimal
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from studyrunner.user_error import WrongValueError
 
@@ -23,7 +23,7 @@ _LARGEST_WHOLE = 2.0**53
 
 
 class Wrong(NamedTuple):
-    """What a rule between keys refuses: dotted key, the value that stands there, what would be right."""
+    """What a rule between keys refuses: dotted key, "" for the whole table, its value, what would be right."""
 
     key: str
     value: object
@@ -42,8 +42,14 @@ class Section(BaseModel):
     EXTRA: ClassVar[type[BaseModel] | None] = None
 
     def rules(self) -> Iterator[Wrong]:
-        """Rules between the keys of the table, whose values are all right by themselves: what breaks them."""
+        """What breaks a rule between the keys of the table, whose values are all right by themselves."""
         return iter(())
+
+    @model_validator(mode="after")
+    def _keep_rules(self) -> Self:
+        for key, value, remedy in self.rules():
+            raise WrongValueError(value, remedy, key)
+        return self
 
 
 def _no_text(value: object) -> object:

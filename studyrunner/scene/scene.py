@@ -142,17 +142,8 @@ def model_key(study: Study) -> str:
     """Hash under which the model of a scene is kept: of its parameters and files, and of the source of the scenes."""
     sources = [package_digest(package) for package in ("studies", "solver")]
     content = None if study.scene.path is None else file_digest(study.scene.path)
-    own = study.scene.model, scene_parameters_of(study), describe_origin(study), content, harmonics_to_build(study)
+    own = study.scene.model, study.scene.of_model, describe_origin(study), content, harmonics_to_build(study)
     return hashlib.sha256(json.dumps((sources, own), sort_keys=True).encode()).hexdigest()[:32]
-
-
-def scene_parameters_of(study: Study) -> dict[str, object]:
-    """Parameters that the model of a scene depends on: mostly without one friction coefficient for all pairs."""
-    given: dict[str, object] = study.scene.parameters.model_dump(mode="json")
-    depends = study.scene.is_bundled and scene_has(study.scene.model, "FRICTION_IN_MODEL")
-    if not depends and not isinstance(given["friction_coefficient"], dict):
-        del given["friction_coefficient"]
-    return given
 
 
 def describe_origin(study: Study) -> dict[str, str]:
@@ -270,7 +261,7 @@ def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] 
     if study.variants:
         names = ", ".join(f"axes.{axis.dotted}" for axis in study.scene_axes)
         raise UserError(study.source, names, None, "give one value: a scene file holds one scene")
-    if len({json.dumps(scene_parameters_of(block), sort_keys=True) for block in study.block_studies}) > 1:
+    if len({json.dumps(block.scene.of_model, sort_keys=True) for block in study.block_studies}) > 1:
         raise UserError(study.source, "mission", None, "give all blocks one scene: a scene file holds one")
     study = next(iter(study.block_studies), study)
     model = build_study_scene(study, progress)

@@ -17,10 +17,10 @@ from studyrunner.scene.scene import (
     build_study_scene,
     describe_scene,
     harmonics_to_build,
-    scene_parameters_of,
 )
+from studyrunner.study.mistakes import keys_as_given
 from studyrunner.study.realisation import Realisation, realise
-from studyrunner.study.scene_axes import keys_as_given
+from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
 
@@ -71,7 +71,7 @@ def _key(study: Study) -> str:
     scene = study.scene
     files = None if scene.files is None else [str(path) for path in scene.files.all]
     where = None if scene.path is None else str(scene.path), scene.group, files
-    return json.dumps([scene.model, scene_parameters_of(study), where, harmonics_to_build(study)], sort_keys=True)
+    return json.dumps([scene.model, study.scene.of_model, where, harmonics_to_build(study)], sort_keys=True)
 
 
 def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
@@ -129,7 +129,7 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
         sizes = str([value for _, value in each.scene.parameters if not isinstance(value, float)])
         if sizes not in built and len(built) < _MOST_PLANNED:
             say(f"building scene {number + 1} of {len(scenes.studies)}")
-            with keys_as_given(study.scene_axes):
+            with keys_as_given(keys_below_axes(study.scene_axes)):
                 built[sizes] = describe_scene(build_study_scene(each, say))
         facts.append(built.get(sizes) or next(reversed(built.values())))
     left = (time.monotonic() - began) / len(built) * (len(facts) - len(built))

@@ -8,7 +8,8 @@ from typing import Any, get_args
 from solver.settings import FIRST_HARMONICS
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import OF_PAIRS
-from studyrunner.study.mistakes import Mistakes, nearest_name
+from studyrunner.study.mission import OWN_AXES
+from studyrunner.study.mistakes import nearest_name
 from studyrunner.study.realisation import is_of_pairs
 from studyrunner.study.sections import AUTO, DEFAULT
 from studyrunner.study.study import MISSIONS, MODES, NUMBERS, WEAR, Study
@@ -18,11 +19,10 @@ from studyrunner.variables import KEPT
 _MOST_POINTS = 1_000_000
 
 
-def check_rules(study: Study, found: Mistakes) -> None:
-    """Notes what breaks a rule."""
-    for rule in (_kind, _frequency, _variables, size_of_result, _solver, _end, wrong_scatter):
-        for wrong in rule(study):
-            found.add(*wrong)
+def broken_rules(study: Study) -> Iterator[Wrong]:
+    """All that does not fit together. study: with its axes, without variants, and before it is complete."""
+    for rule in (_kind, _blocks, _frequency, _variables, _size_of_result, _solver, _end, _scatter):
+        yield from rule(study)
 
 
 def _kind(study: Study) -> Iterator[Wrong]:
@@ -33,17 +33,42 @@ def _kind(study: Study) -> Iterator[Wrong]:
         for key in [key for key in keys if key in table.model_fields_set]:
             if (value := getattr(table, key)) != ():
                 yield Wrong(f"{name}.{key}", value, kind.why)
+    worn, missions = study.scene.worn, study.slow_time.missions
     if kind is MODES and "ramp" in axes.sweep:
         yield Wrong("axes.sweep", "ramp", 'give "up" or "down": the modal amplitude is raised or lowered')
+    if kind is MODES and worn is not None and not any(axis.key == ("worn",) for axis in study.scene_axes):
+        remedy = "missing: give the cycle count of each depth, which is the coordinate cycle of the modes"
+        yield Wrong("scene.worn.cycle", None, remedy)
     if kind is not MODES and axes.mode != (1,):
         yield Wrong("axes.mode", axes.mode, "give axes.modal_amplitude as well: mode is that of a nonlinear mode")
-    missions = study.slow_time.missions
     if kind is MISSIONS and missions is None:
         remedy = "missing: give the number of missions, how often the blocks are repeated"
         yield Wrong("slow_time.missions", None, remedy)
-    elif kind is WEAR and missions is not None:
+    if kind is WEAR and missions is not None:
         remedy = "give blocks under [[mission]], which are repeated so often, or slow_time.cycles in its place"
         yield Wrong("slow_time.missions", missions, remedy)
+
+
+def _blocks(study: Study) -> Iterator[Wrong]:
+    """Each block has a frequency and can begin as it says; an axis has a use in one block at least."""
+    blocks, axes = study.mission, study.axes
+    for before, block in zip((*blocks[-1:], *blocks), blocks, strict=False):
+        key = f"mission.{block.name}"
+        if not block.gives("frequency") and not axes.frequency:
+            remedy = "missing: give it here, or as axes.frequency for all blocks without one"
+            yield Wrong(f"{key}.frequency", None, remedy)
+        theirs, ours = before.parameters, block.parameters
+        changed = [name for name in {**theirs, **ours} if theirs.get(name) != ours.get(name)]
+        if block.begin == "continue" and changed:
+            remedy = f'give "ramp": a block that continues has the {changed[0]} of the block before, {before.name}'
+            yield Wrong(f"{key}.begin", block.begin, remedy)
+        if block.begin == "sweep" and not block.is_passage and "ramp" in axes.sweep:
+            remedy = 'give "ramp", or axes.sweep = "up" or "down": a sweep has a direction'
+            yield Wrong(f"{key}.begin", block.begin, remedy)
+    for name in (*OWN_AXES, *(axis.name for axis in study.scene_axes)):
+        given = name not in OWN_AXES or name in axes.model_fields_set
+        if blocks and given and all(block.gives(name) for block in blocks):
+            yield Wrong(f"axes.{name}", None, f"leave it out: every block under [[mission]] gives its own {name}")
 
 
 def _frequency(study: Study) -> Iterator[Wrong]:
@@ -59,28 +84,25 @@ def _frequency(study: Study) -> Iterator[Wrong]:
             remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
             yield Wrong("loading", study.loading.model_dump(), remedy)
         return
-    followed = f'axes.frequency = "{word}" changes'
+    followed = f'a fixed frequency, and axes.frequency = "{word}" changes'
     if study.kind is MISSIONS:
         yield Wrong("axes.frequency", word, "give frequencies in Hz: blocks of a mission follow no resonance")
     if len(frequency) > 1:
         remedy = f'give "{word}" alone: every point has the frequency that it finds; the other is another study'
         yield Wrong("axes.frequency", frequency, remedy)
     if "ramp" in axes.sweep:
-        yield Wrong("axes.sweep", "ramp", f'give "up" or "down": a ramp has a fixed frequency, and {followed}')
+        yield Wrong("axes.sweep", "ramp", f'give "up" or "down": a ramp has {followed}')
     if "final" in axes.scheme:
-        remedy = f'give "adaptive": the scheme "final" has a fixed frequency, and {followed}'
-        yield Wrong("axes.scheme", "final", remedy)
+        yield Wrong("axes.scheme", "final", f'give "adaptive": the scheme "final" has {followed}')
 
 
 def _followed(study: Study) -> str | None:
-    """What the frequency follows, also before the study is complete."""
-    if study.follow is not None:
-        return study.follow.of
+    """What the frequency follows."""
     given: tuple[Any, ...] = study.axes.frequency or ()
     return next((each for each in given if isinstance(each, str)), None)
 
 
-def size_of_result(study: Study) -> Iterator[Wrong]:
+def _size_of_result(study: Study) -> Iterator[Wrong]:
     """A study has so many points at most, and two dimensions of the result have two names."""
     if "nodal_diameter" in study.dimensions and "natural_frequency" in study.scene_variables:
         remedy = "leave it out: it has a dimension nodal_diameter of its own; a study without this axis gives it"
@@ -132,8 +154,8 @@ def _end(study: Study) -> Iterator[Wrong]:
         yield Wrong("slow_time.until", slow_time.until, remedy)
 
 
-def wrong_scatter(study: Study) -> Iterator[Wrong]:
-    """What is wrong with inputs of [scatter] beside the other tables: unknown ones, and those that cannot scatter."""
+def _scatter(study: Study) -> Iterator[Wrong]:
+    """Inputs of [scatter] are known and can scatter beside the other tables."""
     section = study.scatter
     if section is None:
         return

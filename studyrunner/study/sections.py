@@ -262,6 +262,3 @@ SECTIONS: dict[str, type[Section]] = {
     "scatter": ScatterSection,
     "loading": LoadingSection,
 }
-
-ELSEWHERE = {key: f"{table}.{key}" for table, kind in reversed(SECTIONS.items()) for key in kind.model_fields}
-"""Where a key stands that is not known in another table."""
