@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from studyrunner.scatter import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import draw_pairs, is_of_pairs
+from studyrunner.study.realisation import draw_inputs
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
 
@@ -59,7 +59,7 @@ def drawn_pairs(
 
     facts: of each scene. Raises UserError where a sample draws a value that is none.
     """
-    n_samples = 1 if study.scatter is None else study.scatter.realisations
+    n_samples = 1 if study.scatter is None else study.scatter.n_rows
     for place, variant in enumerate(study.variants or (study,)):
         # scenes of samples mostly have the same pairs, and then the same draws
         drawn: dict[Hashable, _Values] = {}
@@ -74,7 +74,7 @@ def drawn_pairs(
 
 def scatters_pairs(study: Study) -> bool:
     """Whether samples draw values of contact pairs."""
-    return study.scatter is not None and any(is_of_pairs(name, each) for name, each in study.scatter.inputs.items())
+    return study.scatter is not None and bool(study.scatter.of_pairs)
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
@@ -93,4 +93,4 @@ def _pair_values(study: Study, facts: SceneFacts) -> _Values:
     if friction is None:
         friction = np.full(len(facts.area), np.nan if of_all is None else of_all)
     own = {"gap": facts.gap, "area": facts.area, "friction_coefficient": friction}
-    return draw_pairs(study, own, ScatteredPairs(facts.surface, facts.position))
+    return draw_inputs(study, ScatteredPairs(facts.surface, facts.position), own)

@@ -13,13 +13,10 @@ from pydantic import BaseModel
 
 from studies.scenes import scene_with_room
 from studies.scenes.half_space import ExpectedWear
-from studyrunner.scatter import OF_PAIRS, Drawn, Scattered, ScatteredPairs, drawn
+from studyrunner.scatter import Scattered, ScatteredPairs, draw
 from studyrunner.study.mission import MissionBlock
 from studyrunner.study.study import NUMBERS, Study
 from studyrunner.user_error import UserError, WrongValueError
-
-_NO_PAIRS = ScatteredPairs(("",), np.zeros((1, 3)))
-"""Stands for the pairs where inputs are drawn that do not belong to pairs."""
 
 _FAR = 3.1
 """Standard deviations of each input up to which a scene has room for the wear of its samples: 999 of 1000 lie below.
@@ -42,7 +39,7 @@ class Realisation:
 def realise(study: Study) -> tuple[Realisation, ...]:
     """The parts of a study, in the order of their places; the study itself where it has no such axes and samples.
 
-    Values that differ between the pairs of a contact are not in the parts, see `draw_pairs`. Raises UserError where a
+    Values that differ between the pairs of a contact are not in the parts, see `draw_inputs`. Raises UserError where a
     sample draws a value that is none.
     """
     places = itertools.product(*(range(len(axis.values)) for axis in study.scene_axes))
@@ -53,38 +50,24 @@ def realise(study: Study) -> tuple[Realisation, ...]:
     )
 
 
-def draw_inputs(study: Study) -> dict[str, NDArray[np.float64]]:
-    """Values of the inputs that are the same for all pairs, (n_samples,), or (n_values, n_samples) of an axis.
-
-    study: without axes that are keys of [scene] or [wear]. Raises UserError.
-    """
-    own, found = _draw(study, {}, _NO_PAIRS)
-    return {
-        name: np.array([each.apply(value) for value in np.ravel(own[name])]).squeeze(axis=() if name in NUMBERS else 0)
-        for name, (each, scattered) in found.items()
-        if not is_of_pairs(name, scattered)
-    }
-
-
-def draw_pairs(
-    study: Study, own_values: Mapping[str, NDArray[np.float64]], pairs: ScatteredPairs
+def draw_inputs(
+    study: Study, pairs: ScatteredPairs | None = None, own_values: Mapping[str, NDArray[np.float64]] | None = None
 ) -> dict[str, NDArray[np.float64]]:
-    """Values of the inputs that belong to contact pairs, (n_samples, n_pairs).
+    """Values of the inputs that are the same for all pairs, or with pairs of those that belong to them, as `draw`.
 
-    study: without axes that are keys of [scene] or [wear]. own_values: of the scene, (n_pairs,). Raises UserError.
+    study: without axes that are keys of [scene] or [wear]. own_values: of the pairs, (n_pairs,). Raises UserError.
     """
-    _, found = _draw(study, own_values, pairs)
-    n_samples = 1 if study.scatter is None else study.scatter.realisations
-    return {
-        name: np.broadcast_to(each.apply(own_values[name]), (n_samples, len(pairs.surface)))
-        for name, (each, scattered) in found.items()
-        if is_of_pairs(name, scattered)
+    section = study.scatter
+    if section is None:
+        return {}
+    inputs = section.inputs.items()
+    own: Mapping[str, ArrayLike] = own_values or {
+        name: _own_value(study, name, each) for name, each in inputs if name not in section.of_pairs
     }
-
-
-def is_of_pairs(name: str, scattered: Scattered) -> bool:
-    """Whether an input belongs to contact pairs: gaps, areas, a friction coefficient with draws of its own."""
-    return name in OF_PAIRS and (name != "friction_coefficient" or scattered.of != "all pairs")
+    try:
+        return draw(section, own, pairs)
+    except WrongValueError as error:
+        raise UserError(study.source, error.key or "scatter", error.value, error.remedy) from None
 
 
 def block_of_input(study: Study, name: str) -> MissionBlock | None:
@@ -95,7 +78,7 @@ def block_of_input(study: Study, name: str) -> MissionBlock | None:
 
 
 def _own_value(study: Study, name: str, scattered: Scattered) -> ArrayLike:
-    """The study's own value of an input; 1, for any, where the contact pairs have their own."""
+    """The study's own value of an input; 1, for any, of an absolute distribution."""
     if block_of_input(study, name) is not None:
         return _own_value(study.block_studies[0], name, scattered)
     if name in NUMBERS:
@@ -103,25 +86,10 @@ def _own_value(study: Study, name: str, scattered: Scattered) -> ArrayLike:
     value = {**dict(study.scene.parameters), **study.wear.numbers}.get(name)
     if isinstance(value, float | int):
         return float(value)
-    if not scattered.distribution.is_absolute and not is_of_pairs(name, scattered):
+    if not scattered.distribution.is_absolute:
         remedy = "give the middle of the distribution as well: the study has no value of its own"
         raise UserError(study.source, f"scatter.{name}", None, remedy)
     return 1.0
-
-
-def _draw(
-    study: Study, own_values: Mapping[str, NDArray[np.float64]], pairs: ScatteredPairs
-) -> tuple[dict[str, ArrayLike], dict[str, tuple[Drawn, Scattered]]]:
-    """Own values, and what is drawn, of each input; nothing where nothing scatters."""
-    section = study.scatter
-    if section is None:
-        return {}, {}
-    own: dict[str, ArrayLike] = {name: _own_value(study, name, each) for name, each in section.inputs.items()}
-    own |= {name: own_values[name] for name in own if name in own_values}
-    try:
-        return own, {name: (each, section.inputs[name]) for name, each in drawn(section, own, pairs).items()}
-    except WrongValueError as error:
-        raise UserError(study.source, error.key or "scatter", error.value, error.remedy) from None
 
 
 def _samples(study: Study) -> Iterator[Study]:
@@ -133,7 +101,7 @@ def _samples(study: Study) -> Iterator[Study]:
     of_wear = [name for name in values if name in study.wear.numbers]
     of_scene = [name for name in values if name not in (*NUMBERS, *of_wear)]
     blocks = [_samples(block) for block in study.block_studies]
-    for sample in range(study.scatter.realisations):
+    for sample in range(study.scatter.n_rows):
         of_axes = {name: tuple(values[name][:, sample].tolist()) for name in values if name in NUMBERS}
         update: dict[str, object] = {"scatter": None, "axes": study.axes.model_copy(update=of_axes)}
         if of_scene:

@@ -10,7 +10,6 @@ from studyrunner.coordinates import SCENE
 from studyrunner.scatter import OF_PAIRS
 from studyrunner.study.mission import OWN_AXES
 from studyrunner.study.mistakes import nearest_name
-from studyrunner.study.realisation import is_of_pairs
 from studyrunner.study.sections import AUTO, DEFAULT
 from studyrunner.study.study import MISSIONS, MODES, NUMBERS, WEAR, Study
 from studyrunner.values import Wrong
@@ -159,7 +158,7 @@ def _scatter(study: Study) -> Iterator[Wrong]:
     section = study.scatter
     if section is None:
         return
-    of_pairs = [name for name, each in section.inputs.items() if is_of_pairs(name, each)]
+    of_pairs = section.of_pairs
     if of_pairs and "exact" in study.outputs.variables:
         remedy = f"leave it out: the closed form knows nothing of the {of_pairs[0]} that [scatter] draws for each pair"
         yield Wrong("outputs.variables", "exact", remedy)
