@@ -1,15 +1,10 @@
-"""The scene of a study: builds or reads the reduced model and describes the scene for the runner.
-
-A model that takes long to build is the same in each run of a study: it is kept for later runs.
-"""
+"""The scene of a study: builds or reads the reduced model and describes the scene for the runner."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import math
-import time
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -20,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
-from solver.packing import Packed, pack_model, unpack_model
 from studies.contact_compliance import make_compliant
 from studies.fe_models.model_files import file_digest
 from studies.scene_answers import stuck_frequencies
@@ -37,12 +31,8 @@ from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from studies.scene_answers import SurfaceMesh
-    from studyrunner.checkpoint.store import Store
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
-
-LEAST_SECONDS = 2.0
-"""Time, s, above which a model is kept. Shorter times are not worth the space in the file."""
 
 
 @dataclass(frozen=True)
@@ -76,32 +66,26 @@ class SceneFacts:
         return self.surface, self.position.tobytes(), self.area.tobytes()
 
 
-class InMemory(dict[str, Packed]):
-    """Stands for the file of a run in commands that leave nothing behind: values by hash of their inputs."""
-
-    keep_computed = dict.__setitem__
-    read_computed = dict.get
-
-
 def _silent(_: str) -> None: ...
 
 
 def build_study_scene(
-    study: Study, progress: Callable[[str], None] = _silent, computed: Store | InMemory | None = None
+    study: Study, progress: Callable[[str], None] = _silent, known: ReducedModel | None = None
 ) -> ReducedModel:
     """Reduced model of the scene for the largest number of harmonics of the study and those that show the error.
 
     With automatic harmonics a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE; a scene file may hold
-    fewer, see `largest_harmonics`. progress: takes a line on the next step, where a step may take long. computed: holds
-    the model of an earlier run.
-
-    Raises UserError where the parameters or the scene file are wrong, or the scene lacks what the study asks for.
+    fewer, see `largest_harmonics`. progress: takes a line on the next step, where a step may take long. known: the
+    model from an earlier run. Raises UserError where the parameters or the scene file are wrong, or the scene lacks
+    what the study asks for.
     """
     scene = study.scene
     # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
     with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
-        if scene.path is None:
-            model = _build_once(study, progress, InMemory() if computed is None else computed)
+        if known is not None:
+            model = known
+        elif scene.path is None:
+            model = _build_here(study, progress)
         else:
             # h5py is loaded for scene files only: the bundled scenes do without it.
             from studies.scene_file import read_scene
@@ -112,22 +96,6 @@ def build_study_scene(
                 model = make_compliant(model, dict(scene.parameters)["contact_stiffness"])
     _check_pairs(study, model)
     _check_outputs(study, model)
-    return model
-
-
-def _build_once(study: Study, progress: Callable[[str], None], computed: Store | InMemory) -> ReducedModel:
-    """The model of a scene that is not read from a scene file, built or from an earlier run, which is equal to the last
-    bit (`solver.packing`).
-    """
-    key = model_key(study)
-    if (known := computed.read_computed(key)) is not None:
-        # what is damaged, or of another version, is built again
-        with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
-            return unpack_model(known)
-    began = time.monotonic()
-    model = _build_here(study, progress)
-    if time.monotonic() > began + LEAST_SECONDS and (packed := pack_model(model)) is not None:
-        computed.keep_computed(key, packed)
     return model
 
 

@@ -210,8 +210,9 @@ def _of_inputs(
     drawn, dims = [dataset[f"{DRAWN}{name}"] for name in inputs], (*names, "input")
     table = np.stack([each.mean([d for d in each.dims if d != SAMPLE]).values for each in drawn], axis=1)
     if is_saltelli:
-        words = "share of the variance that the input decides"
-        first, total = saltelli_indices(table, values, confidence)
+        words, d = "share of the variance that the input decides", len(inputs)
+        both = saltelli_indices(table, values, confidence)
+        first, total = ((both[0][..., part, :], both[1][..., part, :]) for part in (slice(d), slice(d, None)))
         found = _bands("first_index", f"{words} alone", "1", first, dims)
         return found | _bands("total_index", f"{words}, with the others", "1", total, dims)
     words = "rank correlation of the worn volume with the input"
