@@ -161,7 +161,7 @@ def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progre
     stiffness = (model.padded(stressed) + spin_softening(mass, model.rotation)).tocsr()
     forms = {"stiffness": stiffness if constraints is None else constraints.apply(stiffness, stiffness=True)}
     forms |= {"mass": still.reduction.forms["mass"], "elastic": still.reduction.forms["stiffness"]}
-    return replace(still, reduction=Reduction(structure, forms, still.reduction.positions), at_rest=still.reduction)
+    return replace(still, reduction=replace(still.reduction, forms=forms), at_rest=still.reduction)
 
 
 def _structure(model: MeshModel | MatrixModel, joint: JointDefinition) -> Structure:

@@ -17,7 +17,7 @@ from solver.model import FloatArray, Matrix
 from studies.finite_element.elimination import Dissection, Factor, dissect, factorise
 from studies.finite_element.structure import Coordinates, Structure
 
-_COLUMNS = 64  # vectors solved for at a time
+_COLUMNS = 128  # vectors solved for at a time
 _BLOCK = 8  # modes are looked for with so many vectors at a time
 _SMALL = 400  # displacements of a structure whose modes are found by dense matrices
 _STIFF = 1e-11  # flexibility of a mode that is round-off of the largest one, as of a singular mass
@@ -43,7 +43,8 @@ class Reduction:
     """Forms of a structure that can be reduced at any nodal diameter in 0..n_sectors // 2.
 
     forms: matrices (3 n_nodes, 3 n_nodes), symmetric and unconstrained, by name, with "stiffness" and "mass".
-    positions (n_nodes, n_directions): of the nodes, for the order of elimination.
+    positions (n_nodes, n_directions): of the nodes, for the order of elimination. dissections: filled by the first
+    factorisation, as the order is the same at all nodal diameters and for all forms of a mesh.
 
     All methods raise NotPositiveDefiniteError where the glued structure is not held, or unstable.
     """
@@ -51,7 +52,7 @@ class Reduction:
     structure: Structure
     forms: Mapping[str, sparse.csr_matrix]
     positions: FloatArray
-    _dissections: list[Dissection] = field(default_factory=list)  # one, the same at all nodal diameters
+    dissections: list[Dissection] = field(default_factory=list)
 
     def solve_static(self, load: FloatArray) -> FloatArray:
         """Displacements (3 n_nodes,), m, of the glued structure at nodal diameter 0 under a load (3 n_nodes,), N."""
@@ -69,12 +70,12 @@ class Reduction:
     def _factorise(self, coordinates: Coordinates) -> tuple[sparse.csr_matrix, Factor]:
         """Stiffness with the pairs glued, and its factors."""
         stiffness = _on(coordinates.glued, self.forms["stiffness"])
-        if not self._dissections:
+        if not self.dissections:
             # where phases cancel at one of these diameters they do not at the other
             glued = sum(abs(self.structure.coordinates(diameter).glued) for diameter in (0, 1))
             everything = _on(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
-            self._dissections.append(dissect(everything, coordinates.node, self.positions))
-        return stiffness, factorise(stiffness, self._dissections[0])
+            self.dissections.append(dissect(everything, coordinates.node, self.positions))
+        return stiffness, factorise(stiffness, self.dissections[0])
 
     def reduce(self, nodal_diameter: int, n_modes: int, vectors: FloatArray) -> ReducedStructure:
         """The structure at a nodal diameter.
@@ -87,16 +88,14 @@ class Reduction:
         stiffness, factor = self._factorise(coordinates)
         shapes = _static_shapes(coordinates, self.forms["stiffness"], factor)
         frequencies, modes = _lowest_modes(stiffness, _on(glued, self.forms["mass"]), factor, n_modes)
-        moved = glued @ modes
-        forms = {}
+        moved, forms = glued @ modes, {}
         for name, form in self.forms.items():
-            if name == "stiffness":
-                own = relative.conj().T @ np.concatenate([form @ shapes[:, part] for part in _parts(shapes)], axis=1)
+            if name == "stiffness":  # no force but at the pairs
+                own = (form @ relative).conj().T @ shapes
                 coupling, modal = np.zeros((len(own), len(frequencies))), np.diag(frequencies**2)
             else:
-                inertia, adjoint = form @ moved, shapes.conj().T
-                own = np.concatenate([adjoint @ (form @ shapes[:, part]) for part in _parts(shapes)], axis=1)
-                coupling = adjoint @ inertia
+                inertia = form @ moved
+                own, coupling = _on_shapes(form, shapes), shapes.conj().T @ inertia
                 modal = np.eye(len(frequencies)) if name == "mass" else moved.conj().T @ inertia
             whole = np.block([[own, coupling], [coupling.conj().T, modal]])
             forms[name] = np.asarray(0.5 * (whole + whole.conj().T))
@@ -123,6 +122,16 @@ def _static_shapes(coordinates: Coordinates, stiffness: sparse.csr_matrix, facto
     return shapes
 
 
+def _on_shapes(form: sparse.csr_matrix, shapes: Matrix) -> Matrix:
+    """`shapes^H form shapes` (n_relative, n_relative): its upper blocks are computed, the lower ones follow."""
+    own: Matrix = np.empty_like(shapes, shape=(shapes.shape[1],) * 2)
+    for part in _parts(shapes):
+        before = slice(part.stop)
+        own[before, part] = shapes[:, before].conj().T @ (form @ shapes[:, part])
+        own[part, before] = own[before, part].conj().T
+    return own
+
+
 def _lowest_modes(
     stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, factor: Factor, n_modes: int
 ) -> tuple[FloatArray, Matrix]:
@@ -134,18 +143,22 @@ def _lowest_modes(
     n, random = stiffness.shape[0], np.random.default_rng(0)
     small = n <= max(_SMALL, 4 * n_modes)
     block = np.eye(n) if small else random.standard_normal((n, _BLOCK)).astype(stiffness.dtype)
-    basis = np.zeros((n, 0), dtype=stiffness.dtype)
+    inertia = mass @ block
+    space = [np.zeros((n, 0), dtype=stiffness.dtype)] * 3  # the vectors, their products with the mass and the stiffness
     known = np.zeros(0)
     while True:
         if not small:
-            block = _orthonormal(factor.solve(mass @ block), basis)
-        basis = np.concatenate([basis, block], axis=1)
-        values, vectors = eigh(basis.conj().T @ (mass @ basis), basis.conj().T @ (stiffness @ basis))
+            block = _orthonormal(factor.solve(inertia), space[0])
+        inertia = mass @ block
+        new = block, inertia, stiffness @ block
+        space = [np.concatenate(pair, axis=1) for pair in zip(space, new, strict=True)]
+        adjoint = space[0].conj().T
+        values, vectors = eigh(adjoint @ space[1], adjoint @ space[2])
         found = np.flatnonzero(values > _STIFF * values[-1])[::-1][:n_modes]
         if small or block.shape[1] == 0 or (len(known) == len(found) and _agree(values[found], known)):
             break
         known = values[found]
-    modes = (basis @ vectors[:, found]) / np.sqrt(values[found])
+    modes = (space[0] @ vectors[:, found]) / np.sqrt(values[found])
     seen = random.standard_normal(n) @ modes
     return 1.0 / np.sqrt(values[found]), modes * (seen.conj() / np.abs(seen))
 

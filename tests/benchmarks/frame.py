@@ -98,9 +98,15 @@ def arguments(doc: str | None, choices: Sequence[str] = (), **defaults: Any) -> 
     """
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     if choices:
-        parser.add_argument("chosen", nargs="*", choices=choices, default=list(choices))
+        # without `choices`, which refuse an empty list
+        parser.add_argument("chosen", nargs="*", help=f"of {', '.join(choices)}; all by default")
     for name, default in defaults.items():
         several = isinstance(default, list)
         kind = Path if default is None else type(default[0] if several else default)
         parser.add_argument(f"--{name.replace('_', '-')}", type=kind, default=default, nargs="*" if several else None)
-    return parser.parse_args()
+    given = parser.parse_args()
+    if choices:
+        given.chosen = given.chosen or list(choices)
+        if wrong := set(given.chosen).difference(choices):
+            parser.error(f"{', '.join(wrong)}: use {', '.join(choices)}")
+    return given
