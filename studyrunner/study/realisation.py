@@ -15,6 +15,7 @@ from studies.scenes import scene_with_room
 from studies.scenes.half_space import ExpectedWear
 from studyrunner.scatter import Scattered, ScatteredPairs, draw
 from studyrunner.study.mission import MissionBlock
+from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.study import NUMBERS, Study
 from studyrunner.user_error import UserError, WrongValueError
 
@@ -105,8 +106,7 @@ def _samples(study: Study) -> Iterator[Study]:
         of_axes = {name: tuple(values[name][:, sample].tolist()) for name in values if name in NUMBERS}
         update: dict[str, object] = {"scatter": None, "axes": study.axes.model_copy(update=of_axes)}
         if of_scene:
-            parameters = _with_parameters(study, {name: float(values[name][sample]) for name in of_scene})
-            update["scene"] = study.scene.model_copy(update={"parameters": parameters})
+            update["scene"] = _with_drawn(study, {name: float(values[name][sample]) for name in of_scene})
         if of_wear:
             update["wear"] = study.wear.with_numbers({name: float(values[name][sample]) for name in of_wear})
         if blocks:
@@ -116,57 +116,55 @@ def _samples(study: Study) -> Iterator[Study]:
         yield with_room_for_wear(part) if blocks or of_scene else part
 
 
-def _with_parameters(study: Study, values: Mapping[str, float]) -> BaseModel:
-    """Parameters of the scene with drawn values. Raises UserError where one of them is wrong."""
+def _with_drawn(study: Study, values: Mapping[str, float]) -> SceneSection:
+    """The scene with drawn values of its parameters. Raises UserError where one of them is wrong."""
     parameters = study.scene.parameters
-    if values.keys() == {"friction_coefficient"}:
-        # all that is asked of it was checked when it was drawn
-        return parameters.model_copy(update=dict(values))
     try:
-        return type(parameters).model_validate({**dict(parameters), **values})
+        # all that is asked of a friction coefficient was checked when it was drawn
+        if values.keys() == {"friction_coefficient"}:
+            parameters = parameters.model_copy(update=dict(values))
+        else:
+            parameters = type(parameters).model_validate({**dict(parameters), **values})
     except ValueError as error:
         name = next((each for each in values if each in str(error)), next(iter(values)))
         remedy = "give less width: a sample draws a value that the scene cannot have"
         raise UserError(study.source, f"scatter.{name}", values[name], remedy) from None
+    return study.scene.model_copy(update={"parameters": parameters})
 
 
 def with_room_for_wear(study: Study) -> Study:
     """The study with a scene that has room for what it wears; the same where its scene needs none, or says itself.
 
-    Of a study with samples the scene has room for nearly all of them. Where parameters of the scene scatter, each
-    sample has a scene of its own (`realise`); the study is then the same. Blocks of a mission have room for the wear of
-    all of them, in equal pairs.
+    Of a study with samples the scene has room for nearly all of them; where parameters of the scene scatter, only each
+    sample has (`realise`). Blocks of a mission have room for the wear of all of them, in equal pairs.
     """
-    scene = study.scene
+    scene, parameters = study.scene, dict(study.scene.parameters)
     if study.mission:
-        return _with_room_in_blocks(study)
-    own_scenes = study.scatter is not None and study.scatter.inputs.keys() & dict(scene.parameters).keys()
+        return study.model_copy(update={"block_studies": _with_room_in_blocks(study)})
+    own_scenes = study.scatter is not None and study.scatter.inputs.keys() & parameters.keys()
     # what a result file holds was built with the parameters that stand beside it
     if own_scenes or not scene.is_bundled or scene.path is not None:
         return study
-    return _with_parameters_of_scene(study, scene_with_room(scene.model, scene.parameters, expected_wear(study)))
+    return _with_parameters(study, scene_with_room(scene.model, scene.parameters, expected_wear(study)))
 
 
-def _with_parameters_of_scene(study: Study, parameters: BaseModel) -> Study:
+def _with_parameters(study: Study, parameters: BaseModel) -> Study:
     return study.model_copy(update={"scene": study.scene.model_copy(update={"parameters": parameters})})
 
 
-def _with_room_in_blocks(study: Study) -> Study:
-    cycles = study.output_counts[-1] * sum(
-        block.cycles_at(max(of_block.axes.frequency))
-        for block, of_block in zip(study.mission, study.block_studies, strict=True)
+def _with_room_in_blocks(study: Study) -> tuple[Study, ...]:
+    of_mission = (
+        block.cycles_at(max(each.axes.frequency))
+        for block, each in zip(study.mission, study.block_studies, strict=True)
     )
-    ends = {"cycles": cycles, "until": study.slow_time.until}
-    wearing = [
-        with_room_for_wear(each.model_copy(update={"slow_time": each.slow_time.model_copy(update=ends)}))
-        for each in study.block_studies
-    ]
-    parameters = [each.scene.parameters for each in wearing]
-    widths = [width for each in parameters if isinstance(width := dict(each).get("half_width"), float)]
+    ends = {"cycles": study.output_counts[-1] * sum(of_mission), "until": study.slow_time.until}
+    slow_time = study.block_studies[0].slow_time.model_copy(update=ends)
+    wearing = [with_room_for_wear(each.model_copy(update={"slow_time": slow_time})) for each in study.block_studies]
+    widths = [dict(each.scene.parameters).get("half_width") for each in wearing]
     if len(set(widths)) > 1:
-        parameters = [each.model_copy(update={"half_width": max(widths)}) for each in parameters]
-    found = tuple(map(_with_parameters_of_scene, wearing, parameters))
-    return study.model_copy(update={"block_studies": found})
+        widest = {"half_width": max(width for width in widths if isinstance(width, float))}
+        wearing = [_with_parameters(each, each.scene.parameters.model_copy(update=widest)) for each in wearing]
+    return tuple(wearing)
 
 
 def expected_wear(study: Study) -> ExpectedWear:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
@@ -14,13 +16,13 @@ from studies.hdf5 import is_hdf5
 from studyrunner.scatter import flat_table
 from studyrunner.study.mission import OWN_AXES, engine_frequency, read_blocks
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
-from studyrunner.study.overrides import override
 from studyrunner.study.realisation import with_room_for_wear
 from studyrunner.study.rules import broken_rules
 from studyrunner.study.scene_axes import (
     SceneAxis,
     Tables,
     as_checked,
+    is_table,
     keys_below_axes,
     only_table,
     take_axes,
@@ -43,6 +45,9 @@ from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
 _IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
+_INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
+"""Keys that stand in each other's place."""
+
 _ON_REQUEST = ("scatter", "loading")
 
 
@@ -67,7 +72,7 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
             table = read_toml_file(path, source)
     except OSError as error:
         raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
-    override(table, overrides)
+    _override(table, overrides)
     return _check_study(table, Origin(source, path, archived, scene))
 
 
@@ -240,3 +245,71 @@ def _worn_states(study: Study) -> dict[str, object] | None:
     variants = study.variants[: len(counts)] if counts else (study,)
     depths = [list(each.scene.worn.depth[0]) for each in variants if each.scene.worn]
     return {"depth": depths, **({"cycle": counts, "result": worn.result} if counts else {})}
+
+
+# --- overrides ---
+
+
+def _override(table: Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
+    """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
+    if isinstance(overrides, Mapping):
+        for key, value in overrides.items():
+            _set_key(table, key, _plain(value), "overrides", key)
+        return
+    for text in [overrides] if isinstance(overrides, str) else overrides:
+        key, equals, value_text = (part.strip() for part in text.partition("="))
+        if not equals or not all(key.split(".")):
+            raise UserError("command line", "--set", text, "give KEY=VALUE with the dotted name of a key")
+        _set_key(table, key, _value_of(key, value_text), "command line", f"--set {key}")
+
+
+def _set_key(table: Tables, key: str, value: object, source: str, shown: str) -> None:
+    """Sets the key of a dotted name. source, shown: where the user gave it, and how it is called there."""
+    (*names, last), place = key.split("."), cast("Any", table)
+    for name in names:
+        if isinstance(place, list):
+            # blocks of a mission, by number or name
+            blocks = {str(number): each for number, each in enumerate(place)}
+            place = (blocks | {str(each.get("name")): each for each in place if isinstance(each, dict)}).get(name)
+        else:
+            place = place.setdefault(name, {})
+        if not isinstance(place, dict | list):
+            raise UserError(source, shown, value, f"give a key in a table: {name} is none")
+    if not isinstance(place, dict):
+        raise UserError(source, shown, value, f"give {'.'.join(names)}.NAME.KEY with the name of a table in this list")
+    if value is None:
+        place.pop(last, None)
+        return
+    place[last] = value
+    place.pop(_INSTEAD.get(key, ""), None)
+    # the last place where a key is given counts, here or under [axes]
+    tables = ("solver",) if last in SOLVER_AXES else ("scene", "wear")
+    others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}
+    for other in others.get(".".join(names), ()) if not is_table(value) else ():
+        given = table.get(other)
+        if isinstance(given, dict) and not is_table(given.get(last)):
+            given.pop(last, None)
+
+
+def _value_of(key: str, text: str) -> object:
+    try:
+        parsed = read_toml(f"value = {text}".encode(), "")
+    except UserError:
+        if re.fullmatch(r"[^\s\"'\[\]{}=,#]+", text):
+            return text
+        remedy = f'give a TOML value or a bare word; words in a list stand in quotes, as \'{key}=["up", "down"]\''
+        raise UserError("command line", f"--set {key}", text, remedy) from None
+    if set(parsed) != {"value"}:
+        raise UserError("command line", f"--set {key}", text, "give one TOML value")
+    return parsed["value"]
+
+
+def _plain(value: object) -> object:
+    """A value as TOML has it: numpy's numbers and arrays, tuples and paths are none of its types."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    return str(value) if isinstance(value, Path) else value
