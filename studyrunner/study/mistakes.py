@@ -7,17 +7,16 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
 
 from studies.scene_error import SceneError, remedy_of
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
 from studyrunner.values import Section, Wrong
 
 Details = dict[str, Any]
-"""One of the `errors()` of pydantic; "names": the keys that lead to it."""
+"""One of the `errors()` of pydantic."""
 
 _SINGLE = ("float_type", "int_type", "bool_type", "string_type")
 
@@ -65,18 +64,12 @@ def scene_errors(source: str, path: Path | None) -> Iterator[None]:
         raise UserError(place, "the scene file", None, f"give a file that can be read: {error.strerror}") from None
 
 
-def check_tables(
-    kinds: Mapping[str, type[BaseModel]],
-    tables: Mapping[str, Any],
-    source: str,
-    also: Mapping[str, Iterable[str]] | None = None,
-) -> dict[str, Any]:
+def check_tables(kinds: Mapping[str, type[BaseModel]], tables: Mapping[str, Any], source: str) -> dict[str, Any]:
     """An object of its class for each table, from what the study file gives; a missing table has its defaults.
 
-    kinds: classes by the names of tables, which may be dotted. also: further keys by table, which are looked at
-    elsewhere. Raises UserError with all that is wrong.
+    kinds: classes by the names of tables, which may be dotted. Raises UserError with all that is wrong.
     """
-    checked, also, wrong = {}, also or {}, list[Wrong]()
+    checked, wrong = {}, list[Wrong]()
     elsewhere = {key: f"{name}.{key}" for name, kind in reversed([*kinds.items()]) for key in kind.model_fields}
     for name, kind in kinds.items():
         table = tables.get(name, {})
@@ -84,50 +77,75 @@ def check_tables(
             # tables of scenes are made for other callers as well, and take this from their caller
             checked[name] = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
         except ValidationError as error:
-            others = {**elsewhere, **{key: key for key in also.get(name, ())}}
-            for each in _wrong_keys(error, kind, table, others):
+            for each in _wrong_keys(error, kind, table, elsewhere):
                 wrong.append(each._replace(key=f"{name}.{each.key}" if each.key else name))
     raise_wrong(source, wrong)
     return checked
 
 
+class _Place(NamedTuple):
+    """Where an error is: keys that lead there, classes of the table with the last one, and what this key means."""
+
+    names: tuple[str, ...]
+    tables: list[type[BaseModel]]
+    meaning: str
+
+
+def _place_of(kind: type[BaseModel], table: object, details: Details) -> _Place:
+    """Without places in lists and the kinds of value that were tried on the way."""
+    names, around, meaning = list[str](), [kind], ""
+    inner, tables = table, [kind]
+    for number, part in enumerate(details["loc"], 1):
+        is_missing = number == len(details["loc"]) and details["type"] == "missing"
+        if isinstance(inner, Mapping) and (part in inner or is_missing):
+            names, around, inner = [*names, str(part)], tables, inner.get(part)
+            fields = [each.model_fields[part] for each in tables if part in each.model_fields]
+            extra = [each.EXTRA for each in tables if issubclass(each, Section) and each.EXTRA and not fields]
+            tables = [*(table for field in fields for table in tables_in(field.annotation)), *extra]
+            # a key without a description of its own is part of one with a description
+            meaning = next((field.description for field in fields if field.description), meaning)
+        elif isinstance(inner, list | tuple) and isinstance(part, int) and part < len(inner):
+            inner = inner[part]
+    return _Place(tuple(names), around, f" ({re.sub(', [-1]$', '', meaning)})" if meaning else "")
+
+
 def _wrong_keys(
-    error: ValidationError, kind: type[BaseModel], table: object, others: Mapping[str, str]
+    error: ValidationError, kind: type[BaseModel], table: object, elsewhere: Mapping[str, str]
 ) -> Iterator[Wrong]:
-    """What is wrong in a table, once for each key. others: keys beside those of the table, and where they stand."""
+    """What is wrong in a table, once for each key. elsewhere: keys of all tables, and where they stand."""
     of_keys: dict[str, list[Details]] = {}
+    places: dict[str, _Place] = {}
     for details in _flat_errors(error):
-        details["names"] = _names(table, details)
-        of_keys.setdefault(".".join(details["names"]), []).append(details)
+        place = _place_of(kind, table, details)
+        places[".".join(place.names)] = place
+        of_keys.setdefault(".".join(place.names), []).append(details)
     for key, found in of_keys.items():
         if not any(other.startswith(f"{key}.") for other in of_keys):
             # of a key that takes several kinds of values, the kinds that fit as far as can be
             deepest = max(len(each["loc"]) for each in found)
-            yield _wrong(kind, key, [each for each in found if len(each["loc"]) == deepest], others)
+            yield _wrong(key, places[key], [each for each in found if len(each["loc"]) == deepest], elsewhere)
 
 
-def _wrong(kind: type[BaseModel], key: str, found: Sequence[Details], others: Mapping[str, str]) -> Wrong:
-    details, names = found[0], found[0]["names"]
-    # a key without a description of its own is part of one with a description
-    fields = [_fields(kind, names[:depth]).get(each) for depth, each in enumerate(names)]
-    description = next((field.description for field in reversed(fields) if field and field.description), None)
-    unit = f" ({re.sub(', [-1]$', '', description)})" if description else ""
-    if details["type"] == "extra_forbidden":
-        return Wrong(key, details["input"], f"unknown key, give {_meant(kind, names, others)}")
-    if details["type"] == "missing":
-        if isinstance(details["loc"][-1], int):
-            return Wrong(key, details["input"], f"give more values{unit}")
-        return Wrong(key, None, f"missing: give it{unit}")
-    cause = details.get("ctx", {}).get("error")
+def _wrong(key: str, place: _Place, found: Sequence[Details], elsewhere: Mapping[str, str]) -> Wrong:
+    kind, value, cause = found[0]["type"], found[0]["input"], found[0].get("ctx", {}).get("error")
+    if kind == "extra_forbidden":
+        known = [name for each in place.tables for name, field in each.model_fields.items() if not field.exclude]
+        name = place.names[-1]
+        other = "" if len(place.names) > 1 or close_name(name, known) else close_name(name, list(elsewhere))
+        return Wrong(key, value, f"unknown key, give {elsewhere.get(other) or nearest_name(name, known)}")
+    if kind == "missing":
+        is_value = isinstance(found[0]["loc"][-1], int)
+        remedy = "give more values" if is_value else "missing: give it"
+        return Wrong(key, value if is_value else None, remedy + place.meaning)
     if isinstance(cause, SceneError):
-        return Wrong(cause.key or key, Verbatim(cause.value), cause.remedy + unit)
+        return Wrong(cause.key or key, Verbatim(cause.value), cause.remedy + place.meaning)
     if isinstance(cause, WrongValueError):
-        return Wrong(".".join(filter(None, (key, cause.key))), cause.value, cause.remedy + unit)
-    may_be_axis = key in (kind.AXES if issubclass(kind, Section) else kind.model_fields)
-    if isinstance(details["input"], list) and details["type"] in _SINGLE and may_be_axis:
-        return Wrong(key, details["input"], f"give one value here, or the list as axes.{key}{unit}")
+        return Wrong(".".join(filter(None, (key, cause.key))), cause.value, cause.remedy + place.meaning)
+    own_axes = [name for each in place.tables for name in getattr(each, "AXES", each.model_fields)]
+    if isinstance(value, list) and kind in _SINGLE and key in own_axes:
+        return Wrong(key, value, f"give one value here, or the list as axes.{key}{place.meaning}")
     remedies = dict.fromkeys(remedy_of(each).removeprefix("give ") for each in found)
-    return Wrong(key, details["input"], f"give {', or '.join(remedies)}{unit}")
+    return Wrong(key, value, f"give {', or '.join(remedies)}{place.meaning}")
 
 
 def _flat_errors(error: ValidationError) -> Iterator[Details]:
@@ -140,46 +158,11 @@ def _flat_errors(error: ValidationError) -> Iterator[Details]:
             yield {**details}
 
 
-def _names(table: object, details: Details) -> list[str]:
-    """Keys that lead to the error, without places in lists and the kinds of value that were tried on the way."""
-    names: list[str] = []
-    inner: object = table
-    for number, part in enumerate(details["loc"], 1):
-        is_missing = number == len(details["loc"]) and details["type"] == "missing"
-        if isinstance(inner, Mapping) and (part in inner or is_missing):
-            names.append(str(part))
-            inner = inner.get(part)
-        elif isinstance(inner, list | tuple) and isinstance(part, int) and part < len(inner):
-            inner = inner[part]
-    return names
-
-
-def _fields(kind: type[BaseModel], names: Sequence[str]) -> Mapping[str, FieldInfo]:
-    """Keys of the table that `names` lead to, none where it is no table with keys of its own."""
-    tables = [kind]
-    for name in names:
-        fields = [each.model_fields.get(name) for each in tables]
-        extra = [each.EXTRA if issubclass(each, Section) else None for each in tables]
-        inner = [one.annotation if one else other for one, other in zip(fields, extra, strict=True)]
-        tables = [table for each in inner for table in tables_in(each)]
-    return {name: field for each in tables for name, field in each.model_fields.items() if not field.exclude}
-
-
 def tables_in(annotation: object) -> list[type[BaseModel]]:
     """All classes of tables that a type names."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [found for each in get_args(annotation) for found in tables_in(each)]
-
-
-def _meant(kind: type[BaseModel], names: Sequence[str], others: Mapping[str, str]) -> str:
-    """What is meant by an unknown key, the last of the names: a key of its table, or of another one."""
-    known = [*_fields(kind, names[:-1])]
-    if len(names) == 1:
-        known += [name for name, shown in others.items() if name == shown]
-        if not close_name(names[0], known) and (elsewhere := close_name(names[0], list(others))):
-            return others[elsewhere]
-    return nearest_name(names[-1], known)
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:

@@ -113,7 +113,7 @@ def _variables(study: Study) -> Iterator[Wrong]:
     of_pairs = () if study.scatter is None else study.scatter.of_pairs
     for name in study.outputs.variables:
         if name not in (DEFAULT, *KEPT, *known):
-            yield Wrong("outputs.variables", name, f"give names out of {', '.join(known)}, for {study.kind.name}")
+            yield Wrong("outputs.variables", name, f"give {nearest_name(name, known)}, for {study.kind.name}")
         elif name in ("mesh", "exact") and name not in study.scene.offers:
             yield Wrong("outputs.variables", name, f"leave it out: the scene {study.scene.model} has none")
         elif name == "exact" and (no_exact or of_pairs):

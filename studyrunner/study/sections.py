@@ -6,14 +6,12 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, Field
 
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
-from studyrunner.study.mistakes import nearest_name
-from studyrunner.user_error import WrongValueError
 from studyrunner.values import (
     Axis,
     Cycles,
@@ -30,10 +28,9 @@ from studyrunner.values import (
     Whole,
     Wrong,
     ascending,
-    listed,
     once,
 )
-from studyrunner.variables import ASKED, KEPT, OF_MISSIONS, OF_MODES
+from studyrunner.variables import ASKED, OF_MISSIONS, OF_MODES
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
@@ -56,13 +53,6 @@ def _check_name(value: str) -> str:
         raise ValueError("give a name that can be a file name")
     if "/" in value or "\\" in value or len(value) > 100:
         raise ValueError("give a name of at most 100 characters without a slash")
-    return value
-
-
-def _check_variables(value: object) -> object:
-    for name in listed(value):
-        if name not in (DEFAULT, *VARIABLES, *KEPT) and isinstance(value, list | tuple):
-            raise WrongValueError(name, f'give "{DEFAULT}" or {nearest_name(str(name), (*VARIABLES, *KEPT))}')
     return value
 
 
@@ -233,7 +223,7 @@ class SolverSection(Section):
 class OutputsSection(Section):
     """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
-    variables: Annotated[Listed[str], BeforeValidator(_check_variables), AfterValidator(once)] = Field(
+    variables: Annotated[Listed[str], AfterValidator(once)] = Field(
         (DEFAULT,), description="list of names; default: those that cost little"
     )
     loops: Annotated[

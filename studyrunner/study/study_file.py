@@ -135,16 +135,14 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
         tables.setdefault("loading", {})
     kinds: dict[str, type[BaseModel]] = {name: each for name, each in SECTIONS.items() if name in tables}
-    also = {"axes": (*kind.model_fields, *WearSection.AXES), "scene": ("model", "worn")}
     with keys_as_given({**keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
-        first, *others = variants_of(tables, axes)
-        sections = check_tables({**kinds, "scene": kind}, {**tables, **first}, source, also)
-        variants = [sections, *(check_tables({"scene": kind, "wear": WearSection}, each, source) for each in others)]
+        variants, studies = [*variants_of(tables, axes)], []
+        sections = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
         worn_axis = _worn_axis(worn, "cycle" if sections["axes"].modal_amplitude else WORN_AXIS)
         fixed = {"mission": blocks, "source": source, "folder": origin.path.parent, "archived": origin.archived}
         fixed |= {"solver_axes": solver_axes, "scene_axes": (*axes, *worn_axis)}
-        studies = []
-        for given, checked in zip((first, *others), variants, strict=True):
+        for given in variants:
+            checked = check_tables({"scene": kind, "wear": WearSection}, given, source)
             for state in (None,) if worn is None else worn.states():
                 scene = SceneSection(model=model, parameters=checked["scene"], worn=state)
                 own = {"scene": find_scene(scene, origin), "wear": checked["wear"]}
