@@ -211,9 +211,7 @@ def build_scene_task(task: SceneTask, progress: Callable[[str], None]) -> Iterat
         known = None if task.known is None else unpack_model(task.known)
     try:
         model = build_study_scene(task.study, progress, known)
-        if "natural_frequency" in task.study.scene_variables:
-            progress("finding the natural frequencies of the scene")
-        variables = build_scene_variables(task.study, model)
+        variables = build_scene_variables(task.study, model, progress)
     except UserError as error:
         yield SceneBuilt(None, error=error)
         return

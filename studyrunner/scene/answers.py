@@ -42,14 +42,17 @@ class SmallArray:
     over_axes: bool = False
 
 
-def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SmallArray, ...]:
-    """What the study asks of its scene, but exact answers. Natural frequencies of a bundled sector take some seconds.
-
-    Raises UserError where the scene cannot give them.
-    """
+def build_scene_variables(study: Study, model: ReducedModel, progress: Callable[[str], None]) -> tuple[SmallArray, ...]:
+    """What the study asks of its scene, but exact answers. Raises UserError where the scene cannot give them."""
+    found: list[SmallArray] = []
     with scene_errors(study.source, None):
-        of_mesh = tuple(_mesh(study)) if "mesh" in study.scene_variables else ()
-        return of_mesh + (tuple(_frequencies(study, model)) if "natural_frequency" in study.scene_variables else ())
+        if "mesh" in study.scene_variables:
+            found += _mesh(study)
+        if "natural_frequency" in study.scene_variables:
+            # of a bundled sector they take some seconds
+            progress("finding the natural frequencies of the scene")
+            found += _frequencies(study, model)
+    return tuple(found)
 
 
 def _mesh(study: Study) -> Iterator[SmallArray]:

@@ -49,10 +49,8 @@ _MOST_KNOTS = 1000
 
 
 def _check_name(value: str) -> str:
-    if not value.strip() or value.startswith(".") or not value.isprintable():
-        raise ValueError("give a name that can be a file name")
-    if "/" in value or "\\" in value or len(value) > 100:
-        raise ValueError("give a name of at most 100 characters without a slash")
+    if not value.strip() or value.startswith(".") or not value.isprintable() or {*"/\\"} & {*value} or len(value) > 100:
+        raise ValueError("give a name of at most 100 characters that can be a file name, without a slash")
     return value
 
 

@@ -39,7 +39,7 @@ from studyrunner.study.scene_section import (
 )
 from studyrunner.study.sections import DEFAULT, SECTIONS, SOLVER_AXES, VARIABLES, SlowTimeSection, WearSection
 from studyrunner.study.study import MODES, Study
-from studyrunner.study.text import format_toml, read_archived, read_toml, read_toml_file
+from studyrunner.study.text import format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError
 from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
@@ -69,7 +69,7 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
             table = read_toml(archived.study.encode(), source)
             scene = _scene_of_result(table, source) if archived.holds_scene else None
         else:
-            table = read_toml_file(path, source)
+            table = read_toml(path, source)
     except OSError as error:
         raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
     _override(table, overrides)
