@@ -37,7 +37,7 @@ from studyrunner.kinds.task import (
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import Realisation
+from studyrunner.study.parts import Part
 from studyrunner.study.study import Study
 from studyrunner.units import show_count
 
@@ -185,7 +185,7 @@ def _blocks(
 
 def _task(
     study: Study,
-    part: Realisation,
+    part: Part,
     at: Mapping[str, int],
     blocks: tuple[PlannedBlock, ...],
     n_displacements: Sequence[int],

@@ -15,7 +15,7 @@ from studyrunner.kinds.task import Index, Joint, TaskPlan, grid, joint_of, n_unk
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import Realisation
+from studyrunner.study.parts import Part
 from studyrunner.study.study import Study
 
 _OF_HISTORY = ("wear_coefficient", "step", "scheme")
@@ -37,7 +37,7 @@ class _Case(NamedTuple):
 class _Start(NamedTuple):
     """Points of one part of a study that start from one state. at: their indices along the axes but `_OF_HISTORY`."""
 
-    part: Realisation
+    part: Part
     at: Mapping[str, int]
 
 

@@ -20,7 +20,7 @@ from studyrunner.scene.scene_set import (
     pair_arrays,
     stuck_frequencies_of,
 )
-from studyrunner.study.realisation import block_of_input, draw_inputs
+from studyrunner.study.parts import block_of_input, draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable

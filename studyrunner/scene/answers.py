@@ -19,7 +19,7 @@ from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build, has_frequencies
 from studyrunner.scene.scene_set import SceneSet, axes_of_difference
 from studyrunner.study.mistakes import scene_errors
-from studyrunner.study.realisation import realise
+from studyrunner.study.parts import parts_of
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, show_text
 from studyrunner.variables import Variable
@@ -131,7 +131,7 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     """
     if "exact" not in study.outputs.variables:
         return ()
-    parts = [_answers(part.study) for part in realise(study)]
+    parts = [_answers(part.study) for part in parts_of(study)]
     shape = [len(values) for values in study.axes_of_parts.values()]
     own = len(study.own_axes)
     variables = []

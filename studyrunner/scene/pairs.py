@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from studyrunner.scatter import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import draw_inputs
+from studyrunner.study.parts import draw_inputs
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
 
@@ -23,7 +23,7 @@ _Values = dict[str, NDArray[np.float64]]
 def contact_changes(
     study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]
 ) -> tuple[ContactChange, ...] | tuple[tuple[ContactChange, ...], ...]:
-    """What differs from the pairs of the scene, for each part of a study (`realise`); in a study of missions by block.
+    """What differs from the pairs of the scene, for each part of a study (`parts_of`); in a study of missions by block.
 
     facts: of each scene. Raises UserError where a sample draws a value that is none, or blocks differ in their pairs.
     """

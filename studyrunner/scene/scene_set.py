@@ -19,7 +19,7 @@ from studyrunner.scene.scene import (
     harmonics_to_build,
 )
 from studyrunner.study.mistakes import keys_as_given
-from studyrunner.study.realisation import Realisation, realise
+from studyrunner.study.parts import Part, parts_of
 from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
@@ -32,13 +32,13 @@ class SceneSet:
     """The different scenes of a study.
 
     studies: for each scene a study without axes of the scene, from which the scene is built.
-    parts: of the study (`realise`). numbers: number of the scene of each part; of its first block in a study of
+    parts: of the study (`parts_of`). numbers: number of the scene of each part; of its first block in a study of
         missions.
     of_blocks: for each part the numbers of the scenes of its blocks, or of its only vibration.
     """
 
     studies: tuple[Study, ...]
-    parts: tuple[Realisation, ...]
+    parts: tuple[Part, ...]
     numbers: tuple[int, ...]
     of_blocks: tuple[tuple[int, ...], ...]
 
@@ -53,7 +53,7 @@ def find_scenes(study: Study) -> SceneSet:
     Raises UserError where a result file is to keep the scene, and there are several.
     """
     studies: dict[str, Study] = {}
-    parts, of_blocks = realise(study), []
+    parts, of_blocks = parts_of(study), []
     for part in parts:
         by_key = [(_key(each), each) for each in part.study.block_studies or (part.study,)]
         for key, each in by_key:

@@ -255,7 +255,7 @@ class Study(Section):
 
     @property
     def axes_of_parts(self) -> dict[str, tuple[float | str, ...]]:
-        """Names and values of the axes whose points are parts of the study (`realise`): the last axes of the result."""
+        """Names and values of the axes whose points are parts of the study (`parts_of`), the last of the result."""
         samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.n_rows))}
         return {**{axis.name: axis.values for axis in self.scene_axes}, **samples}
 

@@ -16,7 +16,7 @@ from studies.hdf5 import is_hdf5
 from studyrunner.scatter import flat_table
 from studyrunner.study.mission import OWN_AXES, engine_frequency, read_blocks
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
-from studyrunner.study.realisation import with_room_for_wear
+from studyrunner.study.parts import with_room_for_wear
 from studyrunner.study.rules import broken_rules
 from studyrunner.study.scene_axes import (
     SceneAxis,

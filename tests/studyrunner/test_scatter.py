@@ -10,7 +10,7 @@ from studyrunner.result.arrays import sample_coordinates
 from studyrunner.scatter import ScatteredPairs, ScatterSection, draw, flat_table, unit_design
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
-from studyrunner.study.realisation import draw_inputs, realise
+from studyrunner.study.parts import draw_inputs, parts_of
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import WrongValueError
 from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
@@ -204,7 +204,7 @@ def test_pairs_that_differ_between_samples_have_the_dimension():
     gap = "scatter.gap={normal={std=0}, of='each pair'}"
     samples = compute("cylinder_on_flat", "w.nc", *given, "scatter.samples=2", "scatter.R={normal={std=1e-4}}", gap)
     assert samples.sample_gap.dims == ("sample", "contact")
-    gaps = [build_study_scene(each.study).contact.gap for each in realise(read_study("w.nc"))]
+    gaps = [build_study_scene(each.study).contact.gap for each in parts_of(read_study("w.nc"))]
     np.testing.assert_array_equal(samples.sample_gap, gaps)
     assert samples.contact_x.dims == ("sample", "contact")
     assert samples.contact_exists.all()

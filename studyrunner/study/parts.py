@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -26,29 +25,24 @@ The largest of the samples themselves would give another scene, and other result
 
 
 @dataclass(frozen=True)
-class Realisation:
-    """A part of a study.
+class Part:
+    """A part of a study: a variant with the values that one sample draws, where inputs scatter.
 
-    study: without axes that are keys of [scene] or [wear], and with the values that the sample draws.
-    place: indices along these axes and along the samples of the whole study, which are its last axes.
+    place: indices along the axes that are keys of [scene] or [wear] and along the samples, the last axes of a result.
     """
 
     study: Study
     place: tuple[int, ...]
 
 
-def realise(study: Study) -> tuple[Realisation, ...]:
+def parts_of(study: Study) -> tuple[Part, ...]:
     """The parts of a study, in the order of their places; the study itself where it has no such axes and samples.
 
-    Values that differ between the pairs of a contact are not in the parts, see `draw_inputs`. Raises UserError where a
-    sample draws a value that is none.
+    Values that differ between contact pairs are not in them. Raises UserError where a sample draws one that is none.
     """
-    places = itertools.product(*(range(len(axis.values)) for axis in study.scene_axes))
-    return tuple(
-        Realisation(part, (*place, *([] if study.scatter is None else [sample])))
-        for variant, place in zip(study.variants or (study,), places, strict=True)
-        for sample, part in enumerate(_samples(variant))
-    )
+    studies = (part for variant in study.variants or (study,) for part in _samples(variant))
+    places = np.ndindex(*(len(values) for values in study.axes_of_parts.values()))
+    return tuple(Part(part, place) for part, place in zip(studies, places, strict=True))
 
 
 def draw_inputs(
@@ -136,7 +130,7 @@ def with_room_for_wear(study: Study) -> Study:
     """The study with a scene that has room for what it wears; the same where its scene needs none, or says itself.
 
     Of a study with samples the scene has room for nearly all of them; where parameters of the scene scatter, only each
-    sample has (`realise`). Blocks of a mission have room for the wear of all of them, in equal pairs.
+    sample has (`parts_of`). Blocks of a mission have room for the wear of all of them, in equal pairs.
     """
     scene, parameters = study.scene, dict(study.scene.parameters)
     if study.mission:
