@@ -94,15 +94,9 @@ def spread(value: object) -> tuple[Any, ...]:
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-Cycles = Annotated[float, Field(ge=0, allow_inf_nan=True)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 Whole = Annotated[int, Field(strict=False), BeforeValidator(_no_text)]
 """A whole number; 5.0 and 1e4 are whole numbers, too, true and "5" are not."""
-Mode = Annotated[Whole, Field(ge=1, le=1000)]
-Harmonics = Mode | Literal["auto"]
-Samples = Annotated[Whole, Field(ge=4, le=100_000)] | Literal["auto"]
-Scheme = Literal["implicit", "explicit", "adaptive", "final"]
-Sweep = Literal["up", "down", "ramp"]
 Listed = Annotated[tuple[T, ...], Field(strict=False)]
 """A list."""
 Axis = Annotated[tuple[T, ...], BeforeValidator(spread), AfterValidator(once)]

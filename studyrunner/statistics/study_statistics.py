@@ -12,21 +12,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from studyrunner.scatter import ScatterSection
-from studyrunner.statistics.samples import (
-    CYCLE,
-    DRAWN,
-    FEWEST,
-    SAMPLE,
-    Array,
-    SampleValues,
-    deciding_pair,
-    density,
-    exceedance,
-    quantiles,
-    rank_correlations,
-    saltelli_indices,
-    two_groups,
-)
+from studyrunner.statistics import samples
+from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, SAMPLE, Array, SampleValues
 from studyrunner.units import show_percent
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show
@@ -172,9 +159,9 @@ def _of_values(
     """Quantiles of worn volumes, probabilities of larger volumes and depths, and their coordinates."""
     coords: dict[str, Any] = {"bound": ["lowest", "highest"]}
     coords["quantile"] = ("quantile", np.asarray(probabilities), _about("1", "probability"))
-    band = quantiles(values, probabilities, confidence)
+    band = samples.quantiles(values, probabilities, confidence)
     found = _bands("worn_volume_quantile", "quantile of worn volume", "m3", band, (*names, "quantile"))
-    moved = np.maximum(quantiles(values.widened, probabilities, confidence)[0], 0.0)
+    moved = np.maximum(samples.quantiles(values.widened, probabilities, confidence)[0], 0.0)
     about_error = _about("m3", "quantile of worn volume, with numerical error")
     found["worn_volume_quantile_error"] = ((*names, "quantile", "bound"), moved, about_error)
     found["n_samples"] = ((), np.int32(len(rows)), _about("1", "samples"))
@@ -191,7 +178,7 @@ def _of_values(
             even = np.linspace(0.0, float(own.low.max()) or 1.0, _N_THRESHOLDS)
             above = even if given is None else np.sort(np.atleast_1d(np.asarray(given, dtype=np.float64)))
             name, shown = variable.removesuffix("_max"), f"exceeded_{quantity}"
-            band = exceedance(own, above, confidence)
+            band = samples.exceedance(own, above, confidence)
             found |= _bands(f"{name}_exceedance", words, "1", band, (*own_names, shown))
             coords[shown] = (shown, above, _about(units, name.replace("_", " ")))
     return found, coords
@@ -211,12 +198,12 @@ def _of_inputs(
     table = np.stack([each.mean([d for d in each.dims if d != SAMPLE]).values for each in drawn], axis=1)
     if is_saltelli:
         words, d = "share of the variance that the input decides", len(inputs)
-        both = saltelli_indices(table, values, confidence)
+        both = samples.saltelli_indices(table, values, confidence)
         first, total = ((both[0][..., part, :], both[1][..., part, :]) for part in (slice(d), slice(d, None)))
         found = _bands("first_index", f"{words} alone", "1", first, dims)
         return found | _bands("total_index", f"{words}, with the others", "1", total, dims)
     words = "rank correlation of the worn volume with the input"
-    found = _bands("rank_correlation", words, "1", rank_correlations(table, values, confidence), dims)
+    found = _bands("rank_correlation", words, "1", samples.rank_correlations(table, values, confidence), dims)
     # the mean over the pairs says nothing of what their own draws decide
     for _, ends, _ in found.values():
         ends[..., ["contact" in each.dims for each in drawn], :] = np.nan
@@ -235,16 +222,16 @@ def _of_groups(dataset: xr.Dataset, values: SampleValues, names: tuple[str, ...]
     sizes, gap = np.zeros((*shape, 2), dtype=np.int32), np.full((*shape, 2), np.nan)
     contact = np.full(shape, -1, dtype=np.int32)
     for point in np.ndindex(shape):
-        samples = at_last.at(point)
-        groups, known = two_groups(samples), samples.low[samples.is_known]
+        own = at_last.at(point)
+        groups, known = samples.two_groups(own), own.low[own.is_known]
         sizes[point] = (known.size, 0) if groups is None else groups.sizes
         if known.size:
             margin = 0.1 * float(np.ptp(known))
             grid[point] = np.linspace(max(known.min() - margin, 0.0), known.max() + margin, _N_DENSITY)
-            curve[point] = density(samples, groups, grid[point])
+            curve[point] = samples.density(own, groups, grid[point])
         if groups is not None:
             gap[point] = groups.lower_end, groups.upper_end
-            pair = None if depths is None else deciding_pair(depths.values[point], groups)
+            pair = None if depths is None else samples.deciding_pair(depths.values[point], groups)
             contact[point] = -1 if pair is None else dataset["contact"].values[pair]
     words = "density of the samples at the last count"
     return {

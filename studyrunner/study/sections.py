@@ -14,17 +14,11 @@ from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
 from studyrunner.values import (
     Axis,
-    Cycles,
     Fraction,
-    Harmonics,
     Listed,
-    Mode,
     NotNegative,
     Positive,
-    Samples,
-    Scheme,
     Section,
-    Sweep,
     Whole,
     Wrong,
     ascending,
@@ -60,6 +54,9 @@ def _check_target(value: dict[str, float]) -> dict[str, float]:
     return value
 
 
+_Scheme = Literal["implicit", "explicit", "adaptive", "final"]
+_Samples = Annotated[Whole, Field(ge=4, le=100_000)]
+_Number = Annotated[Whole, Field(ge=1, le=1000)]
 _Knots = Annotated[Listed[float], Field(min_length=1, max_length=_MOST_KNOTS), AfterValidator(ascending)]
 
 
@@ -90,14 +87,14 @@ class AxesSection(Section):
     wear_coefficient: Axis[NotNegative] = Field((1.1e-11,), description="1/Pa, of the law of [wear]")
     excitation_amplitude: Axis[Positive] = Field((1.0,), description="N, factor of the harmonic load of the scene")
     step: Axis[Positive] = Field((1000.0,), description="h, cycles: length of implicit and explicit steps")
-    scheme: Axis[Scheme] = Field(("adaptive",), description="how wear is integrated over the cycles")
-    sweep: Axis[Sweep] = Field(
+    scheme: Axis[_Scheme] = Field(("adaptive",), description="how wear is integrated over the cycles")
+    sweep: Axis[Literal["up", "down", "ramp"]] = Field(
         ("up",), description="to the unworn state the frequency rises, or falls, or the excitation rises"
     )
     modal_amplitude: Axis[Positive] | None = Field(
         None, description="m sqrt(kg), of nonlinear modes, in place of a frequency"
     )
-    mode: Axis[Mode] = Field((1,), description="number of the nonlinear mode, by frequency, from 1 on")
+    mode: Axis[_Number] = Field((1,), description="number of the nonlinear mode, by frequency, from 1 on")
 
 
 class WearSection(Section):
@@ -161,7 +158,7 @@ class WearSection(Section):
 class SlowTimeSection(Section):
     """[slow_time]: end of the histories, and cycle counts of the output."""
 
-    cycles: Cycles = Field(
+    cycles: Annotated[float, Field(ge=0, allow_inf_nan=True)] = Field(
         100_000.0, description="of vibration; 0: the unworn states only, inf: until nothing wears any more"
     )
     missions: Annotated[Whole, Field(ge=1, le=10_000_000)] | None = Field(
@@ -210,8 +207,10 @@ class SlowTimeSection(Section):
 class SolverSection(Section):
     """[solver]: resolution and accuracy. Several values of the first keys are an axis, as under [axes]."""
 
-    harmonics: Axis[Harmonics] = Field((AUTO,), description="harmonics above the static one")
-    samples: Axis[Samples] = Field((AUTO,), description="time samples in a period, more than twice the harmonics")
+    harmonics: Axis[_Number | Literal["auto"]] = Field((AUTO,), description="harmonics above the static one")
+    samples: Axis[_Samples | Literal["auto"]] = Field(
+        (AUTO,), description="time samples in a period, more than twice the harmonics"
+    )
     tolerance: Axis[Fraction] = Field((1e-8,), description="of the scaled residual")
     rtol: Axis[Fraction] = Field((1e-2,), description="aim for the relative error of worn volume and response")
     shortcuts: bool = Field(True, description="whether points with the same history share one")

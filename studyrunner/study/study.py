@@ -11,6 +11,7 @@ from pathlib import Path
 from pydantic import Field
 
 from solver.settings import TARGETS, FollowedFrequency, WearTarget
+from studyrunner import variables
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
 from studyrunner.study.mission import OWN_AXES, MissionBlock
@@ -29,21 +30,6 @@ from studyrunner.study.sections import (
 )
 from studyrunner.study.text import Archived
 from studyrunner.values import Section
-from studyrunner.variables import (
-    ASKED,
-    COUNTS,
-    KEPT,
-    LOOPS,
-    OF_A_MISSION,
-    OF_A_MODE_POINT,
-    OF_MISSIONS,
-    OF_MISSIONS_BY_DEFAULT,
-    OF_MODES,
-    OF_SAMPLED_MISSIONS,
-    OF_SAMPLES,
-    USUAL,
-    Variable,
-)
 
 
 @dataclass(frozen=True)
@@ -62,8 +48,8 @@ class Kind:
     about: str
     time: str
     axes: tuple[str, ...]
-    asked: Mapping[str, Variable]
-    kept: Mapping[str, Variable]
+    asked: Mapping[str, variables.Variable]
+    kept: Mapping[str, variables.Variable]
     usual: tuple[str, ...]
     of_samples: tuple[str, ...]
     counted: str = ""
@@ -76,9 +62,9 @@ def _other_axes(*axes: str) -> tuple[str, ...]:
 
 
 _OF_MODES = ("mode", "sweep")
-_OF_MISSIONS = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
+_OF_MISSIONS = _other_axes("frequency_ratio", "step", "scheme", "modal_amplitude", "mode")
 
-NUMBERS = _OF_MISSIONS[:-1]
+NUMBERS = tuple(name for name in _OF_MISSIONS if name != "sweep")
 """Axes that hold numbers of the joint and of its excitation, which may scatter."""
 
 WEAR = Kind(
@@ -87,10 +73,10 @@ WEAR = Kind(
     " contact pressures and slip, vibration, and the errors of each.",
     "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long",
     _other_axes("frequency_ratio", "modal_amplitude", "mode"),
-    ASKED,
-    KEPT,
-    USUAL,
-    OF_SAMPLES,
+    variables.ASKED,
+    variables.KEPT,
+    variables.USUAL,
+    variables.OF_SAMPLES,
     "cycle",
 )
 MODES = Kind(
@@ -98,10 +84,10 @@ MODES = Kind(
     "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene {scene}.",
     "to a factor of three; a mode that is lost at a large amplitude takes longer",
     _OF_MODES,
-    OF_MODES,
-    OF_A_MODE_POINT,
-    tuple(OF_MODES),
-    tuple(OF_MODES),
+    variables.OF_MODES,
+    variables.OF_A_MODE_POINT,
+    tuple(variables.OF_MODES),
+    tuple(variables.OF_MODES),
     unused={
         "axes": _other_axes(*_OF_MODES, "modal_amplitude"),
         "slow_time": tuple(SlowTimeSection.model_fields),
@@ -116,10 +102,10 @@ MISSIONS = Kind(
     " errors of each.",
     "to a factor of three, if every block wears",
     _OF_MISSIONS,
-    OF_MISSIONS,
-    OF_A_MISSION,
-    OF_MISSIONS_BY_DEFAULT,
-    OF_SAMPLED_MISSIONS,
+    variables.OF_MISSIONS,
+    variables.OF_A_MISSION,
+    variables.OF_MISSIONS_BY_DEFAULT,
+    variables.OF_SAMPLED_MISSIONS,
     "mission",
     {
         "axes": _other_axes(*_OF_MISSIONS, "mode"),
@@ -168,10 +154,10 @@ class Study(Section):
         return MISSIONS if self.mission else MODES if self.axes.modal_amplitude is not None else WEAR
 
     @property
-    def recorded(self) -> Mapping[str, Variable]:
+    def recorded(self) -> Mapping[str, variables.Variable]:
         """Variables of its points, beside those that every result holds."""
         asked = {name: entry for name, entry in self.kind.asked.items() if name in self.outputs.variables}
-        return asked | (LOOPS if self.outputs.loops else {}) | (COUNTS if self.to_the_end else {})
+        return asked | (variables.LOOPS if self.outputs.loops else {}) | (variables.COUNTS if self.to_the_end else {})
 
     @property
     def sizes(self) -> Mapping[str, int]:
