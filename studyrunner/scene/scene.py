@@ -21,11 +21,12 @@ from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene, scene_has, scene_mesh
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.study.mistakes import scene_errors
+from studyrunner.study.mistakes import raise_wrong, scene_errors
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
 from studyrunner.user_error import UserError
+from studyrunner.values import Wrong
 from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 if TYPE_CHECKING:
@@ -94,8 +95,10 @@ def build_study_scene(
             # a scene in a result file is the one that was computed with
             if not scene.group:
                 model = make_compliant(model, dict(scene.parameters)["contact_stiffness"])
-    _check_pairs(study, model)
-    _check_outputs(study, model)
+    raise_wrong(study.source, _wrong_beside(study, model))
+    if "natural_frequency" in study.scene_variables and not has_frequencies(study):
+        with scene_errors(study.source, None):
+            stuck_frequencies(model)
     return model
 
 
@@ -144,36 +147,26 @@ def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
         raise SceneError("model", what, "give parameters of a possible structure") from None
 
 
-def _check_pairs(study: Study, model: ReducedModel) -> None:
-    """Raises UserError where friction is given twice or not at all, or wear factors are of surfaces without pairs."""
-    key, own, value = "scene.friction_coefficient", model.contact.friction_coefficient, study.friction_coefficient
-    if own is None and value is None and study.scene.path is not None:
-        raise UserError(study.source, key, None, "missing: give it, or contact/friction_coefficient in the scene file")
-    if own is not None and value is not None and study.scene.path is not None:
-        remedy = "remove it: the scene file gives each pair its own in contact/friction_coefficient"
-        raise UserError(study.source, key, value, remedy)
+def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
+    """What of a study does not fit to the pairs of its scene."""
+    contact, friction, loops = model.contact, study.friction_coefficient, study.outputs.loops
+    given = contact.friction_coefficient is not None
+    if study.scene.path is not None and given == (friction is not None):
+        file = "contact/friction_coefficient in the scene file"
+        remedy = f"leave it out: {file} gives each pair its own" if given else f"missing: give it, or {file}"
+        yield Wrong("scene.friction_coefficient", friction, remedy)
     if study.wear.surfaces is not None:
         try:
-            surface_factors(model.contact.surface, study.wear.as_law.surfaces)
+            surface_factors(contact.surface, study.wear.as_law.surfaces)
         except ValueError as error:
-            raise UserError(study.source, "wear.surfaces", study.wear.surfaces, str(error)) from None
-
-
-def _check_outputs(study: Study, model: ReducedModel) -> None:
-    """Raises UserError where the study asks for loops of pairs or natural frequencies that the scene does not have."""
-    loops, n_contact = study.outputs.loops, model.contact.n_contact
-    for pair in loops:
-        if pair >= n_contact:
-            remedy = f"give indices from 0 to {n_contact - 1}, the contact pairs of the scene"
-            raise UserError(study.source, "outputs.loops", pair, remedy)
-    facts = SceneFacts(0, model.contact.position, model.contact.area, model.contact.surface, model.response_names, "")
+            yield Wrong("wear.surfaces", study.wear.surfaces, str(error))
+    if loops and max(loops) >= contact.n_contact:
+        remedy = f"give indices from 0 to {contact.n_contact - 1}, the contact pairs of the scene"
+        yield Wrong("outputs.loops", max(loops), remedy)
+    facts = SceneFacts(0, contact.position, contact.area, contact.surface, model.response_names, "")
     if (size := 8.0 * values_of_point(study, facts)) > _LARGEST_HISTORY:
-        remedy = f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
-        key = "outputs.loops" if loops else "slow_time.outputs"
-        raise UserError(study.source, key, list(loops) if loops else len(study.output_counts), remedy)
-    if "natural_frequency" in study.scene_variables and not has_frequencies(study):
-        with scene_errors(study.source, None):
-            stuck_frequencies(model)
+        key, value = ("outputs.loops", list(loops)) if loops else ("slow_time.outputs", len(study.output_counts))
+        yield Wrong(key, value, f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB")
 
 
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
