@@ -131,13 +131,15 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     """
     if "exact" not in study.outputs.variables:
         return ()
-    parts = [_answers(part.study) for part in parts_of(study)]
-    shape = [len(values) for values in study.axes_of_parts.values()]
-    own = len(study.own_axes)
+    answers = [_answers(part.study) for part in parts_of(study)]
+    others = (*(1,) * (len(study.own_axes) - 3), *(len(values) for values in study.axes_of_parts.values()))
     variables = []
     for name, entry in SCENE["exact"].items():
-        values = np.stack([part[name] for part in parts], axis=own)
-        values = values.reshape(*values.shape[:own], *shape, *values.shape[own + 1 :])
+        key = name.removeprefix("exact_")
+        values = np.array([[[getattr(each, key) for each in row] for row in part] for part in answers])
+        # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
+        values = np.moveaxis(values, (1, 3, 2), (0, 1, 2))
+        values = values.reshape(*values.shape[:3], *others, *values.shape[4:])
         variables.append(SmallArray(name, (*study.dimensions, *entry.dimensions), values, entry, over_axes=True))
     return tuple(variables)
 
@@ -158,7 +160,8 @@ def _changed(study: Study) -> frozenset[str]:
     return frozenset(changed | others) - {f"{name}.{key}" for name, keys in tables.items() for key in keys}
 
 
-def _answers(study: Study) -> dict[str, np.ndarray]:
+def _answers(study: Study) -> list[list[ExactAnswer]]:
+    """Exact answers of a part of a study, for all wear coefficients, by frequency and excitation amplitude."""
     axes, changed = study.axes, _changed(study)
     (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
     counts, given = np.array(study.output_counts), np.array(axes.wear_coefficient)
@@ -167,15 +170,7 @@ def _answers(study: Study) -> dict[str, np.ndarray]:
         asked = WearQuestion(frequency, amplitude, given, counts, study.wear.as_law, depth, changed)
         return scene_answer(study.scene.model, study.scene.parameters, asked)
 
-    answers = [[answer(one, other) for other in axes.excitation_amplitude] for one in axes.frequency]
-    others = (1,) * (len(study.own_axes) - 3)
-    found = {}
-    for name in SCENE["exact"]:
-        values = np.array([[getattr(each, name.removeprefix("exact_")) for each in row] for row in answers])
-        # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
-        values = np.swapaxes(values, 1, 2)
-        found[name] = values.reshape(*values.shape[:3], *others, *values.shape[3:])
-    return found
+    return [[answer(one, other) for other in axes.excitation_amplitude] for one in axes.frequency]
 
 
 def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
 
 from studies.contact_compliance import ContactStiffness
 from studies.fe_models.model_files import ModelFiles
@@ -19,7 +19,7 @@ from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
 from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file
 from studyrunner.system.progress import count as counted
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
-from studyrunner.values import NotNegative, Section, Wrong, listed, once
+from studyrunner.values import Axis, NotNegative, Section, Wrong, listed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,18 +49,13 @@ class SceneFileParameters(Section):
     contact_stiffness: ContactStiffness = None
 
 
-def _listed(value: object) -> object:
-    return tuple(listed(value))
-
-
 def _states(value: object) -> object:
     """Depths of all pairs, one number or one for each, of one state or of a list of states."""
     several = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
-    return tuple(_listed(state) for state in listed(value)) if several else (_listed(value),)
+    return tuple(tuple(listed(state)) for state in (listed(value) if several else [value]))
 
 
 _Depths = Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False)]
-_Counts = Annotated[tuple[NotNegative, ...], BeforeValidator(_listed), AfterValidator(once)]
 
 
 class Worn(Section):
@@ -73,7 +68,7 @@ class Worn(Section):
     depth: Annotated[tuple[_Depths, ...], BeforeValidator(_states)] = Field(
         description="m, of each pair or of all pairs"
     )
-    cycle: _Counts = Field((), description="cycle counts of the result")
+    cycle: Axis[NotNegative] = Field((), description="cycle counts of the result")
     result: str = Field("", description="result file")
 
     def rules(self) -> Iterator[Wrong]:
@@ -214,7 +209,7 @@ class _OfResult(Section):
     model_config = ConfigDict(extra="allow")
 
     result: str = Field(description="path of a result file; or depth in place of a result")
-    cycle: Annotated[_Counts, Field(min_length=1)] = Field(description="cycle counts of the result")
+    cycle: Axis[NotNegative] = Field(description="cycle counts of the result")
 
 
 def read_worn(table: object, source: str, folder: Path) -> Worn:
