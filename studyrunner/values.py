@@ -94,7 +94,7 @@ def read_axis(value: object) -> tuple[Any, ...]:
         if isinstance(value["start"], int) and isinstance(value["stop"], int):
             values = tuple(int(each) if each == int(each) else each for each in values)
     if not 0 < len(values) <= LONGEST_AXIS:
-        raise WrongValueError(len(values), f"give at least one value, and at most {LONGEST_AXIS}")
+        raise ValueError(f"give at least one value, and at most {LONGEST_AXIS}")
     for each in values:
         if not isinstance(each, bool | int | float | str):
             raise WrongValueError(each, "give a number, true, false or a name, a list of them or {start, stop, num}")

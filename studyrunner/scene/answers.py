@@ -189,10 +189,7 @@ def check_study_model(study: Study, picture: Path, progress: Callable[[str], Non
     """
     files = study.scene.files
     if files is None:
-        what = f"{study.scene.model} is none"
-        if study.scene.group:
-            what = f"the result holds the reduced scene of {study.scene.model}"
-        remedy = f"give a study of a finite-element model: {what}; --plan shows what is computed"
+        remedy = f"give a study file of a finite-element model, which {study.scene.model} here is not"
         raise UserError("command line", "--check", study.source, remedy)
     # what reads and reduces it is loaded where there is one
     from studies.fe_models.from_files.check import describe_model

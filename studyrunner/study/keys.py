@@ -64,8 +64,7 @@ def write_new_study(name: str, deck: Path | None = None) -> Path:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except OSError as error:
-        remedy = "give another name: there is such a file" if path.exists() else f"{error.strerror}: give another name"
-        raise UserError("command line", "--new", name, remedy) from None
+        raise UserError("command line", "--new", name, f"give another name: {error.strerror}") from None
     return path
 
 

@@ -176,10 +176,8 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
         return scene
     if _names_file(model):
         path = origin.path.parent / model
-        try:
+        with scene_errors(origin.source, path):
             exists = path.is_file()
-        except (OSError, ValueError):
-            exists = False
         if not exists:
             remedy = "there is no such file: give a path relative to the study file"
             raise UserError(origin.source, "scene.model", model, remedy)

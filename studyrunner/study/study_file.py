@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -83,17 +84,13 @@ def bundled_studies() -> tuple[str, ...]:
 
 
 def _study_path(argument: str) -> Path:
-    path, names = Path(argument), bundled_studies()
-    try:
-        if path.is_file():
-            return path
-        remedy = "give a TOML file: this is a folder" if path.is_dir() else ""
-    except OSError as error:
-        remedy = f"give a file that can be read: {error.strerror}"
-    if not remedy and argument in names:
+    names = bundled_studies()
+    with contextlib.suppress(OSError):
+        if Path(argument).is_file():
+            return Path(argument)
+    if argument in names:
         return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
-    what = "no such file" if path.suffix == ".toml" or "/" in argument or "\\" in argument else "none of this name"
-    remedy = remedy or f"there is {what}: give a TOML file or one of the bundled studies {', '.join(names)}"
+    remedy = f"there is no such file: give a TOML file or one of the bundled studies {', '.join(names)}"
     raise UserError(argument, "the study", None, remedy)
 
 
