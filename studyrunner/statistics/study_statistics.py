@@ -248,27 +248,21 @@ def _of_groups(dataset: xr.Dataset, values: SampleValues, names: tuple[str, ...]
 
 def describe_volumes(point: xr.Dataset) -> str:
     """Range, median and numerical error of the worn volumes of one point, and two groups where there are."""
-    ends = point["worn_volume_quantile"].values * _MM3
+    ends, error = (point[name].values * _MM3 for name in ("worn_volume_quantile", "worn_volume_quantile_error"))
     probabilities, n_without = point["quantile"].values, int(point["n_without_value"])
     share = 100.0 * (probabilities[-1] - probabilities[0])
     text = f"{share:.4g} % of {int(point['n_samples'])} samples wear {_range(ends[0, 0], ends[-1, 1])} mm3"
-    (n_lower, n_upper), (lower, upper) = point["group_size"].values.tolist(), point["group_gap"].values * _MM3
-    if 0.5 in probabilities:
-        middle = ends[probabilities == 0.5][0]
-        moved = point["worn_volume_quantile_error"].values[probabilities == 0.5][0] * _MM3
+    for middle, moved in zip(ends[probabilities == 0.5], error[probabilities == 0.5], strict=True):
         # how far the ends move, apart from what samples without a value may have
         finite = np.isfinite(middle)
-        by = np.abs(moved[finite] - middle[finite])
-        error = "not known"
-        if finite.any() and np.isfinite(by).all():
-            error = show_percent(float(by.sum() / middle[finite].sum()) if by.any() else 0.0)
-        between = "between two groups, " if n_upper and lower < middle.mean() < upper else ""
-        text += f", median {_range(*middle)} mm3 ({between}numerical error {error})"
+        by = np.abs(moved - middle)[finite]
+        relative = float(by.sum() / middle[finite].sum()) if by.any() else 0.0
+        shown = show_percent(relative) if finite.any() and math.isfinite(relative) else "not known"
+        text += f", median {_range(*middle)} mm3 (numerical error {shown})"
     text += f"; {n_without} have no volume that can be trusted" if n_without else ""
+    (n_lower, n_upper), (lower, upper) = point["group_size"].values.tolist(), point["group_gap"].values * _MM3
     if n_upper:
-        rest = int(point["n_samples"]) - n_without - n_lower - n_upper
         text += f"; two groups, {n_lower} samples up to {lower:.3g} mm3 and {n_upper} from {upper:.3g} mm3"
-        text += f" ({rest} known too badly to tell)" if rest > 0 else ""
         contact = int(point["deciding_contact"])
         text += "" if contact < 0 else f", which differ in the wear depth of contact pair {contact}"
     return text
@@ -284,20 +278,11 @@ def measure_of(statistics: xr.Dataset) -> str | None:
     return next((name for name in _MEASURES if name in statistics), None)
 
 
-def deciding_input(intervals: Array) -> int | None:
-    """Place of the input that decides most, from intervals (n_inputs, 2); None where the samples do not tell.
-
-    They tell where the interval of its strength, a correlation without sign, is above those of all others.
-    """
-    ends = np.nan_to_num(intervals)
-    least = np.where((ends[:, 0] < 0.0) & (ends[:, 1] > 0.0), 0.0, np.abs(ends).min(axis=1))
-    most = int(np.argmax(least))
-    others = np.delete(np.abs(ends).max(axis=1), most)
-    return most if least[most] > others.max(initial=0.0) else None
-
-
 def describe_ranking(point: xr.Dataset) -> str:
-    """The deciding input in words, or why none is known; "" where no input varies."""
+    """The deciding input in words, or why none is known; "" where no input varies.
+
+    One decides where the interval of its strength, a correlation without sign, is above those of all others.
+    """
     name = measure_of(point)
     if name is None:
         return ""
@@ -307,9 +292,8 @@ def describe_ranking(point: xr.Dataset) -> str:
         # two independent samples for each base sample
         too_few = n_samples < FEWEST * (2 if name == "first_index" else 1)
         return f"{n_samples} samples are too few to say which input decides" if too_few else ""
-    without = [word for word, row in zip(words, values, strict=True) if np.isnan(row).all()]
-    inputs = "input" if len(without) == 1 else "inputs"
-    more = f"; {inputs} not ranked: {', '.join(without)}" if without else ""
+    without = ", ".join(word for word, row in zip(words, values, strict=True) if np.isnan(row).all())
+    more = f"; not ranked: {without}" if without else ""
     most = int(np.argmax(np.abs(np.nan_to_num(values)).max(axis=1)))
     (low, high), (lowest, highest) = intervals[most], values[most].tolist()
     if name == "first_index":
@@ -317,6 +301,7 @@ def describe_ranking(point: xr.Dataset) -> str:
         shown = f"{share} % of the variance, interval {100.0 * low:.0f} to {100.0 * high:.0f} %"
     else:
         shown = f"rank correlation {_range(lowest, highest, '.2f')}, interval {low:.2f} to {high:.2f}"
-    if deciding_input(intervals) is None:
+    others = np.abs(np.nan_to_num(np.delete(intervals, most, axis=0))).max(initial=0.0)
+    if low < 0.0 < high or min(abs(low), abs(high)) <= others:
         return f"which input decides is not known: {words[most]} has the largest estimate ({shown}){more}"
     return f"{words[most]} decides most ({shown}){more}"
