@@ -75,7 +75,7 @@ def _keywords() -> str:
     )
     return "\n\n".join(
         (
-            "Without blanks. Read as well: `*PART` and `*INSTANCE` with `NAME` and `PART`, `*INCLUDE` with `INPUT`.",
+            "Without blanks. Read as well: `*INCLUDE` with `INPUT`.",
             _table(("read", "parameters that are acted upon", "parameters that are skipped"), rows),
             f"Procedures, with any parameters: {_names(procedures)}.",
             f"Skipped: {_names(sorted(HARMLESS))}.",

@@ -85,7 +85,7 @@ def check_elements(mesh: SolidMesh) -> None:
         for chosen in _batches(group):
             wrong = np.flatnonzero(~(smallest_jacobians(kind, mesh.coordinates[group.nodes[chosen]]) > 0.0))
             if len(wrong):
-                found = f"element {group.numbers[chosen][wrong[0]]} ({group.kind}) is turned inside out"
+                found = f"element {group.numbers[chosen][wrong[0]]} is turned inside out"
                 remedy = "give its nodes in the order of CalculiX and Abaqus, or mend the mesh"
                 raise SceneError("model", found, remedy)
 

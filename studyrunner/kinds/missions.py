@@ -137,8 +137,10 @@ class Mission(Task):
         # with those before, for the wear of one
         read = tuple(sorted({0, 1} | kept | {max(number - 1, 0) for number in kept}))
         first = cast("Direction", self.first)
-        mission = of_solver.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
-        history = integrate_missions(mission, note, self.resume)
+        asked = of_solver.MissionRequest(
+            blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first
+        )
+        history = integrate_missions(asked, note, self.resume)
         raise_fault(history.outcome, history.message)
         yield PointResult(self.points(0), _values(self, history), progress=reached.after(history.outcome))
 

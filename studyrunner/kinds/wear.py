@@ -35,7 +35,7 @@ from studyrunner.mpi.dispatch import CostKeys
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.results.history import StartState
-    from solver.wear.integrate import WearRequest
+    from solver.wear.problem import WearRequest
 
 AT_REST = "history at rest"
 """Most general group of histories in which nothing wears, see `CostModel`."""
@@ -239,8 +239,7 @@ class History(_FromRest):
                 yield replace(result, place=place, progress=progress)
 
     def _asked(self, integrated: Integrated) -> WearRequest:
-        from solver.wear.integrate import WearRequest
-        from solver.wear.step import steps_of
+        from solver.wear.problem import WearRequest, steps_of
 
         counts: NDArray[np.float64] | ToTheEnd
         if self.to_the_end is not None and not integrated.unworn:

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from solver.results.history import WearHistory
-from solver.results.verdict import describe_cut_off, judge, last_error
+from solver.results.history import WearHistory, describe_cut_off, judge, last_error
 from studyrunner.kinds.sharing import Integrated
 from studyrunner.kinds.task import PointResult
 from studyrunner.kinds.wear import History

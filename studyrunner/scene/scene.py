@@ -121,7 +121,7 @@ def describe_origin(study: Study) -> dict[str, str]:
     """Attributes on the files of a finite-element model; none for other scenes. Raises OSError, SceneError."""
     # imported where they are used: most studies have no such model
     if study.scene.files is not None:
-        from studies.fe_models.from_files.scene import describe_origin as describe_files
+        from studies.fe_models.from_files.model import describe_origin as describe_files
 
         return describe_files(study.scene.files, study.scene.parameters)
     if study.scene.path is None:
@@ -136,7 +136,7 @@ def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
     try:
         if scene.files is None:
             return build_scene(scene.model, scene.parameters, n_harmonics)
-        from studies.fe_models.from_files.scene import build
+        from studies.fe_models.from_files.model import build
 
         return build(scene.files, scene.parameters, n_harmonics, progress)
     except SceneError:
@@ -202,7 +202,7 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
     if "mesh" not in scene.offers:
         return None
     if scene.files is not None:
-        from studies.fe_models.from_files.scene import describe_model_mesh
+        from studies.fe_models.from_files.model import describe_model_mesh
 
         return describe_model_mesh(scene.files, scene.parameters)
     if scene.path is None:

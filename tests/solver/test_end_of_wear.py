@@ -145,7 +145,7 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
 
 
 def test_one_that_was_interrupted_is_the_same_to_the_last_bit(monkeypatch):
-    monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 30)
+    monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 30)
     kept: list[Packed] = []
     whole = worn(ToTheEnd(9), keep=kept.append)
     assert kept

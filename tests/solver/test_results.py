@@ -10,8 +10,8 @@ import pytest
 from solver import march_wear as march_model
 from solver.accuracy.certificate import certify
 from solver.outcome import Outcome
+from solver.results.history import first_cut_off, judge
 from solver.results.state_report import LOOP_PHASES, periodic_state, report_state
-from solver.results.verdict import first_cut_off, judge
 from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from solver.structure.joint import build_case

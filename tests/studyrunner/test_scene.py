@@ -9,7 +9,7 @@ import pytest
 from solver.model import ContactInterface, needed_nodal_diameters
 from solver.packing import Packed, pack, unpack_model
 from studies import build_scene, read_scene
-from studies.fe_models.from_files import scene as from_files
+from studies.fe_models.from_files import model as from_files
 from studies.scene_file import write_scene
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks

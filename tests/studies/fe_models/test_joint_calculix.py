@@ -7,9 +7,8 @@ import pytest
 
 from studies.fe_models.from_files.check import describe_model
 from studies.fe_models.from_files.imported import order_by_nodes
-from studies.fe_models.from_files.model import find_files, load_model
+from studies.fe_models.from_files.model import find_files, load_model, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.from_files.scene import reduce_model
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.model_files import find_units
 from studies.finite_element.joint_model import ReductionOptions

@@ -9,9 +9,8 @@ from scipy.linalg import eigh
 from solver import build_model
 from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
 from studies.fe_models.from_files.check import describe_model
-from studies.fe_models.from_files.model import find_files, load_model
+from studies.fe_models.from_files.model import find_files, load_model, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.from_files.scene import reduce_model
 from studies.finite_element.pairing import local_frames
 from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
 from studies.scene_answers import stuck_frequencies
