@@ -17,7 +17,7 @@ from studies.scene_error import SceneError
 from studies.scenes import changed_keys, scene_answer, scene_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build, has_frequencies
-from studyrunner.scene.scene_set import SceneSet, axes_of_difference
+from studyrunner.scene.scene_set import SceneSet, along_axes
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.parts import parts_of
 from studyrunner.study.study import Study
@@ -115,11 +115,8 @@ def join_scene_variables(
         if len({each.values.shape for each in variables}) > 1:
             left_out.append(first.name)
             continue
-        names, numbers = axes_of_difference(study, scenes, [each.values.tobytes() for each in variables])
-        if names:
-            values = np.stack([each.values for each in variables])[numbers]
-            first = replace(first, dimensions=(*names, *first.dimensions), values=values)
-        joined.append(first)
+        names, values = along_axes(study, scenes, [each.values for each in variables])
+        joined.append(replace(first, dimensions=(*names, *first.dimensions), values=values))
     notes = [f"{', '.join(left_out)}: left out of the result, as the scenes differ in their sizes"] if left_out else []
     return tuple(joined), tuple(notes)
 

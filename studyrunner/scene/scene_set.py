@@ -8,16 +8,12 @@ import math
 import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.scene.scene import (
-    SceneFacts,
-    build_study_scene,
-    describe_scene,
-    harmonics_to_build,
-)
+from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, harmonics_to_build
 from studyrunner.study.mistakes import keys_as_given
 from studyrunner.study.parts import Part, parts_of
 from studyrunner.study.scene_axes import keys_below_axes
@@ -52,19 +48,18 @@ def find_scenes(study: Study) -> SceneSet:
 
     Raises UserError where a result file is to keep the scene, and there are several.
     """
-    studies: dict[str, Study] = {}
-    parts, of_blocks = parts_of(study), []
+    parts, studies, keys = parts_of(study), dict[str, Study](), list[list[str]]()
     for part in parts:
-        by_key = [(_key(each), each) for each in part.study.block_studies or (part.study,)]
-        for key, each in by_key:
+        own = part.study.block_studies or (part.study,)
+        keys.append([_key(each) for each in own])
+        for key, each in zip(keys[-1], own, strict=True):
             studies.setdefault(key, each)
-        of_blocks.append([key for key, _ in by_key])
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
         raise UserError(study.source, "outputs.scene", True, remedy)
     number_of = {key: number for number, key in enumerate(studies)}
-    numbers = tuple(tuple(number_of[key] for key in keys) for keys in of_blocks)
-    return SceneSet(tuple(studies.values()), parts, tuple(own[0] for own in numbers), numbers)
+    of_blocks = tuple(tuple(number_of[key] for key in each) for each in keys)
+    return SceneSet(tuple(studies.values()), parts, tuple(numbers[0] for numbers in of_blocks), of_blocks)
 
 
 def _key(study: Study) -> str:
@@ -187,9 +182,7 @@ def stuck_frequencies_of(
     study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
 ) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     """First natural frequencies, Hz, with the joint stuck: axes along which they differ, and values along these."""
-    found = np.array([each.stuck_frequency for each in facts])
-    names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in found])
-    return names, found[numbers]
+    return along_axes(study, scenes, [np.array(each.stuck_frequency) for each in facts])
 
 
 def frequencies_of_ratios(
@@ -200,6 +193,12 @@ def frequencies_of_ratios(
         return None
     names, stuck = stuck_frequencies_of(study, facts, scenes)
     return ("frequency_ratio", *names), np.multiply.outer(study.axes.frequency_ratio, stuck)
+
+
+def along_axes(study: Study, scenes: SceneSet, values: Sequence[NDArray[Any]]) -> tuple[tuple[str, ...], NDArray[Any]]:
+    """Axes along which arrays of the scenes differ, and these arrays along the axes. values: of each scene, alike."""
+    names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in values])
+    return names, np.stack(values)[numbers]
 
 
 def axes_of_difference(

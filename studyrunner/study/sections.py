@@ -12,18 +12,7 @@ from solver.contact.wear_law import WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
-from studyrunner.values import (
-    Axis,
-    Fraction,
-    Listed,
-    NotNegative,
-    Positive,
-    Section,
-    Whole,
-    Wrong,
-    ascending,
-    once,
-)
+from studyrunner.values import Axis, Fraction, Listed, NotNegative, Positive, Section, Whole, Wrong, ascending, once
 from studyrunner.variables import ASKED, OF_MISSIONS, OF_MODES
 
 AUTO: Final = "auto"

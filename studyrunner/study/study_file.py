@@ -29,15 +29,7 @@ from studyrunner.study.scene_axes import (
     take_axes,
     variants_of,
 )
-from studyrunner.study.scene_section import (
-    WORN_AXIS,
-    Origin,
-    SceneSection,
-    Worn,
-    find_scene,
-    parameters_of,
-    read_worn,
-)
+from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, Worn, find_scene, parameters_of, read_worn
 from studyrunner.study.sections import DEFAULT, SECTIONS, SOLVER_AXES, VARIABLES, SlowTimeSection, WearSection
 from studyrunner.study.study import MODES, Study
 from studyrunner.study.text import format_toml, read_archived, read_toml

@@ -16,13 +16,7 @@ from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.scene.scene import (
-    _parts,
-    build_study_scene,
-    describe_scene,
-    largest_harmonics,
-    write_study_scene,
-)
+from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics, write_study_scene
 from studyrunner.scene_building import SceneModels, SceneTask, build_scene_task
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
