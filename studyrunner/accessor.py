@@ -32,9 +32,12 @@ class FretwearAccessor:
     def response(self) -> xr.DataArray:
         """First harmonic of the response, complex, m: the response is Re(value * exp(1j omega t)).
 
-        Dimensions of `response_amplitude`; NaN where a point failed. KeyError: the file holds no amplitude or no phase.
+        Dimensions of `response_amplitude`; NaN where a point failed. ValueError: the file holds no amplitude or phase.
         """
-        amplitude, phase = self._dataset["response_amplitude"], self._dataset["response_phase"]
+        names = ("response_amplitude", "response_phase")
+        if missing := [name for name in names if name not in self._dataset]:
+            raise ValueError(f"The result holds no {' and no '.join(missing)}: ask for it by [outputs] variables.")
+        amplitude, phase = (self._dataset[name] for name in names)
         # a damaged file may hold anything
         with np.errstate(invalid="ignore"):
             response = (amplitude * np.exp(1j * phase)).rename("response")
@@ -61,10 +64,7 @@ class FretwearAccessor:
         exceed: Sequence[float] | None = None,
         depth: Sequence[float] | None = None,
     ) -> xr.Dataset:
-        """What the samples of a study with [scatter] say of worn volume and depth.
-
-        As `studyrunner.statistics.study_statistics.worn_volume_statistics` of this dataset. ValueError: it has none.
-        """
+        """`studyrunner.statistics.study_statistics.worn_volume_statistics` of this dataset. ValueError: no samples."""
         return worn_volume_statistics(self._dataset, quantiles, confidence, exceed, depth)
 
     def flank(self, name: str, surface: str) -> xr.DataArray:

@@ -18,28 +18,30 @@ SCENE: dict[str, dict[str, Variable]] = {
             ("mesh_quad_index", "mesh_corner"),
             "1",
             "nodes of the outer face, anticlockwise from outside",
-            "int32",
+            "Indices along mesh_node.",
+            dtype="int32",
             content=_AUXILIARY,
-            comment="Indices along mesh_node.",
         ),
-        "mesh_part": Variable(("mesh_quad_index",), "1", "part that the face belongs to", "str", content=_AUXILIARY),
+        "mesh_part": Variable(
+            ("mesh_quad_index",), "1", "part that the face belongs to", dtype="str", content=_AUXILIARY
+        ),
     },
     "natural_frequency": {
         "natural_frequency": Variable(
             ("nodal_diameter", "mode"),
             "Hz",
             "natural frequency with the joint stuck, without damping",
-            comment="NaN where there are fewer modes.",
+            "NaN where there are fewer modes.",
         ),
     },
     "exact": {
-        "exact_worn_volume": Variable(("cycle",), "m3", "exact worn volume", content=_REFERENCE, comment=_NO_FORM),
+        "exact_worn_volume": Variable(("cycle",), "m3", "exact worn volume", _NO_FORM, content=_REFERENCE),
         "exact_response_amplitude": Variable(
             ("cycle", "response"),
             "m",
             "exact amplitude of the first harmonic of the response",
+            _NO_FORM,
             content=_REFERENCE,
-            comment=_NO_FORM,
         ),
     },
 }
@@ -49,83 +51,68 @@ STUCK_FREQUENCY = Variable(
     (),
     "Hz",
     "first natural frequency with the joint stuck, without damping",
+    "At the nodal diameter of the excitation; NaN where nothing moves that has mass.",
     content=_REFERENCE,
-    comment="At the nodal diameter of the excitation; NaN where nothing moves that has mass.",
 )
 """Of the scene; along the axes along which the scenes of a study differ."""
 
-WORN_DEPTH = Variable(
-    ("contact",), "m", "wear depth at the start", comment="Key scene.worn; wear_depth counts from there."
-)
+WORN_DEPTH = Variable(("contact",), "m", "wear depth at the start", "Key scene.worn; wear_depth counts from there.")
 """Of a joint that is mounted worn."""
 
 COORDINATES = {
-    "frequency": Variable(
-        (), "Hz", "excitation frequency", comment="Of a followed resonance the middle of loading.between."
-    ),
+    "frequency": Variable((), "Hz", "excitation frequency", "Of a followed resonance the middle of loading.between."),
     "frequency_ratio": Variable(
         (),
         "1",
         "excitation frequency over the first natural frequency with the joint stuck",
-        comment="Of the same scene; the coordinate frequency is in Hz.",
+        "Of the same scene; the coordinate frequency is in Hz.",
     ),
-    "wear_coefficient": Variable(
-        (), "1/Pa", "wear coefficient", comment="Of the law that the attribute study names under [wear]."
-    ),
+    "wear_coefficient": Variable((), "1/Pa", "wear coefficient", "Of the law under [wear] in the study."),
     "excitation_amplitude": Variable((), "N", "excitation amplitude, factor of the unit harmonic load"),
-    "step": Variable((), "1", "step of the slow time scale, cycles", comment="Not used by the adaptive scheme."),
+    "step": Variable((), "1", "step of the slow time scale, cycles", "Not used by the adaptive scheme."),
     "scheme": Variable((), "1", "integration scheme of the wear"),
     "sweep": Variable(
         (),
         "1",
         "how the unworn state is reached",
-        comment="up, down: along the frequency; ramp: the excitation is raised at this frequency.",
+        "up, down: along the frequency; ramp: the excitation is raised at this frequency.",
     ),
     "harmonics": Variable((), "1", "harmonics above the static one"),
     "samples": Variable((), "1", "time samples in a period"),
     "tolerance": Variable((), "1", "largest accepted scaled residual"),
     "rtol": Variable((), "1", "relative error that automatic settings and adaptive steps aim at"),
-    "modal_amplitude": Variable(
-        (),
-        "m kg^0.5",
-        "modal amplitude",
-        comment="sqrt(x^H M x), x first harmonic of all displacements, M mass matrix.",
-    ),
-    "sample": Variable((), "1", "number of the sample", comment="What it draws is in the coordinates sample_..."),
-    "cycle": Variable((), "1", "number of vibration cycles", comment="Slow time."),
-    "mission": Variable((), "1", "number of missions", comment="Slow time."),
-    "block": Variable((), "1", "name of the block of the mission", comment="In their order in a mission."),
+    "modal_amplitude": Variable((), "m kg^0.5", "modal amplitude", "sqrt(x^H M x), x: first harmonic, M: mass matrix."),
+    "sample": Variable((), "1", "number of the sample", "What it draws is in the coordinates sample_..."),
+    "cycle": Variable((), "1", "number of vibration cycles", "Slow time."),
+    "mission": Variable((), "1", "number of missions", "Slow time."),
+    "block": Variable((), "1", "name of the block of the mission", "In their order in a mission."),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),
-    "phase": Variable(
-        (), "rad", "phase of the excitation", comment="omega t, 0 where a real harmonic load has its maximum."
-    ),
+    "phase": Variable((), "rad", "phase of the excitation", "omega t, 0 where a real harmonic load has its maximum."),
     "component": Variable((), "1", "component of relative displacement and contact force in the frame of the pair"),
     "nodal_diameter": Variable((), "1", "nodal diameter"),
     "mode": Variable((), "1", "number of the mode, by frequency"),
     **{
-        f"contact_{axis}": Variable(("contact",), "m", f"position of the contact pair, {axis}", comment=_UNPLACED)
+        f"contact_{axis}": Variable(("contact",), "m", f"position of the contact pair, {axis}", _UNPLACED)
         for axis in "xyz"
     },
-    "contact_area": Variable(
-        ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
-    ),
-    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair", "str"),
+    "contact_area": Variable(("contact",), "m2", "area of the contact pair", "Alpha in Eq. (7) of the reference."),
+    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair", dtype="str"),
     "contact_edge": Variable(
         ("contact",),
         "1",
         "whether the contact pair is at the edge of its surface",
-        "int8",
-        ("inside", "edge"),
-        comment="Found from the positions of the pairs of flat surfaces, or given by the scene.",
+        "Found from the positions of the pairs of flat surfaces, or given by the scene.",
+        dtype="int8",
+        flags=("inside", "edge"),
     ),
     "contact_exists": Variable(
         ("contact",),
         "1",
         "whether the scene has the contact pair",
-        "int8",
-        ("missing", "present"),
-        comment="Scenes of the study differ in their pairs. Values of a missing pair are NaN.",
+        "Scenes of the study differ in their pairs. Values of a missing pair are NaN.",
+        dtype="int8",
+        flags=("missing", "present"),
     ),
 }
 """Coordinates, the axes first."""

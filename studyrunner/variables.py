@@ -20,10 +20,10 @@ class Variable:
     dimensions: tuple[str, ...]
     units: str
     long_name: str
+    comment: str = ""
     dtype: str = "float64"
     flags: tuple[str, ...] = ()
     content: str = "modelResult"
-    comment: str = ""
 
     @property
     def is_text(self) -> bool:
@@ -32,76 +32,57 @@ class Variable:
 
 
 _CYCLE, _PAIRS, _RESPONSES = ("cycle",), ("cycle", "contact"), ("cycle", "response")
-_FIRST_HARMONIC = "The first harmonic is x(t) = Re(X exp(i omega t))."
-_OWN = "A response with a unit in its name, as root stress [MPa], has this unit."
+_ANGLE = "Angle of X. The first harmonic is x(t) = Re(X exp(i omega t))."
+_MAGNITUDE = f"{_ANGLE.replace('Angle', 'Magnitude')} A response with a unit in its name, as root stress [MPa], has it."
 _NO_TARGET = "NaN where there is no target, or where the target is not reached: see message."
 _ITS_HISTORY = "Of the history that the point is read from, which points may share."
 
 ASKED = {
-    "worn_volume": Variable(_CYCLE, "m3", "worn volume", comment="Sum over contact pairs of depth times area."),
-    "wear_rate": Variable(_CYCLE, "m3 per cycle", "volume worn in a cycle", comment="See [wear] in the study."),
-    "wear_depth": Variable(_PAIRS, "m", "wear depth", comment="Of both surfaces of the pair together."),
+    "worn_volume": Variable(_CYCLE, "m3", "worn volume", "Sum over contact pairs of depth times area."),
+    "wear_rate": Variable(_CYCLE, "m3 per cycle", "volume worn in a cycle", "See [wear] in the study."),
+    "wear_depth": Variable(_PAIRS, "m", "wear depth", "Of both surfaces of the pair together."),
     "wear_depth_max": Variable(_CYCLE, "m", "largest wear depth of any pair"),
     "wear_depth_max_error": Variable(_CYCLE, "m", "estimated error of the wear depth of the deepest pair"),
     "wear_depth_last": Variable(("contact",), "m", "wear depth at the last count that the point has reached"),
     "mean_pressure": Variable(
-        _PAIRS, "Pa", "contact pressure, mean over a period", comment="Force over contact_area, compression positive."
+        _PAIRS, "Pa", "mean contact pressure over a period", "Force over contact_area; compression."
     ),
-    "response_amplitude": Variable(
-        _RESPONSES,
-        "m",
-        "amplitude of the first harmonic of the response",
-        comment=f"Magnitude of X. {_FIRST_HARMONIC} {_OWN}",
-    ),
-    "response_phase": Variable(
-        _RESPONSES, "rad", "phase of the first harmonic of the response", comment=f"Angle of X. {_FIRST_HARMONIC}"
-    ),
-    "response_mean": Variable(
-        _RESPONSES, "m", "mean of the response over a period", comment="Of the static load, and what the wear changes."
-    ),
-    "response_peak": Variable(
-        _RESPONSES, "m", "largest magnitude of the response over a period", comment="With the static displacement."
-    ),
+    "response_amplitude": Variable(_RESPONSES, "m", "amplitude of the first harmonic of the response", _MAGNITUDE),
+    "response_phase": Variable(_RESPONSES, "rad", "phase of the first harmonic of the response", _ANGLE),
+    "response_mean": Variable(_RESPONSES, "m", "mean of the response over a period", "Of static load and wear."),
+    "response_peak": Variable(_RESPONSES, "m", "largest magnitude of the response over a period", "With its mean."),
     "excitation_frequency": Variable(
-        _CYCLE, "Hz", "frequency of the excitation", comment='Differs between counts with axes.frequency = "resonance".'
+        _CYCLE, "Hz", "frequency of the excitation", "Changes where it follows a resonance."
     ),
     "excitation_frequency_error": Variable(
-        _CYCLE, "Hz", "estimated error of the frequency of the excitation", comment="0 for a given frequency."
+        _CYCLE, "Hz", "estimated error of excitation_frequency", "0 for a given frequency."
     ),
-    "slip_range": Variable(
-        _PAIRS, "m", "range of the slip over a period", comment="Largest distance between two places of the slip."
-    ),
+    "slip_range": Variable(_PAIRS, "m", "range of the slip over a period", "Largest distance of two places."),
     "open_fraction": Variable(_PAIRS, "1", "fraction of the period in which the pair is open"),
     "residual": Variable(_CYCLE, "1", "scaled residual of the harmonic balance"),
     "penetration": Variable(_CYCLE, "1", "largest penetration over the largest relative motion"),
     "tension": Variable(_CYCLE, "1", "largest tension over the largest normal force"),
-    "cone_violation": Variable(
-        _CYCLE, "1", "largest tangential force above its friction limit, over the largest friction limit"
-    ),
-    "energy_error": Variable(
-        _CYCLE, "1", "imbalance of energy in a period over the work of the excitation, or of the contact if less"
-    ),
+    "cone_violation": Variable(_CYCLE, "1", "largest tangential force above its limit, over the largest limit"),
+    "energy_error": Variable(_CYCLE, "1", "imbalance of energy in a period over the work of the excitation"),
     "response_error": Variable(
         _CYCLE,
         "1",
         "estimated relative error of the response",
-        comment="1.5 times the largest difference to the reference solution in the second half of the way to the count,"
+        "1.5 times the largest difference to the reference solution in the second half of the way to the count,"
         " at least the error of harmonics and samples.",
     ),
-    "wear_rate_error": Variable(
-        _CYCLE, "1", "estimated relative error of the wear rate", comment="Estimated as response_error."
-    ),
+    "wear_rate_error": Variable(_CYCLE, "1", "estimated relative error of the wear rate", "As response_error."),
     "worn_volume_error": Variable(
         _CYCLE,
         "1",
         "estimated relative error of the worn volume",
-        comment="By steps, harmonics, samples and start state; 0 where nothing has worn.",
+        "0 where nothing has worn.",
     ),
     "wear_depth_error": Variable(
-        _PAIRS, "m", "estimated error of the wear depth", comment="Relatively larger than that of the worn volume."
+        _PAIRS, "m", "estimated error of the wear depth", "Relatively larger than for the volume."
     ),
-    "harmonics_used": Variable(_CYCLE, "1", "harmonics above the static one in the state", "int32"),
-    "samples_used": Variable(_CYCLE, "1", "time samples in a period of the state", "int32"),
+    "harmonics_used": Variable(_CYCLE, "1", "harmonics above the static one in the state", dtype="int32"),
+    "samples_used": Variable(_CYCLE, "1", "time samples in a period of the state", dtype="int32"),
 }
 """Those that `outputs.variables` asks for, in the order of the file."""
 
@@ -132,7 +113,7 @@ LOOPS = {
         ("cycle", "contact", "phase", "component"),
         units,
         f"{meaning} through a period, positive {sign}",
-        comment="In the frame of the pair; NaN, without room on the disk, for pairs that outputs.loops does not name.",
+        "In the frame of the pair; NaN, without room on the disk, for pairs that outputs.loops does not name.",
     )
     for name, units, meaning, sign in (
         ("loop_displacement", "m", "relative displacement", "where it closes"),
@@ -141,11 +122,7 @@ LOOPS = {
 }
 """Those of the pairs that `outputs.loops` asks for; of the other pairs they are NaN and take no room."""
 
-COUNTS = {
-    "cycle_count": Variable(
-        _CYCLE, "1", "number of vibration cycles of the output", comment="inf: a final state found without slow time."
-    )
-}
+COUNTS = {"cycle_count": Variable(_CYCLE, "1", "number of vibration cycles of the output", "inf: the final state.")}
 """That of a study to the end, slow_time.cycles = inf, whose coordinate cycle is the number of the output."""
 
 LOOP_PHASES = 128
@@ -170,62 +147,46 @@ KEPT = {
         (),
         "1",
         "how the computation of the point ended",
-        "int8",
-        comment="The attribute sentences holds a line for each of the flags.",
+        "See the attribute sentences.",
+        dtype="int8",
     ),
-    "jump_cycle": Variable(
-        (), "1", "first cycle count at which the solution branch was lost", comment="NaN if it never was."
-    ),
-    "cycles_to_target": Variable((), "1", "cycle count at which slow_time.until was reached", comment=_NO_TARGET),
+    "jump_cycle": Variable((), "1", "first cycle count at which the solution branch was lost", "NaN if it never was."),
+    "cycles_to_target": Variable((), "1", "cycle count at which slow_time.until was reached", _NO_TARGET),
     "cycles_to_target_error": Variable((), "1", "estimated error of cycles_to_target, cycles"),
-    "newton_iterations": Variable((), "1", "Newton iterations of the point", "int32", comment=_ITS_HISTORY),
-    "run_time": Variable(
-        (), "s", "CPU time of the computing thread", comment=f"{_ITS_HISTORY} Differs from run to run."
-    ),
-    "error_estimate": Variable(
-        (), "1", "estimated relative error of the last worn volume", comment="NaN where it was not estimated."
-    ),
+    "newton_iterations": Variable((), "1", "Newton iterations of the point", _ITS_HISTORY, dtype="int32"),
+    "run_time": Variable((), "s", "CPU time of the computing thread", f"{_ITS_HISTORY} Differs from run to run."),
+    "error_estimate": Variable((), "1", "estimated relative error of the last worn volume", "NaN: not estimated."),
     "last_cycle": Variable(
         (),
         "1",
         "cycle count up to which the point was computed",
-        comment="Later values are NaN, or 0 in whole numbers. NaN where there is no state at all. A point ends, as"
+        "Later values are NaN, or 0 in whole numbers. NaN where there is no state at all. A point ends, as"
         " converged, with the step that reaches slow_time.until.",
     ),
     "largest_wear_depth": Variable((), "m", "largest wear depth of any pair at any count"),
-    "branch": Variable((), "1", "number of folds that the sweep has jumped over since it began", "int32"),
-    "fold_frequency": Variable(
-        (), "Hz", "fold at which the sweep left its solution branch before this frequency", comment="NaN where none."
-    ),
-    "step_limit": Variable(
-        (), "1", "predicted largest stable step of the explicit scheme at cycle 0, cycles", comment="inf where none."
-    ),
-    "message": Variable((), "1", "further facts on how the point ended", "U240"),
+    "branch": Variable((), "1", "number of folds that the sweep has jumped over since it began", dtype="int32"),
+    "fold_frequency": Variable((), "Hz", "last fold at which the sweep left its solution branch", "NaN where none."),
+    "step_limit": Variable((), "1", "largest stable explicit step at cycle 0, predicted, cycles", "inf where none."),
+    "message": Variable((), "1", "further facts on how the point ended", dtype="U240"),
 }
 """Those that every result holds."""
 
 OF_MODES = {
     "natural_frequency": Variable((), "Hz", "natural frequency of the nonlinear mode"),
-    "natural_frequency_error": Variable(
-        (), "Hz", "estimated error of the natural frequency", comment="Absolute; inf where it is unknown."
-    ),
-    "damping_ratio": Variable(
-        (), "1", "damping ratio of the nonlinear mode", comment="Of friction and structure together, decay positive."
-    ),
-    "damping_ratio_error": Variable(
-        (), "1", "estimated error of the damping ratio", comment="Absolute; inf where it is unknown."
-    ),
+    "natural_frequency_error": Variable((), "Hz", "estimated error of the natural frequency", "inf: unknown."),
+    "damping_ratio": Variable((), "1", "damping ratio of the nonlinear mode", "Of friction and structure together."),
+    "damping_ratio_error": Variable((), "1", "estimated error of the damping ratio", "inf: unknown."),
     "response_amplitude": Variable(
         ("response",),
         "m",
         "amplitude of the first harmonic of the response in the mode",
-        comment="At the modal amplitude; over modal_amplitude: shape of the mode, normalised with the mass.",
+        "At the modal amplitude; over modal_amplitude: shape of the mode, normalised with the mass.",
     ),
     "response_phase": Variable(
         ("response",),
         "rad",
         "phase of the first harmonic of the response in the mode",
-        comment="To the vibration of the linear mode, of which the largest component has the phase 0.",
+        "To the vibration of the linear mode, of which the largest component has the phase 0.",
     ),
     "slip_fraction": Variable(("contact",), "1", "fraction of the period in which the pair slips"),
     "open_fraction": replace(ASKED["open_fraction"], dimensions=("contact",)),
@@ -262,18 +223,16 @@ def _of_block(name: str, when: str = "end") -> Variable:
 
 OF_MISSIONS = {
     "worn_volume": replace(_by_mission("worn_volume"), comment="Of all blocks, see block_worn_volume."),
-    "wear_rate": Variable(("mission",), "m3 per mission", "volume worn in a mission", comment=_OF_ONE),
+    "wear_rate": Variable(("mission",), "m3 per mission", "volume worn in a mission", _OF_ONE),
     "wear_depth": _by_mission("wear_depth"),
     "wear_depth_max": _by_mission("wear_depth_max"),
     "wear_depth_max_error": _by_mission("wear_depth_max_error"),
     "wear_depth_last": ASKED["wear_depth_last"],
-    "block_worn_volume": Variable(_BLOCKS, "m3", "worn volume by block", comment="The blocks add up to worn_volume."),
+    "block_worn_volume": Variable(_BLOCKS, "m3", "worn volume by block", "The blocks add up to worn_volume."),
     "block_worn_volume_error": Variable(
-        _BLOCKS, "1", "estimated relative error of the worn volume by block", comment="0 where a block wears nothing."
+        _BLOCKS, "1", "estimated relative error by block", "0 where a block wears nothing."
     ),
-    "block_share": Variable(
-        _BLOCKS, "1", "share of a block in the volume worn in a mission", comment=f"{_OF_ONE} NaN where nothing wears."
-    ),
+    "block_share": Variable(_BLOCKS, "1", "share of a block in the wear of a mission", f"{_OF_ONE} NaN: no wear."),
     "response_amplitude": _of_block("response_amplitude"),
     "response_phase": _of_block("response_phase"),
     "response_amplitude_begin": _of_block("response_amplitude", "beginning"),
@@ -287,7 +246,7 @@ OF_MISSIONS = {
         _BLOCK,
         "1",
         "sweep rate of a passage over (zeta f)^2, of the damping ratio zeta of the joint at rest",
-        comment="A passage far below 1 wears as its steady states do; 0 for steady vibration and where nothing wears.",
+        "A passage far below 1 wears as its steady states do; 0 for steady vibration and where nothing wears.",
     ),
     "worn_volume_error": _by_mission("worn_volume_error"),
     "wear_depth_error": _by_mission("wear_depth_error"),

@@ -1,4 +1,4 @@
-"""The worn joint of a result computed again: its response curve, loops and natural frequencies, without its history.
+"""The worn joint of a result computed again: its response curve and loops, without its history.
 
 The depths of the pairs in the result are those of a joint that is mounted worn, see `[scene] worn` of a study: a study
 of zero cycles gives its states.
@@ -49,21 +49,18 @@ def compute_worn_joint(
     *,
     loops: Sequence[int] = (),
     response: bool = False,
-    natural_frequencies: bool = False,
     point: Mapping[str, str] | None = None,
     progress: bool = True,
 ) -> dict[str, xr.Dataset]:
-    """What a result does not hold of one worn joint, from the wear depths that it holds.
-
-    path: result file with `wear_depth` or `wear_depth_last`, of wear histories. folder: for the result files of what is
-    computed; what is there already is not computed twice. point: values of axes, as text; by default the point that
-    wears most. The entries that are asked for:
+    """What a result does not hold of one worn joint, from the wear depths that it holds; what is asked for of:
 
     - "loops" of contact pairs: `loop_displacement`, m, and `loop_force`, N, (cycle, contact, phase, component), at the
       first count where the file holds its depths and at the last count;
     - "response": `response_amplitude`, m (cycle, frequency, response), and its relative error at the frequencies of the
-      study; with a followed frequency over its range, and of the new joint as well;
-    - "natural_frequencies": those of the sector with the joint stuck, Hz (nodal_diameter, mode).
+      study; with a followed frequency over its range, and of the new joint as well.
+
+    path: result file of wear histories. folder: for the result files of what is computed; what is there already is not
+    computed twice. point: values of axes, as text; by default the point that wears most.
 
     Raises UserError where the file does not hold the depths, or the study has no such pairs or frequencies.
     """
@@ -71,7 +68,7 @@ def compute_worn_joint(
     with result.dataset:
         if result.has_modes or result.blocks is not None:
             raise UserError(str(path), "kind of study", None, "give a result of wear histories")
-        shown, common = result.shown_point(), _overrides(result)
+        shown, common = result.shown, _overrides(result)
         last = result.last_reached(shown)
         title = f"worn by {result.cycle_label(last)} at {result.describe(shown, ('frequency', *result.varying))}"
         given, found = {**common, "scene.worn": _depths(result, shown, last)}, {}
@@ -95,23 +92,12 @@ def compute_worn_joint(
             asked["outputs.variables"] = ["response_amplitude", "response_error"]
             states = _run(result, asked, folder / "worn_joint_response.nc", progress)
             found["response"] = states[["response_amplitude", "response_error"]].transpose("cycle", "frequency", ...)
-        if natural_frequencies:
-            # nothing slips, and no state takes time
-            asked = {**common, "axes.excitation_amplitude": 1e-9, "outputs.variables": ["natural_frequency", "mesh"]}
-            try:
-                states = _run(result, asked, folder / "worn_joint_frequencies.nc", progress)
-            except UserError as error:
-                if error.key != "outputs.variables":
-                    raise
-                model, remedy = result.study["scene"]["model"], "ask for none: this scene has none over nodal diameters"
-                raise UserError(str(path), "natural frequencies of scene.model", model, remedy) from None
-            found["natural_frequencies"] = states[["natural_frequency"]].isel(cycle=0, drop=True)
     return {name: each.assign_attrs(title=title, how=_HOW) for name, each in found.items()}
 
 
 def _overrides(result: Result) -> dict[str, Any]:
     """Keys of a study of the shown point alone, new and without wear."""
-    shown, given = result.shown_point(), dict[str, Any]()
+    shown, given = result.shown, dict[str, Any]()
     for name in result.axes:
         value = result.dataset[name].values[shown[name]].item()
         if name == "sample":

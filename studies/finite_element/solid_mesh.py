@@ -114,8 +114,11 @@ def spin_softening(mass: sparse.csr_matrix, rotation: Rotation) -> sparse.csr_ma
 
 
 def centrifugal_load(mass: sparse.csr_matrix, coordinates: FloatArray, rotation: Rotation) -> FloatArray:
-    """Centrifugal load (3 n_nodes,), N: elements are isoparametric, so that int N rho x is mass times positions."""
-    arms = (coordinates - rotation.point) @ rotation.across
+    """Centrifugal load (3 n_nodes,), N: elements are isoparametric, so that int N rho x is mass times positions.
+
+    What has no place, NaN, has no arm: an amplitude within an element.
+    """
+    arms = np.nan_to_num(coordinates - rotation.point) @ rotation.across
     return np.asarray(rotation.omega_squared * (mass @ arms.ravel()))
 
 

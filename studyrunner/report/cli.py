@@ -16,8 +16,6 @@ from studyrunner.system.process import keep_talking, raise_ending, take_endings
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
-    from rich.status import Status
-
     from studyrunner.report.drawing import Item
     from studyrunner.result.view import Result
 
@@ -59,7 +57,6 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("--loops", metavar="PAIR,...", type=_read_pairs, default=(), help="compute fretting loops of these pairs")
     scar = "measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)"
     add("--measured", metavar="PROFILE.csv", type=Path, help=scar)
-    add("--natural-frequencies", help="compute those of the sector over the nodal diameter, joint stuck", **flag)
     add("--no-compute", help="draw what the file holds, without the response of a worn joint", **flag)
     add("--vtu", help="also the root over the cycles, for ParaView (extra meshio)", **flag)
     return parser.parse_args(list(arguments))
@@ -105,44 +102,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _report(options: argparse.Namespace) -> int:
     # Loaded late: help and mistakes on the command line do not wait for the libraries that draw.
     began = time.monotonic()
-    from rich.console import Console
-    from rich.markup import escape
+    from studyrunner.report.contents import draw_report
+    from studyrunner.report.page.page import write_page
+    from studyrunner.report.vtu import SERIES, find_writer
+    from studyrunner.result.opening import reading_errors
+    from studyrunner.result.pairs import read_profile
+    from studyrunner.result.view import open_for_report
+    from studyrunner.system.progress import count, format_seconds
 
-    def draw(items: Iterable[Item], status: Status) -> Iterator[Item]:
-        """The items; the terminal shows which of them is drawn."""
-        for item in items:
-            raise_ending()
-            status.update(f"drawing: {escape(item.title)}")
-            yield item
-        status.update("writing the page")
-
-    with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
-        from studyrunner.report.contents import draw_report
-        from studyrunner.report.page.page import write_page
-        from studyrunner.report.vtu import SERIES, find_writer
-        from studyrunner.result.opening import reading_errors
-        from studyrunner.result.pairs import read_profile
-        from studyrunner.result.view import open_for_report
-        from studyrunner.system.progress import count, format_seconds
-
-        measured = read_profile(options.measured) if options.measured else None
-        result = replace(open_for_report(options.result, options.point), measured=measured)
-        with result.dataset, reading_errors(str(options.result)):
-            write_series = find_writer(result) if options.vtu else None
-            folder = options.folder or Path(f"{options.result.stem}-report")
-            _make_folder(folder)
-            status.stop()
-            result = _compute(result, folder, options)
-            status.start()
-            page = folder / "index.html"
-            written = write_page(result, draw(draw_report(result), status), page)
-            n_files = write_series(folder) if write_series else 0
-    shown = f"{count(written.n_drawings, 'figure')}, {count(written.n_tables, 'table')}, {written.n_missing} left out"
-    seconds = format_seconds(time.monotonic() - began)
-    print(f"{page}: {shown}, {written.n_bytes / 1e6:.1f} MB, {seconds}; open it in a browser")
+    measured = read_profile(options.measured) if options.measured else None
+    result = replace(open_for_report(options.result, options.point), measured=measured)
+    with result.dataset, reading_errors(str(options.result)):
+        write_series = find_writer(result) if options.vtu else None
+        folder = options.folder or Path(f"{options.result.stem}-report")
+        _make_folder(folder)
+        result, page = _compute(result, folder, options), folder / "index.html"
+        shown = write_page(result, _until_ended(draw_report(result)), page)
+        n_files = write_series(folder) if write_series else 0
+    print(f"{page}: {shown}, {format_seconds(time.monotonic() - began)}; open it in a browser")
     if options.vtu:
         print(f"{folder / SERIES}: time series of {count(n_files, 'VTU file')}; open it in ParaView")
     return WRITTEN
+
+
+def _until_ended(items: Iterable[Item]) -> Iterator[Item]:
+    """The items, until the process is ended from outside."""
+    for item in items:
+        raise_ending()
+        yield item
 
 
 def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Result:
@@ -150,8 +137,7 @@ def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Resul
     from studyrunner.worn_joint import compute_worn_joint, has_worn_response
 
     given: dict[str, Any] = {"path": options.result, "folder": folder, "point": options.point}
-    asked = {"loops": options.loops, "natural_frequencies": options.natural_frequencies}
-    recomputed, why = compute_worn_joint(**given, **asked) if any(asked.values()) else {}, ""
+    recomputed, why = compute_worn_joint(**given, loops=options.loops) if options.loops else {}, ""
     if not options.no_compute and has_worn_response(result):
         print("study-report: computing the response of the worn joint (--no-compute leaves it out)", file=sys.stderr)
         try:

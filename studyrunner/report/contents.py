@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, cast
@@ -25,7 +25,7 @@ _QUANTILES = (
 )
 CAPTIONS = {
     "blocks": "Cycles of one mission. A passage whose rate is far below (zeta f)² wears as its steady states do",
-    "block_shares": f"Above, shares of the blocks in the volume worn in one mission; below, worn volumes. {_BANDS}",
+    "block_shares": f"Above, shares of the blocks in the volume worn in one mission. {_BANDS}",
     "block_responses": f"Amplitude of the first harmonic in the mission that ends at the number. {_BANDS}",
     "natural_frequency": _BARS,
     "damping_ratio": _BARS,
@@ -86,7 +86,7 @@ class Entry:
         if isinstance(drawn, str):
             return Missing(self.name, title, drawn)
         named = {"point": ("frequency", "scheme", *shown.varying, *shown.fixed), "course": (axis or "frequency",)}
-        where = shown.describe(shown.shown_point(), named.get(self.at, ()))
+        where = shown.describe(shown.shown, named.get(self.at, ()))
         title = f"{title}: {where}" if where else title
         if isinstance(drawn, Table):
             return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, how))
@@ -105,15 +105,13 @@ class Entry:
 
 _ONE: dict[str, Any] = {"scene": OF_PAIRS, "at": "point"}
 _BLOCK: dict[str, Any] = {"kinds": (MISSIONS,), "at": "point"}
-_SHARES: dict[str, Any] = {**_BLOCK, "needs": ("block_worn_volume", "block_share")}
-_OF_BLOCKS: dict[str, Any] = {**_BLOCK, "needs": ("response_amplitude",)}
 _MODE: dict[str, Any] = {"kinds": (MODES,)}
 _WEAR: dict[str, Any] = {"kinds": (WEAR,)}
 _OF_ONE = {**_WEAR, **_ONE}
 _WORN: dict[str, Any] = {"needs": ("worn_volume",)}
 _RESPONSE: dict[str, Any] = {**_WEAR, "needs": ("response_amplitude",)}
 _ALL: dict[str, Any] = {"kinds": (WEAR, MISSIONS, MODES)}
-_SECTOR: dict[str, Any] = {"scene": root.OF_SECTOR, "always": True}
+_SECTOR: dict[str, Any] = {"scene": root.OF_SECTOR, "always": True, "needs": ("natural_frequency",)}
 
 
 def _of(draw: Callable[..., Drawn], name: str, title: str, **options: Any) -> Entry:
@@ -122,14 +120,20 @@ def _of(draw: Callable[..., Drawn], name: str, title: str, **options: Any) -> En
     return Entry(name, title, partial(draw, name=options["needs"][-1]), **options)
 
 
+def _of_blocks(name: str, title: str, names: Mapping[str, str]) -> Entry:
+    return Entry(name, title, partial(wear.draw_blocks, names=names), needs=tuple(names), **_BLOCK)
+
+
 FIGURES = (
-    Entry("blocks", "Blocks of the mission with their wear (table)", wear.list_blocks, **_BLOCK),
-    Entry("block_shares", "Wear by block over the missions", wear.draw_shares, **_SHARES),
-    Entry("block_responses", "Vibration of each block over the missions", wear.draw_block_responses, **_OF_BLOCKS),
+    Entry("blocks", "Blocks of the mission with their wear (table)", wear.list_blocks, needs=wear.LISTED, **_BLOCK),
+    _of_blocks("block_shares", "Wear by block over the missions", wear.SHARES),
+    _of_blocks("block_responses", "Vibration of each block over the missions", wear.RESPONSES),
     _of(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude", **_MODE),
     _of(response.draw_mode, "damping_ratio", "Damping ratio of a mode over its amplitude", **_MODE),
-    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", points.draw_bands),
-    Entry("worn_volume_bands_course", "Worn volume of the samples over {over}", points.draw_bands_over_course),
+    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", partial(points.draw_bands, over="cycle")),
+    Entry(
+        "worn_volume_bands_course", "Worn volume of the samples over {over}", partial(points.draw_bands, over="course")
+    ),
     Entry("exceedance", "Probability of more wear", points.draw_exceedance),
     Entry("deciding_inputs", "What decides the worn volume", points.draw_deciding_inputs),
     Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, **_WORN, at="course"),
@@ -152,9 +156,14 @@ FIGURES = (
     Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, **_ONE),
     Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, **_ONE),
     Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, **_OF_ONE, needs=("mean_pressure",)),
-    Entry("fretting_loops", "Fretting loops", response.draw_fretting, **_OF_ONE),
-    Entry("normal_load", "Normal force through a period", response.draw_normal, **_OF_ONE),
-    Entry("pair_motion", "Motion of the pairs in the contact plane", response.draw_motion, **_OF_ONE),
+    Entry("fretting_loops", "Fretting loops", partial(response.draw_loops, name="fretting_loops"), **_OF_ONE),
+    Entry("normal_load", "Normal force through a period", partial(response.draw_loops, name="normal_load"), **_OF_ONE),
+    Entry(
+        "pair_motion",
+        "Motion of the pairs in the contact plane",
+        partial(response.draw_loops, name="pair_motion"),
+        **_OF_ONE,
+    ),
     _of(root.draw_fraction, "slip_fraction", "Where the joint slips", **_MODE, **_ONE),
     _of(root.draw_fraction, "open_fraction", "Where the joint opens", **_MODE, **_ONE),
     Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS, **_ALL),

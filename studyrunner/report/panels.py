@@ -22,9 +22,6 @@ from studyrunner.units import show_power
 
 FloatArray = NDArray[np.float64]
 
-MAP = "cividis"
-"""Colour map of values from low to high: its lightness grows evenly, and it looks the same to the colour blind."""
-
 ERROR = "fretwear_error"
 """Attribute of a line: the error of its values."""
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -31,10 +32,8 @@ Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 _DEEPEST = 0.04  # worn depth as it is drawn, over the size of the contact surfaces
-_CORNERS = 4
+_CORNERS, _MOST_CLOSE_UPS = 4, 7
 _SAME = 1e-6  # distance of a node and its pair, over the size of the mesh
-
-MOST_VIEWS = 8
 
 _AROUND = 0.16  # of a close-up: how much is seen around the contact surfaces, over their size
 _BEFORE = 0.06  # what stands before a contact surface is cut off from here on, over the same size
@@ -46,59 +45,47 @@ _INSIDE, _EDGEWAYS = 0.42, 1e-9
 
 
 @dataclass(frozen=True)
-class ContactFaces:
-    """Faces in contact and the pairs at their nodes.
-
-    flank (n_faces,): number of the contact surface that a face belongs to, -1 for those not in contact. nodes
-    (n_own,): of the faces in contact, ascending. pairs (n_own,): contact pair at each of these nodes. normals
-    (n_own, 3): unit vectors out of the body.
-    """
-
-    flank: Places
-    nodes: Places
-    pairs: Places
-    normals: Floats
-
-
-@dataclass(frozen=True)
 class RootSurface:
     """Outer faces of the bodies of a joint, and what its contact pairs are on them.
 
     nodes (n_nodes, 3): m. faces (n_faces, 4): nodes anticlockwise from outside; triangles repeat their last one.
-    body (n_faces,): index into `bodies`, whose faces hang together by their nodes. contact: the faces in contact.
-    flanks: labels of the contact surfaces.
+    body (n_faces,): index into `bodies`, whose faces hang together by their nodes. flank (n_faces,): index into
+    `flanks`, the labels of the contact surfaces, -1 for faces not in contact. own (n_own,): nodes of the faces in
+    contact, ascending; pairs (n_own,): the contact pair at each, normals (n_own, 3): unit vectors out of the body.
     """
 
     nodes: Floats
     faces: Places
     body: Places
     bodies: tuple[str, ...]
-    contact: ContactFaces
+    flank: Places
     flanks: tuple[str, ...]
+    own: Places
+    pairs: Places
+    normals: Floats
 
     def worn(self, depth: Floats, factor: float) -> Floats:
         """Nodes (n_nodes, 3), m, with the wear depth (n_contact,), m, times a factor taken off both surfaces."""
         worn = self.nodes.copy()
-        worn[self.contact.nodes] -= factor * np.nan_to_num(depth[self.contact.pairs])[:, None] * self.contact.normals
+        worn[self.own] -= factor * np.nan_to_num(depth[self.pairs])[:, None] * self.normals
         return worn
 
     def near_contact(self, most_faces: int) -> RootSurface:
         """The surface with at most so many faces: those in contact, and those nearest to them."""
         if len(self.faces) <= most_faces:
             return self
-        distance, _ = cKDTree(self.nodes[self.contact.nodes]).query(self.nodes[self.faces].mean(axis=1))
-        of_contact = self.contact.flank >= 0
-        order = np.argsort(np.where(of_contact, -1.0, distance), kind="stable")
-        kept = np.sort(order[: max(most_faces, int(of_contact.sum()))])
+        distance, _ = cKDTree(self.nodes[self.own]).query(self.nodes[self.faces].mean(axis=1))
+        order = np.argsort(np.where(self.flank >= 0, -1.0, distance), kind="stable")
+        kept = np.sort(order[: max(most_faces, int((self.flank >= 0).sum()))])
         used, places = np.unique(self.faces[kept], return_inverse=True)
-        nodes, faces = np.searchsorted(used, self.contact.nodes), places.reshape(-1, _CORNERS)
-        contact = replace(self.contact, flank=self.contact.flank[kept], nodes=nodes)
-        return replace(self, nodes=self.nodes[used], faces=faces, body=self.body[kept], contact=contact)
+        faces, own = places.reshape(-1, _CORNERS), np.searchsorted(used, self.own)
+        of_faces: dict[str, Any] = {"faces": faces, "body": self.body[kept], "flank": self.flank[kept]}
+        return replace(self, nodes=self.nodes[used], own=own, **of_faces)
 
     @property
     def well_seen(self) -> float:
         """Depth, m, that is well seen beside the size of the contact surfaces."""
-        return _DEEPEST * float(np.linalg.norm(np.ptp(self.nodes[self.contact.nodes], axis=0)))
+        return _DEEPEST * float(np.linalg.norm(np.ptp(self.nodes[self.own], axis=0)))
 
     def exaggeration(self, deepest: float) -> float:
         """Factor 1, 2 or 5 times a power of ten with which a depth, m, is well seen; 1 where nothing is worn."""
@@ -111,7 +98,7 @@ class RootSurface:
 
 def read_root(result: Result) -> RootSurface | None:
     """The faces of a file; None where it has no mesh, no positions of pairs, or no pairs on its mesh."""
-    pairs = contact_pairs(result, result.shown_point())
+    pairs = contact_pairs(result, result.shown)
     if not np.isfinite(pairs.position).all() or not result.has(*MESH):
         return None
     nodes, faces, parts = read_mesh(result)
@@ -125,8 +112,9 @@ def read_root(result: Result) -> RootSurface | None:
     _, component = connected_components(joined, directed=False)
     _, first, body = np.unique(component[faces[:, 0]], return_index=True, return_inverse=True)
     body = np.argsort(np.argsort(first))[body].astype(np.int64)
-    contact = find_contact_faces(nodes, faces, pairs.position, flank)
-    return RootSurface(nodes, faces, body, _name_bodies(body, parts), contact, flanks) if len(contact.nodes) else None
+    found, own, at, normals = _find_contact_faces(nodes, faces, pairs.position, flank)
+    names = _name_bodies(body, parts)
+    return RootSurface(nodes, faces, body, names, found, flanks, own, at, normals) if own.size else None
 
 
 def read_mesh(result: Result) -> tuple[Floats, Places, NDArray[np.str_]]:
@@ -153,20 +141,19 @@ def face_normals(nodes: Floats, faces: Places) -> Floats:
     return np.asarray(0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
 
 
-def find_contact_faces(nodes: Floats, faces: Places, positions: Floats, flank: Places) -> ContactFaces:
-    """Faces in contact of a mesh: nodes (n_nodes, 3), m, faces (n_faces, 4).
-
-    positions (n_contact, 3) of the pairs, m. flank (n_contact,): number of the contact surface of each pair.
-    """
+def _find_contact_faces(
+    nodes: Floats, faces: Places, positions: Floats, flank: Places
+) -> tuple[Places, Places, Places, Floats]:
+    """`flank`, `own`, `pairs` and `normals` of a surface. flank (n_contact,): contact surface of each pair."""
     distance, nearest = cKDTree(positions).query(nodes)
     stands = distance <= _SAME * np.linalg.norm(np.ptp(nodes, axis=0))
     found = np.where(stands[faces].all(axis=1), flank[nearest[faces[:, 0]]], -1)
     found[(flank[nearest[faces]] != found[:, None]).any(axis=1)] = -1
-    own, normals = faces[found >= 0], np.zeros_like(nodes)
-    np.add.at(normals, own, face_normals(nodes, own)[:, None, :])
-    used = np.unique(own)
-    normals = normals[used] / np.maximum(np.linalg.norm(normals[used], axis=1, keepdims=True), 1e-300)
-    return ContactFaces(found, used, nearest[used], normals)
+    touching, normals = faces[found >= 0], np.zeros_like(nodes)
+    np.add.at(normals, touching, face_normals(nodes, touching)[:, None, :])
+    own = np.unique(touching)
+    normals = normals[own] / np.maximum(np.linalg.norm(normals[own], axis=1, keepdims=True), 1e-300)
+    return found, own, nearest[own], normals
 
 
 # --- from where it is looked at ---
@@ -200,19 +187,16 @@ class View:
 
 
 def find_views(surface: RootSurface) -> tuple[View, ...]:
-    """Close-ups of each contact surface of each body, the outermost body first, then the whole."""
-    up, contact = _upwards(surface.nodes), surface.contact.flank >= 0
-    # by where they are along the direction upwards
+    """Close-ups of the contact surfaces of the outermost body, then the whole."""
+    up, contact = _upwards(surface.nodes), surface.flank >= 0
+    # outermost by where it is along the direction upwards
     height = {
         body: float((surface.nodes[np.unique(surface.faces[surface.body == body])] @ up).mean())
         for body in np.unique(surface.body[contact]).tolist()
     }
-    closer = [
-        _close_up(surface, body, flank, up)
-        for body in sorted(height, key=lambda body: -height[body])
-        for flank in np.unique(surface.contact.flank[(surface.body == body) & contact]).tolist()
-    ]
-    return (*closer[: MOST_VIEWS - 1], from_aslant(surface.nodes, len(surface.faces)))
+    outer = max(height, key=lambda body: height[body])
+    flanks = np.unique(surface.flank[(surface.body == outer) & contact]).tolist()[:_MOST_CLOSE_UPS]
+    return (*(_close_up(surface, outer, flank, up) for flank in flanks), from_aslant(surface.nodes, len(surface.faces)))
 
 
 def from_aslant(nodes: Floats, n_faces: int) -> View:
@@ -226,8 +210,8 @@ def from_aslant(nodes: Floats, n_faces: int) -> View:
 def _close_up(surface: RootSurface, body: int, flank: int, up: Floats) -> View:
     """The faces of a body around its contact surfaces, without those that stand before the one looked at."""
     own = surface.body == body
-    inside = surface.nodes[np.unique(surface.faces[own & (surface.contact.flank >= 0)])]
-    looked_at = own & (surface.contact.flank == flank)
+    inside = surface.nodes[np.unique(surface.faces[own & (surface.flank >= 0)])]
+    looked_at = own & (surface.flank == flank)
     normal = face_normals(surface.nodes, surface.faces[looked_at]).sum(axis=0)
     normal /= max(float(np.linalg.norm(normal)), 1e-300)
     size = float(np.linalg.norm(np.ptp(inside, axis=0)))
@@ -292,14 +276,13 @@ def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view
 
 def draw_scale_bar(panel: Axes, nodes: Floats, view: View) -> None:
     """A bar of a round length under what is seen, in place of axes."""
-    seen = view.seen(nodes)
-    low, high = seen.min(axis=0), seen.max(axis=0)
+    low, high = (end(view.seen(nodes), axis=0) for end in (np.min, np.max))
     size = float((high - low).max())
     if not size > 0.0:
         return
-    length = 10.0 ** np.floor(np.log10(0.4 * size))
-    length *= max(factor for factor in (1.0, 2.0, 5.0) if factor * length <= 0.4 * size or factor == 1.0)
-    bottom = low[1] - 0.05 * size
-    panel.fill_between([low[0], low[0] + length], bottom - 0.006 * size, bottom + 0.006 * size, color="0.1", lw=0.0)
-    panel.text(low[0] + 0.5 * length, bottom - 0.02 * size, f"{length:g} mm", ha="center", va="top")
+    power = 10.0 ** np.floor(np.log10(0.4 * size))
+    length = power * max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= 0.4 * size or factor == 1.0)
+    bottom, middle = low[1] - 0.05 * size, low[0] + 0.5 * length
+    panel.plot([low[0], low[0] + length], [bottom, bottom], color="0.1", linewidth=2.5, label="_")
+    panel.text(middle, bottom - 0.02 * size, f"{length:g} mm", ha="center", va="top")
     panel.set_ylim(bottom - 0.1 * size, high[1] + 0.02 * size)

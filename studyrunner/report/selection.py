@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from studyrunner.report.panels import FloatArray, line_style, set_log
 from studyrunner.result.view import Result
 from studyrunner.statistics.samples import SAMPLE
-from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, units_of
 
 _DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
@@ -23,24 +22,24 @@ _MANY = 60  # points from which markers are small
 
 @dataclass(frozen=True)
 class Choice:
-    """Points that a figure shows, with labels, and a sentence on combinations that are left out, or nothing."""
+    """Points that a figure shows, with labels, and a sentence where there are others. It iterates over both."""
 
     points: tuple[dict[str, int], ...]
     labels: tuple[str, ...]
     sentence: str
 
     def __iter__(self) -> Iterator[tuple[dict[str, int], str]]:
-        """Points with their labels."""
         return iter(zip(self.points, self.labels, strict=True))
 
 
 def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:
-    """At most `limit` combinations of the axes that are not `free`; that of the shown point is among them.
+    """At most `limit` combinations of the axes that are not `free`, along which each is the shown point.
 
-    The axes `first` are split first, then the others, each whole or not at all; the rest stays at the shown point.
+    The combination of the shown point is among them. The axes `first` are split first, then the others, each whole or
+    not at all; the rest stays at the shown point.
     """
     order = [name for name in dict.fromkeys((*first, *result.axes)) if name in result.varying and name not in free]
-    shown = {name: index for name, index in result.shown_point().items() if name not in free}
+    shown = result.shown
     sizes, split, number = result.dataset.sizes, list[str](), 1
     for name in order:
         if number * sizes[name] <= limit:
@@ -49,19 +48,9 @@ def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, 
     split.sort(key=result.axes.index)
     places = itertools.product(*(range(sizes[name]) for name in split))
     points = tuple({**shown, **dict(zip(split, place, strict=True))} for place in places)
-    labels = tuple(result.describe(point, split) for point in points)
-    left = {name: sizes[name] for name in order if name not in split}
-    left |= {name: size for name, size in result.fixed.items() if name not in free}
-    fixed = [name for name in result.axes if name in left]
-    if not fixed:
-        return Choice(points, labels, "")
-    others = " and ".join(
-        count(left[name] - 1, "other sample")
-        if name == SAMPLE
-        else f"{count(left[name] - 1, 'other value')} of {name.replace('_', ' ')}"
-        for name in fixed
-    )
-    return Choice(points, labels, f"Shown for {result.describe(shown, fixed)}; the file also holds {others}.")
+    fixed = [name for name in result.axes if name in {*order, *result.fixed} - {*split, *free}]
+    sentence = f"Shown for {result.describe(shown, fixed)} alone" if fixed else ""
+    return Choice(points, tuple(result.describe(point, split) for point in points), sentence)
 
 
 @dataclass(frozen=True)

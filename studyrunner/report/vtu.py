@@ -50,7 +50,7 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> int:
     """
     import meshio
 
-    shown = result.shown_point()
+    shown = result.shown
     fields = {"wear_depth": depths(result, shown)} if has_depths(result) else {}
     fields |= {name: result.at(name, shown).values for name in FIELDS if name not in fields and result.has(name)}
     units = {name: str(result.dataset[name].attrs.get("units", "1")) for name in fields if result.has(name)}
@@ -60,7 +60,7 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> int:
     cells = [
         ("triangle", surface.faces[rows, :3]) if triangle[rows[0]] else ("quad", surface.faces[rows]) for rows in chosen
     ]
-    of_cells = {"body": surface.body, "contact_surface": surface.contact.flank}
+    of_cells = {"body": surface.body, "contact_surface": surface.flank}
     at_cells = {key: [values[rows] for rows in chosen] for key, values in of_cells.items()}
     (folder / "vtu").mkdir(exist_ok=True)
     for old in (folder / "vtu").glob("root_*.vtu"):
@@ -79,7 +79,7 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> int:
             unit = units.get(field, "m")
             field = field if unit == "1" else f"{field} ({unit})"
             at_points[field] = np.full(len(surface.nodes), np.nan)
-            at_points[field][surface.contact.nodes] = values[number][surface.contact.pairs]
+            at_points[field][surface.own] = values[number][surface.pairs]
         if "wear_depth" in fields:
             at_points["worn_displacement (m)"] = surface.worn(fields["wear_depth"][number], 1.0) - surface.nodes
         name = f"vtu/root_{place:04d}.vtu"

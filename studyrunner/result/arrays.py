@@ -120,51 +120,39 @@ def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Smal
 
 
 def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
-    """The drawn values of each input, in its unit, along the samples.
+    """The drawn values of each input, in its unit, along the samples, and along axes and pairs where they differ.
 
-    Along an axis as well where they are drawn around its values; along the pairs where pairs differ.
+    NaN where a scene does not have a pair.
     """
     if study.scatter is None:
         return
-    variants = study.variants or (study,)
-    shape = [len(axis.values) for axis in study.scene_axes]
-    drawn = [draw_inputs(variant) for variant in variants]
+    of_scenes = {axis.name: len(axis.values) for axis in study.scene_axes}
+    drawn = [draw_inputs(variant) for variant in study.variants or (study,)]
     for name, first in drawn[0].items():
-        dimensions: tuple[str, ...] = ("sample",)
-        values = first
-        if first.ndim == 2:
-            # around each value of an axis
-            dimensions, values = (("sample",), first[0]) if len(first) == 1 else ((name, "sample"), first)
-        elif any(axis.name == name for axis in study.scene_axes):
-            place = [axis.name for axis in study.scene_axes].index(name)
-            every = np.array([each[name] for each in drawn]).reshape(*shape, -1)
-            along = tuple(slice(None) if each == place else 0 for each in range(len(shape)))
-            dimensions, values = (name, "sample"), every[along]
-        yield _sample_coordinate(study, name, dimensions, values)
+        # those drawn around each value of an axis have that axis
+        names = (*of_scenes, *((name,) if first.ndim == 2 else ()), "sample")
+        values = np.array([each[name] for each in drawn]).reshape(*of_scenes.values(), *first.shape)
+        yield _sample_coordinate(study, name, names, values)
     if scatters_pairs(study):
-        yield from _of_pairs(study, facts, scenes)
+        of_parts = [of_part for _, _, of_part in drawn_pairs(study, scenes, facts)]
+        n_contact = max(len(each.area) for each in facts)
+        for name in of_parts[0]:
+            values = np.full((len(of_parts), n_contact), np.nan)
+            for row, of_part in zip(values, of_parts, strict=True):
+                row[: len(of_part[name])] = of_part[name]
+            values = values.reshape(*(len(each) for each in study.axes_of_parts.values()), n_contact)
+            yield _sample_coordinate(study, name, (*study.axes_of_parts, "contact"), values)
 
 
-def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
-    """Values of the pairs along the axes on which they depend; NaN where a scene does not have a pair."""
-    drawn = [of_part for _, _, of_part in drawn_pairs(study, scenes, facts)]
-    n_contact = max(len(each.area) for each in facts)
-    for name in drawn[0]:
-        values = np.full((len(drawn), n_contact), np.nan)
-        for row, of_part in zip(values, drawn, strict=True):
-            row[: len(of_part[name])] = of_part[name]
-        values = values.reshape(*(len(each) for each in study.axes_of_parts.values()), n_contact)
-        dimensions = ["contact"]
-        for place, axis in reversed(list(enumerate(study.axes_of_parts))):
-            first = values.take([0], axis=place)
-            if axis != "sample" and np.array_equal(np.broadcast_to(first, values.shape), values, equal_nan=True):
-                values = values.take(0, axis=place)
-            else:
-                dimensions.insert(0, axis)
-        yield _sample_coordinate(study, name, tuple(dimensions), values)
-
-
-def _sample_coordinate(study: Study, name: str, dimensions: tuple[str, ...], values: NDArray[np.float64]) -> SmallArray:
+def _sample_coordinate(study: Study, name: str, names: Sequence[str], values: NDArray[np.float64]) -> SmallArray:
+    """The values along those of their axes along which they differ, along samples and pairs in any case."""
+    dimensions: tuple[str, ...] = ()
+    for place, axis in reversed(list(enumerate(names))):
+        same = np.broadcast_to(values.take([0], axis=place), values.shape)
+        if axis not in ("sample", "contact") and np.array_equal(same, values, equal_nan=True):
+            values = np.asarray(values.take(0, axis=place))
+        else:
+            dimensions = (axis, *dimensions)
     if name in COORDINATES:
         units, meaning = COORDINATES[name].units, COORDINATES[name].long_name
     elif name in _OF_CONTACT:

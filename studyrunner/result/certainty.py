@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.advice import Used, advise, advise_error
 from studyrunner.result.view import WELL_ENOUGH, Point, Result
 from studyrunner.system.progress import count
 from studyrunner.units import show_cycles, show_percent, show_rtol
 
 _MOST_NAMED = 10
 _LEAST = 1e-4  # relative error that is shown, of any smaller one
-_AUTO = "auto"
-_OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
+_SWEEPS = ("up", "down", "ramp")
+_OWN_STEPS = ("adaptive", "final")
+
+_FAR = 10.0
+"""Errors of more than so many times `rtol` do not fall in proportion to it."""
 
 
 @dataclass(frozen=True)
@@ -88,101 +91,132 @@ def _certainty(result: Result, of: str, errors: NDArray[np.float64]) -> Certaint
     known = result.computed & np.isfinite(errors)
     # each is compared with its own rtol: one that is above it is worse than any that is not
     above = result.computed & (errors > result.rtol)
-    within = known & ~above
     several = np.unique(result.rtol[np.isfinite(result.rtol)])
     n_unknown = int(np.count_nonzero(result.computed & np.isnan(errors)))
     worst, where, advice = math.nan, "", ""
     if above.any() or known.any():
         point = result.largest(np.where(above if above.any() else known, errors, -1.0))
-        place = tuple(point.values())
+        place = result.place(point)
         worst, where = float(errors[place]), result.describe(point) if result.varying else ""
         if above.any():
-            found = "set a smaller solver.rtol"
-            if of == "worn volume":
-                rates = result.at("wear_rate_error", point).values.tolist() if result.has("wear_rate_error") else ()
-                found = advise_error(worst, rates, settings_of(result, place))
+            found = _advise_error(result, place, worst) if of == "worn volume" else "set a smaller solver.rtol"
             advice = f"for {show_rtol(float(result.rtol[place]))} {found}"
-    n_known, n_less = (int(np.count_nonzero(each)) for each in (within, above))
+    n_known, n_less = (int(np.count_nonzero(each)) for each in (known & ~above, above))
     rtol = float(several[0]) if several.size == 1 else math.nan
     return Certainty(of, errors.size, n_known, n_less, n_unknown, rtol, worst, where, advice)
 
 
 def show_error(result: Result, point: Point) -> str:
     """Error of the worn volume of a point as text: "2.6 %"."""
-    place = tuple(point[name] for name in result.axes)
+    place = result.place(point)
     return show_percent(float(result.errors[place]), float(result.rtol[place]))
 
 
-def describe_ends(result: Result) -> str:
-    """Numbers of points that were computed to the end, ended early, or have no state."""
-    n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
-    n_early = int(np.count_nonzero(result.has_values & ~result.computed))
-    text = f"{count(n_points, 'point')}, {n_computed} computed to the end"
-    text += f", {n_early} ended early with values up to there" if n_early else ""
-    n_without = n_points - n_computed - n_early
-    return f"{text}, {n_without} without a result." if n_without else f"{text}."
+# --- points that ended otherwise ---
 
 
-def list_ended(result: Result, number: int) -> dict[str, list[dict[str, int]]]:
-    """Points that ended in this way, by what is to be said of each beside the outcome; the text may be empty."""
-    messages = result.dataset["message"].values if result.has("message") else None
-    found: dict[str, list[dict[str, int]]] = {}
+def ended_points(result: Result, number: int) -> Iterator[tuple[dict[str, int], str]]:
+    """Points that ended in this way, each with what is to be said beside the outcome, which may be nothing."""
     for index in np.argwhere(result.dataset["outcome"].values == number):
         place, point = tuple(index.tolist()), result.point_at(index)
-        said = "" if messages is None else str(messages[place])
+        said = str(result.dataset["message"].values[place]) if result.has("message") else ""
         if result.has_values[place] and result.counted[:-1] not in said:
             last = show_cycles(float(result.last_cycle[place]), result.counted)
             end = "" if result.computed[place] else f"computed up to {last}"
             is_known = 0.0 < result.errors[place] <= WELL_ENOUGH
             known = f"worn volume known within {show_error(result, point)}" if is_known else ""
             said = ", ".join(filter(None, (end, known, said)))
-        found.setdefault(said, []).append(point)
-    return found
+        yield point, said
 
 
 def describe_ended(result: Result, number: int) -> list[str]:
-    """The first points that ended in this way, with cycle, error and message; points with the same text in one line."""
-    axes = (*result.varying, *result.fixed)
-    texts = list_ended(result, number)
-    lines = []
-    for said, points in list(texts.items())[:_MOST_NAMED]:
-        named = [result.describe(point, axes) for point in points[:_MOST_NAMED]]
-        named += [f"{count(len(points) - _MOST_NAMED, 'more point')}"] if len(points) > _MOST_NAMED else []
-        lines.append(": ".join(filter(None, ("; ".join(named), said))))
-    left = sum(map(len, list(texts.values())[_MOST_NAMED:]))
-    return [line for line in (*lines, f"and {count(left, 'more point')}" if left else "") if line]
+    """The first points that ended in this way, with cycle, error and message, and how many more there are."""
+    first = itertools.islice(ended_points(result, number), _MOST_NAMED)
+    named = [(result.describe(point, (*result.varying, *result.fixed)), said) for point, said in first]
+    left = int(np.count_nonzero(result.dataset["outcome"].values == number)) - len(named)
+    lines = [*(": ".join(filter(None, each)) for each in named), f"and {count(left, 'more point')}" if left else ""]
+    return [line for line in lines if line]
 
 
-def advise_ended(result: Result, number: int) -> list[str]:
-    """Advice for the points that ended in this way: a sentence for each group of settings."""
-    found = np.argwhere(result.dataset["outcome"].values == number)
-    # advice depends on a few axes: one point for each of their values
-    axes = [place for place, name in enumerate(result.axes) if name in _OF_ADVICE]
-    _, first = np.unique(found[:, axes], axis=0, return_index=True)
-    word, places = result.endings[number].word, (tuple(found[row].tolist()) for row in sorted(first.tolist()))
-    return [text for text in dict.fromkeys(advise(word, settings_of(result, place)) for place in places) if text]
+# --- advice: what was used already is never named, nor what the scheme does not use ---
 
 
-def settings_of(result: Result, place: tuple[int, ...]) -> Used:
-    """Settings of a point, as far as the file says."""
-    dataset, solver, slow_time = result.dataset, result.study.get("solver", {}), result.study.get("slow_time", {})
-    of: dict[str, Any] = {"sweep": _AUTO, "harmonics": _AUTO, "samples": _AUTO, **solver}
+def advise_ended(result: Result, number: int) -> str:
+    """A sentence on what may help the points that ended in this way, from the first of them.
+
+    Empty where the sentence of the outcome says all, where nothing is left to try, and for words not known here.
+    """
+    word = result.endings[number].word
+    if word == "time_limit":
+        return "--retry-failed continues with a larger solver.time_limit."
+    place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
+    scheme, finer, steps, sweeps = _scheme(result, place), _finer(result, place), _steps(result, place), _sweeps(result)
+    until = "" if "until" in result.study.get("slow_time", {}) else " or slow_time.until"
+    remedies = {
+        # a ramp holds the frequency
+        "resonance_lost": ("another range in loading.between", *(each for each in sweeps if "ramp" not in each)),
+        "start_failed": (*finer, *sweeps),
+        "branch_lost": (*finer, *sweeps),
+        # more harmonics make no state stable
+        "unstable": sweeps,
+        "march_failed": (*finer, *steps),
+        "step_too_long": steps,
+        "sensitive": ("a smaller rtol",) if scheme in _OWN_STEPS else steps,
+        "inaccurate": finer,
+        "certificate_failed": (*finer, "a smaller tolerance"),
+        "no_final_state": (f"{'another scheme with ' * (scheme == 'final')}an end in slow_time.cycles{until}",),
+    }.get(word, ())
+    text = f"Try {' or '.join(remedies)}." if remedies else ""
+    more = " If both still differ then, the joint itself is that sensitive: use [scatter]."
+    return text + more if word == "sensitive" and scheme in _OWN_STEPS else text
+
+
+def _advise_error(result: Result, place: tuple[int, ...], error: float) -> str:
+    """What would make the error of a worn volume smaller, in a few words. error: relative, above `rtol`."""
+    finer, rtol = _finer(result, place), float(result.rtol[place])
+    if _scheme(result, place) not in _OWN_STEPS:
+        return f"set {' or '.join((*finer, *_steps(result, place)))}"
+    # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
+    digits, exponent = f"{rtol**2 / error:.12e}".split("e")
+    smaller = f"solver.rtol = {float(f'{digits[:3]}e{exponent}'):g}" if error < _FAR * rtol else "a smaller solver.rtol"
+    return f"set {' or '.join((*finer, smaller))}"
+
+
+def _setting(result: Result, place: tuple[int, ...], name: str, missing: str) -> str:
+    """What a point was computed with: a value of an axis, or of [solver]."""
+    if name in result.axes:
+        return str(result.dataset[name].values[place[result.axes.index(name)]])
+    return str(result.study.get("solver", {}).get(name, missing))
+
+
+def _scheme(result: Result, place: tuple[int, ...]) -> str:
     # missions and modes have neither step nor scheme, and what they take of their own controls its error
-    of |= {"scheme": "adaptive"} | {name: dataset[name].values[index] for name, index in result.point_at(place).items()}
-    harmonics, samples = (each if each == _AUTO else int(float(each)) for each in (of["harmonics"], of["samples"]))
-    schemes, sweeps = (
-        tuple(map(str, dataset[name].values)) if name in result.axes else () for name in ("scheme", "sweep")
-    )
+    return _setting(result, place, "scheme", "adaptive")
+
+
+def _finer(result: Result, place: tuple[int, ...]) -> tuple[str, ...]:
+    """Harmonics and samples of a given number, which may be automatic instead."""
+    keys = ("harmonics", "samples")
+    return tuple(f'{key} = "auto"' for key in keys if _setting(result, place, key, "auto") != "auto")
+
+
+def _steps(result: Result, place: tuple[int, ...]) -> tuple[str, ...]:
+    """Steps that are shorter than those that were used, and schemes that the study does not have."""
+    scheme, schemes = _scheme(result, place), set(_values(result, "scheme"))
+    if scheme in _OWN_STEPS:
+        shorter = "a smaller rtol, which makes the steps shorter"
+        return (shorter,) if "implicit" in schemes else (f"{shorter},", 'scheme = "implicit" with a small step')
+    by_depth = scheme == "explicit" and "largest_depth" in result.study.get("slow_time", {})
+    shorter = "a smaller slow_time.largest_depth" if by_depth else "a smaller step"
+    return (shorter,) if "adaptive" in schemes else ('scheme = "adaptive"', shorter)
+
+
+def _sweeps(result: Result) -> tuple[str, ...]:
+    """Ways to the unworn state that the study does not have."""
     # the modal amplitude of a mode is raised or lowered only
-    sweeps += ("ramp",) if result.has_modes else ()
-    return Used(
-        scheme=str(of["scheme"]),
-        sweep=str(of["sweep"]),
-        harmonics=harmonics,
-        samples=samples,
-        rtol=float(result.rtol[place]),
-        schemes=schemes,
-        sweeps=sweeps,
-        by_depth="largest_depth" in slow_time,
-        until="until" in slow_time,
-    )
+    used = (*_values(result, "sweep"), *(("ramp",) if result.has_modes else ()))
+    return tuple(f'sweep = "{sweep}"' for sweep in _SWEEPS if sweep not in used)
+
+
+def _values(result: Result, axis: str) -> Iterator[str]:
+    yield from map(str, result.dataset[axis].values if axis in result.axes else ())

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -45,9 +45,9 @@ _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
 _INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", "sweep_rate", *CERTIFICATE)
 """Ends of the names of variables that may be infinite: errors not known, after any cycle, rates without damping."""
-_LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
-_LONGEST = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanings": 50 * _LONGEST_SENTENCE}
-_ATTRIBUTES = (*_LONGEST, "sentences", "flag_values")  # of variables, for the report
+_LONGEST = 400  # characters of a text
+_LONG = ("study", "sentences", "flag_meanings")
+_OF_VARIABLES = ("units", "long_name", "flag_meanings", "sentences", "flag_values")  # attributes for the report
 _REMEDY = "give a result file of run-study that is whole"
 
 _OF_SCENE = SCENE["mesh"] | SCENE["natural_frequency"]
@@ -64,8 +64,7 @@ _LIKE_CYCLES = {
     "missions_to_target_error": "cycles_to_target_error",
 }
 
-Known = dict[str, tuple[tuple[str, ...], Variable | None]]
-"""Of each variable of a file its dimensions and what it is, None for the values of an axis."""
+_Need = Callable[[object, str, str], None]
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -109,7 +108,8 @@ def open_known(path: str | Path) -> xr.Dataset:
                 sizes = np.abs(variable.values)
                 may_be_infinite = str(name).endswith(_INFINITE)
                 wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (not may_be_infinite))]
-                _need(source, not wrong.size, str(name), f"{wrong.max(initial=0.0):g}")
+                if wrong.size:
+                    raise UserError(source, str(name), Verbatim(f"{wrong.max():g}"), _REMEDY)
     return known
 
 
@@ -184,13 +184,12 @@ def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
     return xr.DataArray(values, outcome.coords, outcome.dims, attrs=attributes)
 
 
-def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
+def study_tables(attributes: Mapping[str, object]) -> dict[str, dict[str, object]]:
     """The effective study of a file, by table; empty where it cannot be read."""
-    try:
-        tables = read_toml(str(attributes.get("study", "")).encode("utf-8", "replace"), source)
-    except UserError:
-        return {}
-    return {name: table for name, table in tables.items() if isinstance(table, dict)}
+    with suppress(UserError):
+        tables = read_toml(str(attributes.get("study", "")).encode("utf-8", "replace"), "")
+        return {name: table for name, table in tables.items() if isinstance(table, dict)}
+    return {}
 
 
 def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
@@ -198,56 +197,58 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
 
     source: name of the file for the user. Raises UserError where a variable is missing, or has a wrong shape or type.
     """
+
+    def need(right: object, name: str, found: str) -> None:
+        if not right:
+            raise UserError(source, name, Verbatim(found), _REMEDY)
+
     slow = "mission" if "mission" in dataset.dims else "cycle"
     lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
     if lacking:
         raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
     axes = tuple(map(str, dataset["outcome"].dims))
-    _check_sizes(source, dataset, axes, slow)
-    known = _known_variables(source, dataset, axes, slow)
-    for name, (dimensions, entry) in known.items():
-        _check_variable(source, name, dataset.variables[name], dimensions, entry)
+    _check_sizes(need, dataset, axes, slow)
+    known = _known_variables(need, dataset, axes, slow)
     checked = dataset.drop_vars([name for name in dataset.variables if name not in known]).copy()
-    for name in known:
+    for name, (dimensions, entry) in known.items():
+        _check_variable(need, name, dataset.variables[name], dimensions, entry)
         if name in COORDINATES or name.startswith(DRAWN):
             checked = checked.set_coords(name)
-        if checked[name].dtype.kind in "OSU":
-            texts = _texts(source, name, checked.variables[name])
-            checked = checked.assign_coords({name: texts}) if name in checked.coords else checked.assign({name: texts})
-    _check_values(source, checked, axes, slow)
+        variable = checked.variables[name]
+        if variable.dtype.kind in "OSU":
+            need(variable.size <= _MOST_NAMES, name, f"shape {variable.shape}")
+            texts = np.array([_line(each) for each in variable.values.flat], np.str_).reshape(variable.shape)
+            put = checked.assign_coords if name in checked.coords else checked.assign
+            checked = put({name: xr.Variable(variable.dims, texts, variable.attrs)})
+    _check_values(need, checked, axes, slow)
     checked.attrs = _attributes(checked.attrs)
     for variable in checked.variables.values():
-        variable.attrs = _attributes({name: variable.attrs[name] for name in _ATTRIBUTES if name in variable.attrs})
+        variable.attrs = _attributes({name: variable.attrs[name] for name in _OF_VARIABLES if name in variable.attrs})
     checked.set_close(dataset.close)
-    study_tables(checked.attrs, source)
     return checked
 
 
-def _need(source: str, right: object, name: str, found: str) -> None:
-    if not right:
-        raise UserError(source, name, Verbatim(found), _REMEDY)
-
-
-def _check_sizes(source: str, dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
-    for name in axes:
-        _need(source, name.isidentifier() and len(name) <= _LONGEST_NAME, "outcome", "axes with unusual names")
+def _check_sizes(need: _Need, dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
     sizes = {str(name): size for name, size in dataset.sizes.items()}
     for name in (*axes, slow, "contact"):
-        _need(source, 0 < sizes.get(name, 0) <= _MOST_NAMES, name, f"{sizes.get(name, 0)} values")
+        need(0 < sizes.get(name, 0) <= _MOST_NAMES, name, f"{sizes.get(name, 0)} values")
+        need(name.isidentifier() and name in dataset.variables, name, "no values along the dimension of this name")
     n_points = math.prod(sizes[name] for name in axes)
     n_values = n_points * math.prod(sizes.get(name, 1) for name in (slow, "response", "block"))
     is_small = n_points <= _MOST_POINTS and n_values <= _MOST_VALUES
-    _need(source, is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
+    need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
 
 
-def _known_variables(source: str, dataset: xr.Dataset, axes: Sequence[str], slow: str) -> Known:
-    """Variables of a file that the report knows."""
+def _known_variables(
+    need: _Need, dataset: xr.Dataset, axes: Sequence[str], slow: str
+) -> dict[str, tuple[tuple[str, ...], Variable | None]]:
+    """Of each variable that the report knows its dimensions and what it is, None for the values of an axis."""
     with_axes = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
     if slow == "mission":
         with_axes = OF_MISSIONS | OF_A_MISSION
     elif "modal_amplitude" in axes:
         with_axes = OF_MODES | OF_A_MODE_POINT
-    found: Known = {}
+    found: dict[str, tuple[tuple[str, ...], Variable | None]] = {}
     for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
         # what is of the scene, or drawn, has those axes along which it differs
         along = tuple(axis for axis in axes if axis in variable.dims)
@@ -256,23 +257,19 @@ def _known_variables(source: str, dataset: xr.Dataset, axes: Sequence[str], slow
         elif name.startswith(DRAWN) or (name == "frequency" and "frequency_ratio" in axes):
             found[name] = (*along, *(each for each in ("contact",) if each in variable.dims)), _DRAWN_VALUES
             is_along = {SAMPLE, "frequency_ratio"} & set(along)
-            _need(source, is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
+            need(is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
         elif name in with_axes:
             found[name] = (*axes, *with_axes[name].dimensions), with_axes[name]
         elif name in _OF_SCENE:
             found[name] = (*along, *_OF_SCENE[name].dimensions), _OF_SCENE[name]
-    for name in axes:
-        _need(source, name in found, name, "no values along the dimension of this name")
     return found
 
 
 def _check_variable(
-    source: str, name: str, variable: xr.Variable, dimensions: tuple[str, ...], entry: Variable | None
+    need: _Need, name: str, variable: xr.Variable, dimensions: tuple[str, ...], entry: Variable | None
 ) -> None:
     """Dimensions and type; entry None: of an axis, which has finite numbers or texts."""
-    need = functools.partial(_need, source)
     need(variable.dims == dimensions, name, f"dimensions {', '.join(map(str, variable.dims))}")
-    need(not {"scale_factor", "add_offset"} & set(variable.encoding), name, "packed values")
     kind = variable.dtype.kind
     if entry is not None:
         right = "OSU" if entry.is_text else "iuf" if entry.dtype.startswith("float") else "iu"
@@ -281,7 +278,11 @@ def _check_variable(
         need(name not in _WORDS, name, "numbers in place of words")
         need(np.isfinite(variable.values).all(), name, "a value that is no finite number")
     elif name in COORDINATES and name not in _TEXTS:
-        need(all(map(_is_choice, variable.values.tolist())), name, "texts in place of numbers")
+        # the values of an axis with numbers and "auto" are texts
+        with suppress(ValueError):
+            if np.isfinite([float(each) for each in variable.values if each != "auto"]).all():
+                return
+        need(False, name, "texts in place of numbers")
     if entry is _DRAWN_VALUES:
         # NaN of pairs that a scene does not have
         need(variable.size <= _MOST_VALUES, name, f"shape {variable.shape}")
@@ -289,17 +290,8 @@ def _check_variable(
         need(right.all(), name, "a value that is no finite number")
 
 
-def _is_choice(text: object) -> bool:
-    """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
-    try:
-        return text == "auto" or math.isfinite(float(str(text)))
-    except ValueError:
-        return False
-
-
-def _check_values(source: str, kept: xr.Dataset, axes: Sequence[str], slow: str) -> None:
+def _check_values(need: _Need, kept: xr.Dataset, axes: Sequence[str], slow: str) -> None:
     """Tests the values that lead to other values: cycles or missions, pairs, flags and mesh."""
-    need = functools.partial(_need, source)
     # worn joints whose modes are sought stand in any order
     counts = np.sort(kept[slow].values) if slow in axes else kept[slow].values
     rising = counts.dtype.kind in "iuf" and counts[0] >= 0 and (np.diff(counts) > 0).all()
@@ -316,29 +308,17 @@ def _check_values(source: str, kept: xr.Dataset, axes: Sequence[str], slow: str)
         need(((quad >= 0) & (quad < n_nodes)).all(), "mesh_quad", "nodes that there are not")
 
 
-def _texts(source: str, name: str, variable: xr.Variable) -> xr.Variable:
-    _need(source, variable.size <= _MOST_NAMES, name, f"shape {variable.shape}")
-    longest = _LONGEST_SENTENCE if name == "message" else _LONGEST_NAME
-    texts = [_line(each, longest) for each in variable.values.flat]
-    return xr.Variable(variable.dims, np.array(texts, dtype=np.str_).reshape(variable.shape), variable.attrs)
-
-
 def _attributes(found: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes without control characters, in one line but for texts of several."""
-
-    def clean(name: str, value: object) -> object:
-        if name in ("study", "sentences"):
-            return show_text(_decoded(value))
-        return value if name == "flag_values" else _line(value, _LONGEST.get(name, _LONGEST_SENTENCE))
-
-    return {name: clean(name, value) for name, value in found.items()}
+    kept = {name: value if name == "flag_values" else _line(value) for name, value in found.items()}
+    return kept | {name: show_text(_decoded(found[name])) for name in _LONG if name in found}
 
 
 @functools.lru_cache(maxsize=4096)  # most messages are the same
-def _line(value: object, longest: int) -> str:
-    """Text in one line, without control characters. longest: number of characters."""
-    text = show_text(" ".join(_decoded(value)[: 2 * longest].split()))
-    return text if len(text) <= longest else f"{text[: longest - 1]}…"
+def _line(value: object) -> str:
+    """Text in one line, without control characters, not longer than a sentence."""
+    text = show_text(" ".join(_decoded(value)[: 2 * _LONGEST].split()))
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 
 def _decoded(value: object) -> str:

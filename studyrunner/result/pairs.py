@@ -29,8 +29,8 @@ OF_PAIRS = (*(name for name, entry in COORDINATES.items() if entry.dimensions ==
 
 _EXISTS = "contact_exists"
 _ALIGNED = 0.05  # of the smallest distance between two pairs: pairs are on a line of the grid if they miss it by less
-_MIRRORED = {"cylinder_on_flat": 1, "sphere_on_flat": 2}
-"""Of bundled scenes with pairs of one half or one quarter of the contact: how many planes mirror them, x = 0 first."""
+_MIRRORED = ("cylinder_on_flat", "sphere_on_flat")
+"""Bundled scenes with pairs of one half, x > 0, or one quarter, x > 0 and y > 0, of the contact."""
 
 _UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 _HEADER = re.compile(r"\s*(x|depth)\s*[_(\[ ]\s*(m|mm|um|µm)\s*[)\]]?\s*", re.IGNORECASE)
@@ -61,17 +61,10 @@ class Grid:
 
 @dataclass(frozen=True)
 class Scar:
-    """The whole contact. pairs (n,): index along `contact`, each pair as often as it is mirrored. x, y (n,): m.
+    """The line through the middle of the whole contact. x (n,): m, ascending. pairs (n,): index along `contact`."""
 
-    line (k,): places in `pairs` of those along x through the middle, x ascending. width: of a square patch, m; 0 for
-    strips.
-    """
-
-    pairs: NDArray[np.intp]
     x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    line: NDArray[np.intp]
-    width: float
+    pairs: NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -104,24 +97,18 @@ def axes_of_scenes(result: Result, names: Collection[str] = OF_PAIRS) -> tuple[s
     return tuple(axis for axis in result.axes if axis in found)
 
 
-def of_scene(result: Result, point: Point, names: Collection[str] = OF_PAIRS) -> Result:
-    """The points whose scene is the one of `point` as far as these variables say, with its contact pairs alone."""
-    axes = axes_of_scenes(result, names)
+def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
+    """The points whose scene is that of the shown point as far as these variables say, with its contact pairs alone."""
+    axes, point = axes_of_scenes(result, names), result.shown
     if not axes and not result.has(_EXISTS):
         return result
     dataset = result.dataset.isel({axis: [point[axis]] for axis in axes})
     for name in filter(result.has, names):
         variable = dataset[name]
         dataset[name] = variable.isel({axis: 0 for axis in axes if axis in variable.dims}, drop=True)
-    fixed = {axis: result.dataset.sizes[axis] for axis in axes if axis in result.varying}
     if _EXISTS in names and result.has(_EXISTS):
         dataset = dataset.isel(contact=pairs_of_scene(result, point)).drop_vars(_EXISTS)
-    return replace(result, dataset=dataset, fixed={**result.fixed, **fixed})
-
-
-def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
-    """As `of_scene`, of the point that figures of a single point show."""
-    return of_scene(result, result.shown_point(), names)
+    return replace(result, dataset=dataset, fixed=(*result.fixed, *(axis for axis in axes if axis in result.varying)))
 
 
 def pairs_of_scene(result: Result, point: Point) -> NDArray[np.intp]:
@@ -230,17 +217,12 @@ def _parallel_lines(
 
 def find_scar(result: Result) -> Scar | None:
     """The contact of the shown scene where it is one of a cylinder or a sphere on a flat; None for other scenes."""
-    planes = _MIRRORED.get(str(result.study.get("scene", {}).get("model", "")), 0)
-    x, y, _ = contact_pairs(result, result.shown_point()).position.T
-    if not planes or not np.isfinite([x, y]).all():
+    x, y, _ = contact_pairs(result, result.shown).position.T
+    if result.study.get("scene", {}).get("model") not in _MIRRORED or not np.isfinite([x, y]).all():
         return None
-    pairs, width = np.arange(x.size), 0.0
-    pairs, x, y = np.r_[pairs, pairs], np.r_[-x, x], np.r_[y, y]
-    if planes == 2:
-        width = 2.0 * float(np.abs(x).min())
-        pairs, x, y = np.r_[pairs, pairs], np.r_[x, x], np.r_[y, -y]
-    middle = np.flatnonzero((np.abs(y) <= 0.75 * width) & (y >= 0.0))
-    return Scar(pairs, x, y, middle[np.argsort(x[middle], kind="stable")], width)
+    row = np.flatnonzero(y <= y.min() + 0.5 * x.min())
+    row = row[np.argsort(x[row], kind="stable")]
+    return Scar(np.r_[-x[row[::-1]], x[row]], np.r_[row[::-1], row])
 
 
 def read_profile(path: Path) -> Profile:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
-import subprocess
 from datetime import UTC, date, datetime
 from importlib import metadata
-from pathlib import Path
 
 from studyrunner.kinds.task import solver_digest
 from studyrunner.scene.scene import SceneFacts
@@ -24,10 +21,6 @@ POINTS_LEFT = "points_not_computed"
 NOW = "now"
 """Stands for the time at which the run begins."""
 
-CHANGED = " with local changes"
-"""End of the text of a commit with changed files."""
-
-_SECONDS_FOR_GIT = 5.0
 _REFERENCE = (
     "Salles et al.: Dynamic analysis of fretting-wear in joint interface by a multiscale harmonic"
     " balance method coupled with explicit or implicit integration schemes"
@@ -88,9 +81,8 @@ def describe_versions() -> str:
 
 def compare_with_archived(study: Study, scene_sha256: str) -> tuple[str, ...]:
     """Why a study from a result file may have another result with a scene of this digest, as lines; none for others."""
-    if study.archived is None:
-        return ()
-    return study.archived.differences(scene_sha256, solver_digest(), describe_versions())
+    there = study.archived
+    return () if there is None else there.differences(scene_sha256, solver_digest(), describe_versions())
 
 
 def check_date(text: str, place: str, key: str) -> str:
@@ -109,32 +101,8 @@ def check_date(text: str, place: str, key: str) -> str:
     raise UserError(place, key, text, remedy)
 
 
-def describe_time_and_commit(checked: str | None) -> dict[str, str]:
-    """Attributes that equal runs may differ in: the date, where asked for, see `check_date`, and the commit."""
-    commit = commit_of(Path(__file__).parents[2])
-    found = {"software_commit": commit} if commit else {}
+def describe_date(checked: str | None) -> dict[str, str]:
+    """The date, where asked for, see `check_date`: equal runs may differ in it."""
     if checked == NOW:
         checked = datetime.now(UTC).replace(microsecond=0, tzinfo=None).isoformat() + "Z"
-    return found if checked is None else {**found, "date_created": checked}
-
-
-def commit_of(folder: Path) -> str:
-    """Commit that is checked out in a folder, with `CHANGED` where files were changed; empty where unknown.
-
-    The commit of a folder inside a checkout, such as an environment, is unknown. By hand: `setuptools-scm` knows the
-    commit of the installation, not of the checkout that runs.
-    """
-    if not (folder / ".git").exists():
-        return ""
-    # a hook or an alias of the caller's own repository, whose variables are set, is not meant; nothing is written
-    clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
-    command = ["git", "-C", str(folder), "describe", "--always", "--exclude=*", "--abbrev=40", "--dirty"]
-    clean |= {"GIT_OPTIONAL_LOCKS": "0"}
-    try:
-        said = subprocess.check_output(
-            command, text=True, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=_SECONDS_FOR_GIT, env=clean
-        )
-    except (OSError, ValueError, subprocess.SubprocessError):
-        return ""
-    commit = said.strip()
-    return commit.removesuffix("-dirty") + CHANGED if commit.endswith("-dirty") else commit
+    return {} if checked is None else {"date_created": checked}

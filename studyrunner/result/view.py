@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -53,7 +53,7 @@ class Result:
     """A result file, each point one combination of the axes. Arrays of points have the shape of the axes.
 
     dataset: read lazily; a variable that was read as a whole stays in memory. fixed: axes of which this holds one value
-    of several, and how many the file has. blocks: of missions what belongs to single blocks; in `dataset` missions then
+    of several. blocks: of missions what belongs to single blocks; in `dataset` missions then
     have the name of cycles. chosen: values of axes of the point that figures of a single point show. measured: a worn
     profile to compare with. recomputed: of the worn joint of the shown point, by `studyrunner.worn_joint`.
     no_worn_response: why its response curve is not among them.
@@ -61,7 +61,7 @@ class Result:
 
     path: Path
     dataset: xr.Dataset
-    fixed: Mapping[str, int] = field(default_factory=dict)
+    fixed: tuple[str, ...] = ()
     blocks: xr.Dataset | None = None
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None
@@ -143,16 +143,14 @@ class Result:
     def over_points(
         self, name: str, reduce: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
-        """A number of each point, read some at a time. reduce: from values (n_points, ...) to (n_points,)."""
-
-        def reduced(part: xr.DataArray) -> NDArray[np.float64]:
-            values = np.asarray(part.transpose(*self.axes, ...).values, dtype=float)
+        """A number of each point, read some at a time. reduce: from values (..., n) of what follows the axes."""
+        values, axis = self.dataset[name].transpose(*self.axes, ...), max(self.axes, key=self.dataset.sizes.__getitem__)
+        length, parts = max(1, _AT_ONCE * values.sizes[axis] // values.size), []
+        for start in range(0, values.sizes[axis], length):
+            part = np.asarray(values.isel({axis: slice(start, start + length)}).values, dtype=float)
             # a copy: a view would keep the whole part in memory
-            return np.array(reduce(values.reshape(-1, *values.shape[len(self.axes) :])))
-
-        # in a function of its own, so that no part is in memory while the next one is read; `map` holds none either
-        parts = map(reduced, _in_slabs(self.dataset[name], self.axes))
-        return np.concatenate(list(parts)).reshape(self.computed.shape)
+            parts.append(np.array(reduce(part.reshape(*part.shape[: len(self.axes)], -1))))
+        return np.concatenate(parts, axis=self.axes.index(axis))
 
     @cached_property
     def endings(self) -> dict[int, Ending]:
@@ -241,14 +239,14 @@ class Result:
         """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
 
         def last(values: NDArray[np.float64]) -> NDArray[np.float64]:
-            return np.where(np.isnan(values[:, -1]), np.fmax.reduce(values, axis=1), values[:, -1])
+            return np.where(np.isnan(values[..., -1]), np.fmax.reduce(values, axis=-1), values[..., -1])
 
         return self.over_points("worn_volume", last)
 
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
         """Cycle counts that the file holds; where each point has its own those of the shown point."""
-        return self.counts(self._shown) if self.has("cycle_count") else self.counts({})
+        return self.counts(self.shown) if self.has("cycle_count") else self.counts({})
 
     def counts(self, point: Point) -> NDArray[np.float64]:
         """Cycle counts of one point, NaN for outputs that it has not.
@@ -265,7 +263,7 @@ class Result:
     def last_reached(self, point: Point) -> int:
         """Index of the last cycle count at which a point holds values: one at its target has none after it."""
         counts = self.counts(point)
-        last = self.last_cycle[tuple(point[name] for name in self.axes)]
+        last = self.last_cycle[self.place(point)]
         reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))
         return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
 
@@ -273,32 +271,28 @@ class Result:
         """A kept cycle count in words."""
         return show_cycles(float(self.cycles[index]), self.counted)
 
-    def shown_point(self) -> dict[str, int]:
+    @cached_property
+    def shown(self) -> dict[str, int]:
         """The point that figures of a single point show: of `best_known` the one with the largest final worn volume.
 
         Where nothing is worn the one with the largest response at first. Other points count only where there is none.
         """
-        return dict(self._shown)
-
-    @cached_property
-    def _shown(self) -> dict[str, int]:
-        measures = [np.ones(self.computed.shape)]
+        everywhere = has_slow_time = np.ones(self.computed.shape, np.bool_)
+        measures, outcome = [everywhere.astype(float)], self.dataset["outcome"]
         if self.has_modes:
-            amplitude = self.dataset["modal_amplitude"].broadcast_like(self.dataset["outcome"])
-            measures.insert(0, amplitude.transpose(*self.axes).values)
+            measures.insert(0, self.dataset["modal_amplitude"].broadcast_like(outcome).transpose(*self.axes).values)
         elif self.has("response_amplitude"):
-            amplitude = self.dataset["response_amplitude"].isel(cycle=0)
-            measures.insert(0, amplitude.max("response", skipna=False).transpose(*self.axes).values)
+            amplitude = self.dataset["response_amplitude"].isel(cycle=0).max("response", skipna=False)
+            measures.insert(0, amplitude.transpose(*self.axes).values)
         if not self.has_modes and self.has("worn_volume"):
             measures.insert(0, self.worn)
-        all_points = has_slow_time = np.ones(self.computed.shape, np.bool_)
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
-        wanted = xr.ones_like(self.dataset["outcome"], dtype=bool)
+        wanted = xr.ones_like(outcome, dtype=bool)
         for name in set(self.chosen) & set(self.varying):
             wanted = wanted & (self.dataset[name] == self.chosen[name])
         allowed, best = np.asarray(wanted.transpose(*self.axes).values), self.best_known
-        sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, all_points)
+        sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, everywhere)
         points = next(each & allowed for each in sets if (each & allowed).any())
         for measure in measures:
             known = np.where(points & np.isfinite(measure), measure, 0.0)
@@ -314,6 +308,10 @@ class Result:
         """The point at a place in an array of points."""
         return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
 
+    def place(self, point: Point) -> tuple[int, ...]:
+        """The place of a point in an array of points."""
+        return tuple(point[name] for name in self.axes)
+
     def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
         kept = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
@@ -323,17 +321,6 @@ class Result:
             for name in self.axes
             if name in kept and name in point
         )
-
-
-def _in_slabs(values: xr.DataArray, axes: Sequence[str]) -> Iterator[xr.DataArray]:
-    """Parts of a variable along its axes, in their order, of which none is much larger than `_AT_ONCE`."""
-    if values.size <= _AT_ONCE or not axes:
-        yield values
-        return
-    axis, *others = axes
-    length = max(1, _AT_ONCE // (values.size // values.sizes[axis]))
-    for start in range(0, values.sizes[axis], length):
-        yield from _in_slabs(values.isel({axis: slice(start, start + length)}), others if length == 1 else [])
 
 
 def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -> Result:

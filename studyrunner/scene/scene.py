@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
-from studies.contact_compliance import make_compliant
 from studies.fe_models.model_files import file_digest
-from studies.scene_answers import stuck_frequencies
+from studies.scene import as_scene, make_compliant, stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene, scene_has, scene_mesh
+from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.study.mistakes import raise_wrong, scene_errors
 from studyrunner.study.sections import AUTO
@@ -31,7 +30,7 @@ from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from studies.scene_answers import SurfaceMesh
+    from studies.scene import SurfaceMesh
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
 
@@ -96,7 +95,7 @@ def build_study_scene(
             if not scene.group:
                 model = make_compliant(model, dict(scene.parameters)["contact_stiffness"])
     raise_wrong(study.source, _wrong_beside(study, model))
-    if "natural_frequency" in study.scene_variables and not has_frequencies(study):
+    if "natural_frequency" in study.scene_variables:
         with scene_errors(study.source, None):
             stuck_frequencies(model)
     return model
@@ -190,12 +189,6 @@ def values_of_point(study: Study, facts: SceneFacts) -> int:
     return sum(math.prod(shape) for _, _, shape in record_fields(study, facts))
 
 
-def has_frequencies(study: Study) -> bool:
-    """Whether the scene knows more natural frequencies than those of its reduced model."""
-    rigid = dict(study.scene.parameters)["contact_stiffness"] is None
-    return study.scene.is_bundled and rigid and scene_has(study.scene.model, "natural_frequencies")
-
-
 def build_mesh(study: Study) -> SurfaceMesh | None:
     """Mesh of the study's scene, None where it has none. Raises SceneError."""
     scene = study.scene
@@ -206,7 +199,7 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
 
         return describe_model_mesh(scene.files, scene.parameters)
     if scene.path is None:
-        return scene_mesh(scene.model, scene.parameters)
+        return as_scene(scene.parameters).describe_mesh()
     from studies.scene_file import read_mesh
 
     return read_mesh(scene.path, scene.group)

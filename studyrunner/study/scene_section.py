@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
 
-from studies.contact_compliance import ContactStiffness
 from studies.fe_models.model_files import ModelFiles
+from studies.scene import ContactStiffness, as_scene
 from studies.scene_error import SceneError
-from studies.scenes import scene_has, scene_parameters
+from studies.scenes import scene_parameters
 from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
 from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file
 from studyrunner.system.progress import count as counted
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 WORN_AXIS = "worn_cycle"
 """Name of the axis of several worn states."""
-
-_OFFERED = {"mesh": "describe_mesh", "exact": "exact_answer"}
 
 
 def _names_model(model: str) -> bool:
@@ -118,7 +116,7 @@ class SceneSection(Section):
     def of_model(self) -> dict[str, object]:
         """Parameters that the reduced model depends on: mostly without one friction coefficient of all pairs."""
         given: dict[str, object] = self.parameters.model_dump(mode="json")
-        depends = self.is_bundled and scene_has(self.model, "FRICTION_IN_MODEL")
+        depends = self.is_bundled and as_scene(self.parameters).FRICTION_IN_MODEL
         if not depends and not isinstance(given["friction_coefficient"], dict):
             del given["friction_coefficient"]
         return given
@@ -162,8 +160,7 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
     """
     model, before = scene.model, origin.scene
     if scene.is_bundled:
-        offers = tuple(name for name, function in _OFFERED.items() if scene_has(model, function))
-        scene = scene.model_copy(update={"offers": offers})
+        scene = scene.model_copy(update={"offers": as_scene(scene.parameters).OFFERS})
     if before is not None and before.model == model:
         ours, theirs = scene.of_model, before.of_model
         changed = [key for key in {**theirs, **ours} if ours.get(key) != theirs.get(key)]

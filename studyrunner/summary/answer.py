@@ -1,8 +1,4 @@
-"""What came out of a study, as data, from its result alone.
-
-`summary(dataset)` is for the command, the page and notebooks; `lines.summary_lines` writes it. Only results are in it:
-a history that was not computed to the end, or is known to a factor of two only, has no number here.
-"""
+"""The summary of a result: for the command, the page and notebooks; as data, and in at most nine lines."""
 
 from __future__ import annotations
 
@@ -14,51 +10,36 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, list_ended
+from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, ended_points
 from studyrunner.result.opening import as_history
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import COMPLETE_WORDS, Result
-from studyrunner.statistics.samples import SAMPLE
-from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
-from studyrunner.summary.wear import (
+from studyrunner.summary.findings import (
     Life,
     MeshChange,
+    ModeRange,
     MostWear,
     NothingWore,
     Vibration,
     compare_meshes,
+    describe_samples,
+    mode_ranges,
     most_wear,
     shortest_life,
     vibration_of,
     where_is,
 )
 from studyrunner.system.progress import count
-from studyrunner.units import show_number
+from studyrunner.units import show_percent
+
+MOST_LINES = 9
 
 SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
 
-
-@dataclass(frozen=True)
-class Samples:
-    """What the samples say, at the point of the other axes where their median is largest."""
-
-    where: str  # this point in words
-    n_points: int
-    volumes: str  # range and median of the worn volumes
-    ranking: str  # which input decides
-
-
-@dataclass(frozen=True)
-class ModeRange:
-    """Natural frequency, Hz, and damping ratio of a mode: ends of their ranges over the points that were found."""
-
-    number: int
-    over: str  # what varies, in words
-    frequency: tuple[float, float]
-    damping: tuple[float, float]
-    n_found: int
-    n_points: int
+_MOST_FAILURES, _MOST_MODES = 2, 4
+_WIDTH, _LONGEST = 12, 240
+_PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
 
 @dataclass(frozen=True)
@@ -73,10 +54,19 @@ class Failure:
     where: str  # the first of these points in words, empty where the study has one point
     reason: str  # its message
 
+    @property
+    def text(self) -> str:
+        """What it means, what may help, and the first of the points."""
+        cut = len(self.reason) > _LONGEST
+        reason = f"{self.reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if cut else self.reason
+        first = ": ".join(filter(None, (self.where, reason)))
+        said = (self.sentence, self.advice, f"First: {first}" if self.where else reason[:1].upper() + reason[1:])
+        return ". ".join(filter(None, said))
+
 
 @dataclass(frozen=True)
 class Summary:
-    """What came out."""
+    """What came out. `print` shows its `lines`."""
 
     n_points: int
     n_complete: int  # computed to the end
@@ -84,19 +74,58 @@ class Summary:
     failures: tuple[Failure, ...]  # of each way to fail
     certainty: Certainty | None
     wear: MostWear | NothingWore | None = None  # None where it is not known or not asked for
-    samples: Samples | None = None  # with [scatter]
+    samples: str = ""  # with [scatter]: range and median of the worn volumes
+    ranking: str = ""  # which input decides
     vibration: Vibration | None = None
     life: Life | None = None  # with a target
     mesh: MeshChange | None = None  # where meshes can be compared
     modes: tuple[ModeRange, ...] = ()
-    stuck_frequency: float = np.nan  # Hz, of the joint that sticks; NaN where there is none, or several
+    stuck_frequency: float = math.nan  # Hz, of the joint that sticks; NaN where there is none, or several
     doubts: tuple[str, ...] = ()  # sentences on values that are hardly what was meant
 
     def __str__(self) -> str:
         """The summary as text."""
-        from studyrunner.summary.lines import summary_lines
+        return "\n".join(self.lines)
 
-        return "\n".join(summary_lines(self))
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Lines of plain text: label and text of each row."""
+        return tuple(f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in self.rows)
+
+    @property
+    def rows(self) -> tuple[tuple[str, str], ...]:
+        """Label and text, in the order in which an engineer asks: the answer, failures, certainty."""
+        wear, vibration, rows = self.wear, self.vibration, list[tuple[str, str]]()
+        stuck = f"first resonance {self.stuck_frequency:.4g} Hz when all pairs stick"
+        stuck = stuck if math.isfinite(self.stuck_frequency) else ""
+        if isinstance(wear, NothingWore):
+            rows.append(("wear", f"{wear.text} ({stuck})" if stuck else wear.text))
+        elif isinstance(wear, MostWear):
+            label = "most wear" if wear.n_compared > 1 else "wear"
+            rows.append(("wear", self.samples) if self.samples else (label, wear.text(self.counted)))
+            rows.append(("input", self.ranking))
+            at = f" in the sample that wears most ({wear.where})" if self.samples else ""
+            rows.append(("deepest", wear.deepest.text + at))
+            shares = ", ".join(f"{name} {show_percent(share)}" for name, share in wear.blocks)
+            rows.append(("blocks", shares and f"share of the wear: {shares}"))
+        elif self.certainty is not None and self.certainty.of == "worn volume":
+            rows.append(("wear", "no worn volume is known within 50 %"))
+        if vibration is not None:
+            wears = isinstance(wear, MostWear)
+            text = vibration.text(wears, self.n_points == 1)
+            rows.append((vibration.followed or "response", f"{text}; {stuck}" if wears and stuck else text))
+        rows += [(f"mode {mode.number}", mode.text) for mode in self.modes[:_MOST_MODES]]
+        rows.append(("life", self.life.text(self.counted) if self.life else ""))
+        rows.append(("mesh", self.mesh.text if self.mesh else ""))
+        for each in self.failures[:_MOST_FAILURES]:
+            of = f"{each.n_points} of {count(self.n_points, 'point')}: " if self.n_points > 1 else ""
+            rows.append(("uncertain" if each.is_complete else "failed", f"{of}{each.text}"))
+        if left := self.failures[_MOST_FAILURES:]:
+            n_left = count(sum(each.n_points for each in left), "more point")
+            rows.append(("uncertain" if left[0].is_complete else "failed", f"{n_left} in other ways"))
+        rows.append(("beware", next(iter(self.doubts), "")))
+        rows = [(label, text) for label, text in rows if text][: MOST_LINES - 1]
+        return (*rows, *([("certainty", self.certainty.sentence)] if self.certainty else []))
 
 
 def summary(dataset: xr.Dataset) -> Summary:
@@ -109,7 +138,7 @@ def summarise(result: Result) -> Summary:
     """The summary of a result that is opened for the report."""
     numbers = result.computed.size, int(result.computed.sum()), result.counted, _failures(result)
     if result.has_modes:
-        return Summary(*numbers, certainty_of(result), modes=_modes(result))
+        return Summary(*numbers, certainty_of(result), modes=mode_ranges(result))
     wear = most_wear(result)
     of_scenes = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
     stuck = float(of_scenes) if of_scenes.ndim == 0 else math.nan
@@ -117,43 +146,13 @@ def summarise(result: Result) -> Summary:
         *numbers,
         certainty_of(result, wore=not isinstance(wear, NothingWore)),
         wear,
-        _samples(result) if isinstance(wear, MostWear) else None,
+        *(describe_samples(result) if isinstance(wear, MostWear) else ("", "")),
         vibration_of(result, wear),
         shortest_life(result),
         compare_meshes(result),
         stuck_frequency=stuck,
         doubts=tuple(filter(None, (_not_small(result), _in_radians(result, stuck), _too_few_counts(result)))),
     )
-
-
-def _samples(result: Result) -> Samples | None:
-    statistics = result.statistics
-    if statistics is None:
-        return None
-    last = statistics.isel(cycle=-1, missing_dims="ignore")
-    medians = last["worn_volume_quantile"].sel(quantile=0.5).isel(bound=0)
-    place = np.unravel_index(int(np.argmax(medians.values)), medians.shape)
-    point = dict(zip(map(str, medians.dims), map(int, place), strict=True))
-    where = result.describe(point, [name for name in result.varying if name != SAMPLE])
-    of_all = last.isel(point)
-    return Samples(where, int(medians.size), describe_volumes(of_all), describe_ranking(of_all))
-
-
-def _modes(result: Result) -> tuple[ModeRange, ...]:
-    numbers = [name for name in result.varying if name != "mode" and result.dataset[name].dtype.kind in "iuf"]
-    ends = {name: [show_number(float(result.dataset[name].values[place])) for place in (0, -1)] for name in numbers}
-    over = ", ".join(f"{name.replace('_', ' ')} {' to '.join(each)}" for name, each in ends.items())
-    axis, found = result.axes.index("mode"), []
-    for index, number in enumerate(result.dataset["mode"].values.tolist()):
-        computed = result.computed.take(index, axis=axis)
-        ranges = {}
-        for name in ("natural_frequency", "damping_ratio"):
-            values = result.dataset[name].values.take(index, axis=axis) if result.has(name) else np.zeros(0)
-            values = values[computed] if values.size else values
-            ranges[name] = (float(values.min()), float(values.max())) if values.size else (math.nan, math.nan)
-        frequency, damping = ranges.values()
-        found.append(ModeRange(int(number), over, frequency, damping, int(computed.sum()), computed.size))
-    return tuple(found)
 
 
 def _failures(result: Result) -> tuple[Failure, ...]:
@@ -163,16 +162,14 @@ def _failures(result: Result) -> tuple[Failure, ...]:
         ending = result.endings[number]
         if ending.word == "converged":
             continue
-        reason, (point, *_) = next(iter(list_ended(result, number).items()))
-        sentence = re.split(r"[.:](?:\s|$)", ending.sentence)[0]
-        advice = " ".join(advise_ended(result, number)[:1]).rstrip(".")
+        point, reason = next(ended_points(result, number))
+        sentence = re.split(r"[.:](?:\s|$)", ending.sentence)[0] or ending.word
         where = where_is(result, point) if result.varying else ""
         # what the message of a sensitive one holds is no result
         reason = "" if ending.word == "sensitive" else reason
-        is_complete = ending.word in COMPLETE_WORDS
+        is_complete, advice = ending.word in COMPLETE_WORDS, advise_ended(result, number).rstrip(".")
         found.append(Failure(ending.word, is_complete, n_points, sentence, advice, where, reason))
-    found.sort(key=lambda each: (each.is_complete, -each.n_points))
-    return tuple(found)
+    return tuple(sorted(found, key=lambda each: (each.is_complete, -each.n_points)))
 
 
 def _not_small(result: Result) -> str:
@@ -184,7 +181,7 @@ def _not_small(result: Result) -> str:
     """
     if not result.has("largest_wear_depth"):
         return ""
-    pairs = contact_pairs(result, result.shown_point())
+    pairs = contact_pairs(result, result.shown)
     areas = [float(np.nansum(pairs.area[pairs.surface == surface])) for surface in np.unique(pairs.surface)]
     width = math.sqrt(min((area for area in areas if area > 0.0), default=math.inf))
     ratios = np.nan_to_num(np.where(result.computed, result.dataset["largest_wear_depth"].values, 0.0) / width)
@@ -212,7 +209,6 @@ def _too_few_counts(result: Result) -> str:
         return ""
     at_second = result.dataset["worn_volume"].isel(cycle=1).transpose(*result.axes).values
     early = result.computed & np.isfinite(result.dataset["cycles_to_target"].values) & np.isnan(at_second)
-    if not early.any():
-        return ""
     points = count(int(np.count_nonzero(early)), "point")
-    return f"no worn volume is stored for {points}: the target comes before the second of slow_time.outputs: give more"
+    said = f"no worn volume is stored for {points}: the target comes before the second of slow_time.outputs: give more"
+    return said if early.any() else ""

@@ -13,7 +13,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from studies import build_scene
-from studies.scenes.den_hartog import DenHartogSlider, WearingSlider
+from studies.scenes.sdof_slider import DenHartogSlider, WearingSlider
 from tests.solver.models import assert_same, march_wear
 from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
 from tests.studies.half_space_twin import limit_depth

@@ -20,7 +20,7 @@ from solver.missions.step import MissionStep, attempt_step
 from solver.packing import Packed
 from solver.settings import WearTarget
 from solver.wear.slow_time import Guide
-from studies.scenes.den_hartog import DenHartogSlider
+from studies.scenes.sdof_slider import DenHartogSlider
 from studies.scenes.sdof_slider import Parameters as SliderParameters
 from tests.solver.models import assert_same, scene
 

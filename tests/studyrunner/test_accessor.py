@@ -146,6 +146,7 @@ def test_loop_is_closed(result):
         (lambda result: result.isel(contact=slice(1, 20)).fretwear.flank("wear_depth", "back"), "on a grid"),
         (lambda result: result.drop_vars(["loop_force", "loop_displacement"]).fretwear.loop(PAIR), r"loops = \[7\]"),
         (lambda result: result.fretwear.loop(6), r"loops = \[6\]"),
+        (lambda result: result.drop_vars("response_phase").fretwear.response(), "no response_phase: ask"),
         (lambda result: result.fretwear.loop(99), r"loops = \[99\]"),
         (lambda _: xr.Dataset().fretwear.summary(), "no result of a study"),
         (lambda _: join_results([]), "no results"),

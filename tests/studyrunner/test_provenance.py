@@ -1,6 +1,5 @@
-"""Commit of the software, and the date in a result: where they are known or asked for, and nothing else."""
+"""The date in a result: where it is asked for, and nothing else."""
 
-import subprocess
 from pathlib import Path
 
 import netCDF4
@@ -8,28 +7,9 @@ import pytest
 
 from studyrunner.api import run_study
 from studyrunner.cli import main
-from studyrunner.result.provenance import CHANGED, check_date, commit_of
+from studyrunner.result.provenance import check_date
 from studyrunner.user_error import UserError
 from tests.studyrunner.faked_runs import SMALL
-
-
-def test_the_commit_is_that_of_git(tmp_path, monkeypatch):
-    def git(*arguments):
-        command = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=b", *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-
-    monkeypatch.setenv("GIT_CONFIG_GLOBAL", "/dev/null")
-    git("init", "-q")
-    head = ""
-    for text in ("one", "two"):
-        (tmp_path / "a.py").write_text(text, encoding="utf-8")
-        git("add", "a.py")
-        assert not head or commit_of(tmp_path) == head + CHANGED
-        git("commit", "-qm", text)
-        git("tag", "-a", text, "-m", "a name is no commit")
-        head = git("rev-parse", "HEAD")
-        assert commit_of(tmp_path) == head
-    assert commit_of(tmp_path.parent) == ""
 
 
 @pytest.mark.parametrize(
@@ -56,16 +36,15 @@ def test_a_wrong_date_is_bad_input(capsys):
 
 
 @pytest.mark.usefixtures("folder")
-def test_date_and_software_stand_in_the_result_and_change_nothing_else(solver, monkeypatch):
-    def run(*more, commit="b" * 40):
+def test_the_date_stands_in_the_result_and_changes_nothing_else(solver):
+    def run(*more):
         solver.begin_again()
-        monkeypatch.setattr("studyrunner.result.provenance.commit_of", lambda _: commit)
         assert main([*SMALL, *more]) == 0
         with netCDF4.Dataset("out.nc") as file:
             return {name: file.getncattr(name) for name in file.ncattrs()}
 
-    there = run(commit="") | {"software_commit": "b" * 40}
-    # what is finished is known by the same hashes whatever the date and the commit
+    there = run()
+    # what is finished is known by the same hashes whatever the date
     assert run("--date=2026-11-23") == there | {"date_created": "2026-11-23"}
     assert solver.n_results == 0
     now = run("--date")

@@ -10,9 +10,8 @@ from solver.outcome import Outcome
 from studyrunner.result.opening import as_history
 from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
-from studyrunner.summary.answer import SMALL, ModeRange, Samples, summary
-from studyrunner.summary.lines import MOST_LINES, summary_lines
-from studyrunner.summary.wear import MeshChange, MostWear, NothingWore, compare_meshes
+from studyrunner.summary.answer import MOST_LINES, SMALL, summary
+from studyrunner.summary.findings import MeshChange, ModeRange, MostWear, NothingWore, compare_meshes
 from studyrunner.units import show_percent, show_rtol
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.results import made_result
@@ -75,7 +74,7 @@ def test_what_is_not_known_is_no_result(name, value, known):
     assert found.wear.n_left_out == 1
     nothing = summary(dataset.assign(outcome=dataset["outcome"] * 0 + FAILED))
     assert (nothing.wear, nothing.n_complete) == (None, 0)
-    assert not any("mm3" in line for line in summary_lines(nothing))
+    assert not any("mm3" in line for line in nothing.lines)
 
 
 DEPTHS = np.array([3e-6, 1e-6, 2e-6, 0.0, 5e-6, 0.0])
@@ -101,7 +100,7 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
         np.testing.assert_allclose(deepest.position, BY_SIX.position[pair])
         assert deepest.edge_share == pytest.approx(edge)
         assert deepest.edge_area == pytest.approx(0.5)
-        text = "\n".join(summary_lines(summary(made)))
+        text = "\n".join(summary(made).lines)
         assert ("edge pairs" in text) is (edge > 0.5)
 
 
@@ -110,12 +109,12 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
 
 def test_a_joint_that_does_not_move_has_no_amplitude_of_round_off():
     made = wearing("axes.frequency=100", volume=lambda _: 0.0, response_amplitude=lambda _: np.full((21, 1), 4e-25))
-    assert any("does not move" in line for line in summary_lines(summary(made)))
+    assert any("does not move" in line for line in summary(made).lines)
 
 
 def test_nothing_wore_says_why():
     still = summary(wearing("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive", volume=lambda _: 0.0))
-    assert still.wear == NothingWore(0.0, "at all 3 frequencies")
+    assert still.wear == NothingWore(0.0, "at all 3 points")
     slips = wearing("axes.frequency=[1, 2]", volume=lambda _: 0.0, slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
     assert summary(slips).wear.largest_slip == 1e-6
     some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)
@@ -125,7 +124,7 @@ def test_nothing_wore_says_why():
             stuck_frequency=212.6
         )
     )
-    assert "nothing wore: all pairs stick at all 3 frequencies (first resonance 212.6 Hz)" in summary_lines(stuck)[0]
+    assert "nothing wore: all pairs stick at all 3 points (first resonance 212.6 Hz" in stuck.lines[0]
     assert stuck.certainty.of == "response"
 
 
@@ -188,9 +187,9 @@ def test_a_target_before_the_second_count_and_one_without_a_unit():
         cycles_to_target_error=lambda _: 3.0,
         error_estimate=lambda _: math.nan,
     )
-    lines = summary_lines(summary(made))
+    lines = summary(made).lines
     assert any("slow_time.outputs: give more" in line for line in lines)
-    assert any(line.endswith("to frequency shift 0.01") for line in lines)
+    assert any("to frequency shift 0.01 " in line for line in lines)
     assert not summary(made.assign(worn_volume=made["worn_volume"].fillna(0.0))).doubts
 
 
@@ -245,9 +244,9 @@ def test_the_summary_is_short_whatever_came_out():
         facts=BY_SIX,
     )
     found = summary(made)
-    of_all = {"samples": Samples("1 Hz", 3, "volumes", "ranking"), "mesh": MeshChange((1, 2), "", 0.1, 0.2)}
+    of_all = {"samples": "volumes", "ranking": "ranking", "mesh": MeshChange((1, 2), "", 0.1, 0.2)}
     for each in (found, replace(found, **of_all, modes=(ModeRange(1, "", (1, 2), (0, 1), 1, 2),))):
-        lines = summary_lines(each)
+        lines = each.lines
         assert len(lines) <= MOST_LINES
         assert all(line.isprintable() and line.isascii() for line in lines)
         assert lines[-1].startswith("certainty")

@@ -61,7 +61,7 @@ def test_the_command_draws_what_it_computes_and_says_what_is_wrong(path, tmp_pat
         page = (tmp_path / "lost" / "index.html").read_text(encoding="utf-8")
         assert ("Without the curve of the worn joint" in page) is (not options)
     capsys.readouterr()
-    for wrong in (["--loops", "7"], ["--loops", "a"], ["--natural-frequencies"]):
+    for wrong in (["--loops", "7"], ["--loops", "a"]):
         assert main([str(path), "-o", str(tmp_path), *wrong]) == 2
         assert len(capsys.readouterr().err.strip().splitlines()) == 1
     with pytest.raises(UserError, match="frequency"):

@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import BaseModel
 
 from solver.model import FloatArray, ReducedModel
-from studies.contact_compliance import build_compliant
 from studies.fe_models.deck.contents import Deck
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.export_mistakes import check_nodes_have_dofs
@@ -37,7 +36,7 @@ from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_
 from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.surfaces import describe_mesh, loops_of_faces, pressure_forces
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh, build_compliant
 from studies.scene_error import SceneError
 
 

@@ -214,14 +214,13 @@ def find_cut(selections: Selections, axis: CyclicAxis | None, contacts: Sequence
     if axis is None:
         return None
     mesh, given = selections.mesh, selections.parameters.cut_faces
-    places = mesh.coordinates, mesh.numbers, mesh.bodies
     names = selections.deck.cut_faces if given is None else (given,)
     if not names:
         across = [surface.nodes for each in contacts if each.sector for surface in (each.first, each.second)]
-        return find_cut_faces(*places, axis, np.concatenate([_NONE, *across]))
+        return find_cut_faces(mesh, axis, np.concatenate([_NONE, *across]))
     sides = ([selections.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
     first, second = (np.unique(np.concatenate(each)) for each in sides)
-    return match_cut_faces(*places, axis, first, second)
+    return match_cut_faces(mesh, axis, first, second)
 
 
 def find_clamped(selections: Selections) -> BoolArray | None:

@@ -70,7 +70,7 @@ class Flank:
 
 def find_flanks(result: Result) -> tuple[Flank, ...]:
     """The contact surfaces of a file, in order of first appearance; a single one where the file has no labels."""
-    found = contact_pairs(result, result.shown_point())
+    found = contact_pairs(result, result.shown)
     area = np.where(np.isfinite(found.area), found.area, 1.0)
     words = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model")))
     flanks = []

@@ -33,7 +33,7 @@ _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _SLENDER, _LONGEST_NAME = 150, 4, 12
 
 def _worn_depth(result: Result) -> FloatArray | None:
     """Wear depths (n_contact,), m, of the shown point at its last count; None where nothing is worn."""
-    depth = last_depth(result, result.shown_point()) if has_depths(result) else np.zeros(1)
+    depth = last_depth(result, result.shown) if has_depths(result) else np.zeros(1)
     return depth if len(result.cycles) > 1 and float(depth.max()) > NO_DEPTH else None
 
 
@@ -43,20 +43,20 @@ def draw_depths(result: Result) -> Drawn:
         return result.lacks("wear_depth")
     if _worn_depth(result) is None or result.dataset.sizes["contact"] == 1:
         return None
-    shown, course = result.shown_point(), course_axis(result)
+    course, pairs = course_axis(result), result.dataset["contact"].values
     choice = choose(result, [course] if course else [], _MOST_SERIES)
-    series = {label: last_depth(result, {**shown, **point}) for point, label in choice}
+    series = {label: last_depth(result, point) for point, label in choice}
     series = {label: depth for label, depth in series.items() if not np.isnan(depth).all()}
-    (figure, panel), pairs = plot.new_panel(3.3), result.dataset["contact"].values
+    figure, panel = plot.new_panel(3.3)
     scale, apart = scale_for("m", *series.values()), 0.8 / len(series) if len(pairs) <= _MANY_PAIRS else 0.0
     for number, (label, depth) in enumerate(series.items()):
         at = pairs + (number - 0.5 * (len(series) - 1)) * apart
         style = plot.line_style(number) | {"linestyle": "none", "markevery": 1}
         panel.vlines(at, 0.0, scale(depth), color=style["color"], linewidth=1.2)
         panel.plot(at, scale(depth), label=label or "computed", **style)
-    plot.set_from_zero(panel, scale(max(float(np.nanmax(depth, initial=0.0)) for depth in series.values())).item())
+    plot.set_from_zero(panel)
     panel.set(xlim=(pairs[0] - 0.8, pairs[-1] + 0.8), xlabel="contact pair")
-    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(result.last_reached(shown))}"))
+    panel.set_ylabel(scale.label(f"wear depth at {result.cycle_label(result.last_reached(result.shown))}"))
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
     if "contact_surface" in result.dataset.coords:
@@ -79,7 +79,7 @@ def _name_surfaces(panel: Axes, result: Result) -> None:
 
 def draw_pressure(result: Result) -> Drawn:
     """Mean pressure on each flank at the first and the last cycle count (Figs. 10, 11)."""
-    shown, scar = result.shown_point(), find_scar(result)
+    shown, scar = result.shown, find_scar(result)
     if scar is None and result.dataset.sizes["contact"] == 1:
         return None
     kept = sorted({0, result.last_reached(shown)})
@@ -108,7 +108,7 @@ def draw_profile(result: Result) -> Drawn:
     if not flanks:
         # without positions there is nothing that the wear depth per pair does not show
         return None
-    when, scale = result.cycle_label(result.last_reached(result.shown_point())), scale_for("m", depth)
+    when, scale = result.cycle_label(result.last_reached(result.shown)), scale_for("m", depth)
     if all(flank.cells is not None for flank in flanks):
         figure = _draw_profiles(flanks, depth, scale)
     else:
@@ -122,16 +122,14 @@ def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -
     figure, panels = plot.new_panels(2, len(flanks), inches + 3.3, sharex="col", height_ratios=(inches, 2.0))
     deepest = scale(float(np.nanmax(depth))).item() or 1.0
     norm = Normalize(0.0, deepest)
-    rows = [flank.cells.y for flank in flanks if flank.cells is not None]
-    same = all(len(y) == len(rows[0]) and np.allclose(y, rows[0]) for y in rows)
     for (above, panel), flank in zip(panels.T, flanks, strict=True):
         values, cells = scale(depth[flank.pairs]), flank.cells
         assert cells is not None
         draw_field(above, flank, values, norm)
         above.set_title(flank.surface)
-        n_rows, own = len(cells.y), "" if same else f"{flank.surface}: "
+        n_rows = len(cells.y)
         for number, row in enumerate(np.unique(np.linspace(0, n_rows - 1, min(n_rows, _MOST_PROFILES)).round())):
-            label = f"{own}{1e3 * cells.y[int(row)]:.3g} mm {flank.directions[1]}"
+            label = f"{1e3 * cells.y[int(row)]:.3g} mm {flank.directions[1]}"
             panel.plot(1e3 * cells.x, values[cells.pair[int(row)]], label=label, **plot.line_style(number))
         panel.set(xlim=above.get_xlim(), ylim=(1.06 * deepest, -0.04 * deepest))
         panel.set(xlabel=f"{flank.directions[0]} (mm)", ylabel=scale.label("wear depth"))
@@ -143,44 +141,27 @@ def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -
 def _draw_scar(
     scar: Scar, fields: Mapping[str, FloatArray], scale: Scale, text: str, error: FloatArray | None = None
 ) -> tuple[Figure, Axes, str]:
-    """Fields (n_contact,) over x, the last with its errors, with the panel and a sentence; of a sphere its map, too."""
-    along, last = scale_for("m", scar.x), list(fields.values())[-1]
-    figure, panels = plot.new_panels(1, 2 if scar.width else 1, 3.4)
-    panel, pairs = panels[0, -1], scar.pairs[scar.line]
-    at = along(scar.x[scar.line])
+    """Fields (n_contact,) along x through the middle, the last with its errors; the panel, and a sentence."""
+    (figure, panel), along, pairs = plot.new_panel(3.4), scale_for("m", scar.x), scar.pairs
+    at = along(scar.x)
     for number, (label, values) in enumerate(fields.items()):
-        wrong = scale(error[pairs]) if error is not None and values is last else None
+        wrong = scale(error[pairs]) if error is not None and number == len(fields) - 1 else None
         plot.add_line(panel, at, scale(values[pairs]), wrong, band=True, label=label, **plot.line_style(number))
-    panel.set_xlim(1.02 * float(np.min(at)), 1.02 * float(np.max(at)))
-    panel.set(xlabel=along.label("x"), ylabel=scale.label(text))
-    if not scar.width:
-        return figure, panel, "The contact is symmetric: one half is computed, the whole is drawn"
-    # square patches at their places; nothing where there is none
-    columns, rows = (np.round(each / scar.width - 0.5).astype(int) for each in (scar.x, scar.y))
-    low = int(min(columns.min(), rows.min()))
-    grid = np.full((-2 * low, -2 * low), np.nan)
-    grid[rows - low, columns - low] = scale(last)[scar.pairs]
-    edges, norm = along(np.arange(low, -low + 1) * scar.width), Normalize(0.0, scale(float(np.nanmax(last))).item())
-    panels[0, 0].grid(visible=False)
-    panels[0, 0].pcolormesh(edges, edges, np.ma.masked_invalid(grid), norm=norm)
-    panels[0, 0].set(xlabel=along.label("x"), ylabel=along.label("y"), aspect="equal")
-    plot.add_colour_bar(figure, panels[0, :1], norm, scale.label(text), fraction=0.05)
-    return figure, panel, "The contact is symmetric: a quarter is computed, the whole is drawn, here along x"
+    panel.set(xlabel=along.label("x"), ylabel=scale.label(text), xlim=(1.02 * at.min(), 1.02 * at.max()))
+    return figure, panel, "The contact is symmetric: one part is computed, the whole is drawn, along x"
 
 
 def _draw_scar_depth(result: Result, scar: Scar, after: FloatArray) -> Drawn:
     """Depth over x before and after wear, downwards as the surface sinks, with a measured one where there is one."""
-    shown, measured, error = result.shown_point(), result.measured, None
-    last = result.last_reached(shown)
-    scale = scale_for("m", after, *([measured.depth] if measured else []))
-    if result.has("wear_depth_error"):
-        error = np.asarray(result.at("wear_depth_error", shown, last).values, dtype=float)
+    shown, measured, last = result.shown, result.measured, result.last_reached(result.shown)
+    scale, known = scale_for("m", after, *([measured.depth] if measured else [])), result.has("wear_depth_error")
+    error = result.at("wear_depth_error", shown, last).values if known else None
     fields = {"before": np.nan_to_num(depths(result, shown)[0]), f"after {result.cycle_label(last)}": after}
     figure, panel, said = _draw_scar(scar, fields, scale, "depth", error)
     if measured is not None:
-        along = scale_for("m", scar.x)
         # a measured profile may have piled-up edges above the surface
-        panel.plot(along(measured.x), scale(measured.depth), color=COLOURS[2], linewidth=1.2, label="measured")
+        at, depth = scale_for("m", scar.x)(measured.x), scale(measured.depth)
+        panel.plot(at, depth, color=COLOURS[2], linewidth=1.2, label="measured")
     panel.invert_yaxis()
     deepest = f"After {result.cycle_label(last)}. Deepest: {scale.show(float(np.nanmax(after)))}"
     return figure, deepest, said, f"Measured: {measured.name}" if measured else ""

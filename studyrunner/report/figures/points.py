@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 from collections.abc import Collection
 from typing import Any
@@ -15,7 +16,7 @@ from matplotlib.patches import Patch
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn, Table, as_sentences
 from studyrunner.report.panels import COLOURS, FloatArray
-from studyrunner.report.selection import Course, choose, find_course, slow_time, spans_decades
+from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
 from studyrunner.result.view import CONVERGED, NO_VOLUME, Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, measure_of
@@ -46,59 +47,46 @@ _CONVERGED_COLOUR, _OTHERS = "#dfe7ef", (COLOURS[1], COLOURS[0], *COLOURS[2:], "
 
 def draw_trends(result: Result) -> Drawn:
     """Small multiples: one row a quantity, one column an axis. Nothing where only frequency and scheme vary."""
-    quantities = [each for each in find_quantities(result) if np.isfinite(each[2]).any()]
+    quantities = [each for each in _find_quantities(result) if np.isfinite(each[2]).any()]
     if not quantities or all(name in _PLAIN for name in result.varying):
         return None
     # the last of many are the first to go
     axes = [name for name in result.varying if name != SAMPLE][:_MOST_AXES]
     left = [name.replace("_", " ") for name in result.varying if name not in (*axes, SAMPLE)]
     figure, panels = plot.new_panels(len(quantities), len(axes), 0.5 + 1.35 * len(quantities), sharey="row")
-    lowest: dict[str, Axes] = {}
     for row, (label, units, values, errors) in zip(panels, quantities, strict=True):
         scale = scale_for(units, values)
-        # a quantity that is the largest over the frequency has no panel over it
-        known = [name for name in axes if values.shape[result.axes.index(name)] > 1]
         for name, panel in zip(axes, row, strict=True):
-            if name not in known:
-                panel.remove()
-                continue
             _draw_trend(panel, result, name, scale(values), scale(errors))
-            if plot.is_narrow() or name == known[0]:
-                panel.set_ylabel(f"{label}\n({scale.unit})")
-                panel.tick_params(labelleft=True)
-            if above := lowest.get(name):
-                above.set_xlabel("")
-                above.tick_params(labelbottom=False)
-            lowest[name] = panel
-    through = f"Blue: through {result.describe(result.shown_point())}, where most is worn; grey: all other combinations"
+            panel.set_ylabel(f"{label}\n({scale.unit})")
+    plot.label_outer(panels)
+    through = f"Blue: through {result.describe(result.shown)}, where most is worn; grey: all other combinations"
     return figure, through, f"Left out: {', '.join(left)}" if left else ""
 
 
-def find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArray]]:
-    """Label, unit, values and errors (axes...) of what every point has; the largest response over the frequencies."""
+def _find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArray]]:
+    """Label, unit, values and errors (axes...) in the end of what every point has."""
     found = []
     if result.has("worn_volume") and len(result.cycles) > 1:
         worn = np.where(result.computed, result.worn, np.nan)
         found.append(("worn volume\nin the end", "m3", worn, result.errors * worn))
     if result.has("response_amplitude"):
-        amplitude = result.dataset["response_amplitude"].isel(response=0, cycle=-1).transpose(*result.axes)
-        units, of = str(amplitude.attrs.get("units", "m")), f"response\nof {result.responses[0]}"
-        values = np.where(result.computed, amplitude.values, np.nan)
-        if "frequency" in result.varying:
-            values, of = np.fmax.reduce(values, axis=result.axes.index("frequency"), keepdims=True), f"largest {of}"
-        found.append((f"{of} in the end", units, values, np.full(values.shape, np.nan)))
+        last = result.dataset.isel(response=0, cycle=-1).transpose(*result.axes, ...)
+        amplitude = np.where(result.computed, last["response_amplitude"].values, np.nan)
+        wrong = last["response_error"].values if result.has("response_error") else np.nan
+        units = str(last["response_amplitude"].attrs.get("units", "m"))
+        found.append((f"response\nof {result.responses[0]}", units, amplitude, wrong * amplitude))
     return found
 
 
 def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, errors: FloatArray) -> None:
-    """A quantity, as shown, along an axis, through the shown point and all others."""
-    axis, shown, places = result.axes.index(name), result.shown_point(), result.dataset[name].values
+    """A quantity (axes...), as shown, along an axis, through the shown point and all others."""
+    axis, places = result.axes.index(name), result.dataset[name].values
     words = places.dtype.kind not in "fiu"
     order = np.arange(len(places)) if words else np.argsort(places, kind="stable")
     at = order.astype(float) if words else places[order].astype(float)
     drawn, wrong = (np.moveaxis(each, axis, 0)[order] for each in (values, errors))
-    others = [shown[other] for other in result.axes if other != name]
-    through: Any = (slice(None), *(0 if n == 1 else place for n, place in zip(drawn.shape[1:], others, strict=True)))
+    through: Any = (slice(None), *(result.shown[other] for other in result.axes if other != name))
     panel.plot(at, drawn.reshape(len(order), -1), color="0.72", linewidth=0.6, zorder=1)
     look: dict[str, Any] = {"color": COLOURS[0], "marker": "o", "markersize": 3.5, "zorder": 3, "label": "shown point"}
     plot.add_line(panel, at, drawn[through], wrong[through], **look)
@@ -109,13 +97,11 @@ def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, erro
     panel.tick_params(labelsize=_SMALL)
     if not words and name != "frequency" and spans_decades(at):
         plot.set_log(panel.xaxis, float(at[0]), float(at[-1]))
-        return
-    room = (0.15 if len(at) <= 3 else 0.05) * float(np.ptp(at))
-    panel.set_xlim(at[0] - room, at[-1] + room)
-    if words or len(at) <= 3:
+    elif words or len(at) <= 3:
         texts = [str(each) if words else show_number(float(each), 4) for each in places[order]]
         turned: dict[str, Any] = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"}
         panel.set_xticks(at, texts, **(turned if sum(map(len, texts)) > _LONG else {}))
+        panel.margins(x=0.15)
     else:
         panel.locator_params(axis="x", nbins=3)
 
@@ -144,28 +130,18 @@ def _choose(
 ) -> tuple[list[xr.Dataset], list[str], str]:
     """Statistics of combinations of the axes beside samples and `free`, their labels, a sentence on the others."""
     choice = choose(result, [SAMPLE, *free], limit)
-    return (
-        [statistics.isel(point, missing_dims="ignore") for point in choice.points],
-        list(choice.labels),
-        choice.sentence,
-    )
+    others = [name for name in result.axes if name not in free]
+    points = [statistics.isel({name: point[name] for name in others}, missing_dims="ignore") for point in choice.points]
+    return points, list(choice.labels), choice.sentence
 
 
-def draw_bands(result: Result) -> Drawn:
-    """5, 25, 50, 75 and 95 % of the samples over the cycles."""
-    statistics = _statistics(result)
-    return None if statistics is None or statistics.sizes["cycle"] < 2 else _draw_bands(result, statistics, None)
-
-
-def draw_bands_over_course(result: Result) -> Drawn:
-    """5, 25, 50, 75 and 95 % of the samples at the last count over the course."""
-    statistics, course = _statistics(result), find_course(result)
-    if statistics is None or course is None:
+def draw_bands(result: Result, over: str) -> Drawn:
+    """5, 25, 50, 75 and 95 % of the samples over the cycles, or at the last count over the "course"."""
+    statistics, course = _statistics(result), find_course(result) if over == "course" else None
+    if statistics is None or (statistics.sizes["cycle"] < 2 if over == "cycle" else course is None):
         return None
-    return _draw_bands(result, statistics.isel({"cycle": -1, course.axis: course.index}), course)
-
-
-def _draw_bands(result: Result, statistics: xr.Dataset, course: Course | None) -> Drawn:
+    if course:
+        statistics = statistics.isel({"cycle": -1, course.axis: course.index})
     name, axis = "worn_volume_quantile", course.axis if course else "cycle"
     shown, labels, left_out = _choose(result, statistics, [course.axis] if course else [])
     cycles = scale_for(result.counted, statistics["cycle"].values.astype(float))
@@ -279,18 +255,15 @@ def draw_outcomes(result: Result) -> Drawn:
         return None
     choice = choose(result, [course.axis], _MOST_ROWS)
     field = np.array([course.read(result, "outcome", point) for point in choice.points])
-    present = np.unique(field).astype(int)
-    special = [number for number in present.tolist() if number != CONVERGED]
-    colours = {number: _OTHERS[place % len(_OTHERS)] for place, number in enumerate(special)}
-    cells = [colours.get(number, _CONVERGED_COLOUR) for number in present.tolist()]
+    present = np.unique(field).astype(int).tolist()
+    others = itertools.cycle(_OTHERS)
+    cells = {number: _CONVERGED_COLOUR if number == CONVERGED else next(others) for number in present}
     labels = [textwrap.fill(label, _LABEL_WIDTH) if plot.is_narrow() else label for label in choice.labels]
-    height = 1.4 + 0.32 * len(field)
-    figure, panel = plot.new_panel(height)
-    figure.set_figheight(height + 0.15 * sum(label.count("\n") for label in labels))
-    norm = BoundaryNorm([*(present - 0.5), present[-1] + 0.5], len(present))
+    figure, panel = plot.new_panel(1.4 + 0.32 * len(field) + 0.15 * sum(label.count("\n") for label in labels))
+    norm = BoundaryNorm([*(np.array(present) - 0.5), present[-1] + 0.5], len(present))
     look: dict[str, Any] = {"edgecolors": "white", "linewidth": 0.8} if field.size <= _MOST_CELLS else {}
     across, down = (np.arange(size + 1) - 0.5 for size in field.shape[::-1])
-    plot.add_map(panel, across, down, field, norm, cmap=ListedColormap(cells), **look)
+    plot.add_map(panel, across, down, field, norm, cmap=ListedColormap(list(cells.values())), **look)
     panel.invert_yaxis()
     kept = np.arange(0, course.values.size, -(-course.values.size // (4 if plot.is_narrow() else 9)))
     panel.set_xticks(kept, [f"{course.values[index]:.6g}" for index in kept])
@@ -298,9 +271,9 @@ def draw_outcomes(result: Result) -> Drawn:
     panel.set_yticks(np.arange(len(labels)), labels)
     panel.tick_params(length=0)
     panel.spines[:].set_visible(False)
-    words = {number: result.endings[number].word.replace("_", " ") for number in present.tolist()}
-    plot.add_legend(figure, [Patch(facecolor=cell, label=words[n]) for n, cell in zip(words, cells, strict=True)])
-    meaning = [f"{words[number].capitalize()}: {result.endings[number].sentence}" for number in special]
+    words = {number: result.endings[number].word.replace("_", " ") for number in present}
+    plot.add_legend(figure, [Patch(facecolor=cells[number], label=words[number]) for number in present])
+    meaning = (f"{words[number].capitalize()}: {result.endings[number].sentence}" for number in present if number)
     return figure, as_sentences(*meaning), choice.sentence
 
 

@@ -13,10 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import Drawn, as_sentences
+from studyrunner.report.drawing import Drawn
 from studyrunner.report.panels import FloatArray, add_legend, line_style, new_panels, set_log
 from studyrunner.result.view import NO_VOLUME, Result
-from studyrunner.system.progress import count
 from studyrunner.units import show_number, show_percent
 
 KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
@@ -34,7 +33,7 @@ _COMPARED = (
     *("computed", "run_time", "worn_volume", "response_amplitude", "exact_worn_volume", "exact_response_amplitude"),
     *("error_estimate", "response_error", "harmonics_used"),
 )
-_MOST_POINTS, _SHAPES, _SHAPED = 3, "os^DvPX<>p", ("harmonics", "rtol", "samples", "tolerance", "step")
+_SHAPES, _SHAPED = "os^DvPX<>p", ("harmonics", "rtol", "samples", "tolerance", "step")
 _NO_LINE: dict[str, Any] = {"linestyle": "none", "markersize": 5.5}
 _RING = {**_NO_LINE, "marker": "o", "markersize": 11, "markerfacecolor": "none", "markeredgecolor": "black"}
 
@@ -176,58 +175,44 @@ def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:
 
 
 def draw_precision(result: Result) -> Drawn:
-    """One row a point, one column a quantity; nothing where no settings are compared."""
-    points = compare_settings(result)
-    clear = [point for point in points if any(point.is_clear(name).any() for name in QUANTITIES)]
-    if not clear:
-        said = "No error is clearly larger than the uncertainty of the reference: give finer values of a key."
-        return said if points else None
-    # those that wear most
-    order = np.argsort([-float(np.nanmax(point.worn, initial=0.0)) for point in clear], kind="stable")
-    shown = [clear[number] for number in sorted(order[:_MOST_POINTS].tolist())]
-    quantities = [name for name in QUANTITIES if any(point.is_clear(name).any() for point in shown)]
-    figure, panels = new_panels(len(shown), len(quantities), 0.3 + 2.4 * len(shown))
-    settings = points[0].settings
-    lines = {scheme: line_style(n) for n, scheme in enumerate(dict.fromkeys(each.scheme for each in settings))}
+    """Errors of the settings at the shown point, one column a quantity; nothing where no settings are compared."""
+    where = result.describe(result.shown, set(result.varying) - set(KEYS))
+    point = next((each for each in compare_settings(result) if each.label == where), None)
+    if point is None:
+        return None
+    quantities = [name for name in QUANTITIES if point.is_clear(name).any()]
+    if not quantities:
+        return "Here no error is clearly larger than the uncertainty of the reference: give finer values of a key."
+    figure, (panels,) = new_panels(1, len(quantities), 3.0)
+    schemes = dict.fromkeys(each.scheme for each in point.settings)
+    lines = {scheme: line_style(number) for number, scheme in enumerate(schemes)}
     lines = {scheme: {key: look[key] for key in ("color", "linestyle")} for scheme, look in lines.items()}
     # the first other key that varies has the shapes
     key = next((key for key in _SHAPED if key in result.varying), "scheme")
-    values = {getattr(each, key) for each in settings if key != "scheme"} - {None}
+    values = {getattr(each, key) for each in point.settings if key != "scheme"} - {None}
     ordered = sorted(values, key=lambda value: math.inf if isinstance(value, str) else value)
     shapes = dict(zip(ordered, itertools.cycle(_SHAPES), strict=False))
-    markers = [shapes.get(getattr(each, key), "h") for each in settings]
-    for row, point in zip(panels, shown, strict=True):
-        for panel, quantity in zip(row, quantities, strict=True):
-            _draw_panel(panel, point, quantity, lines, markers)
-            panel.set_ylabel(f"error of {QUANTITIES[quantity]}")
-        # one title a row: it goes on above the panels to its right
-        row[0].set_title(point.label, loc="left")
-    for panel in panels[-1]:
-        panel.set_xlabel("CPU time of one point (s)")
+    markers = [shapes.get(getattr(each, key), "h") for each in point.settings]
+    for panel, quantity in zip(panels, quantities, strict=True):
+        _draw_panel(panel, point, quantity, lines, markers)
+        panel.set(xlabel="CPU time of one point (s)", ylabel=f"error of {QUANTITIES[quantity]}")
     meaning = {scheme or "all": look for scheme, look in lines.items()}
     meaning |= {
         Setting(**{key: each}).describe(): {"marker": s, "color": "0.3", **_NO_LINE} for each, s in shapes.items()
     }
     meaning["cheapest for its error"] = _RING
     add_legend(figure, [Line2D([], [], label=label, **look) for label, look in meaning.items()])
-    references, left = [], len(points) - len(shown)
-    for point in shown:
-        said = "errors are those against the exact answer"
-        if point.reference is not None:
-            each = (f"{show_percent(point.uncertainty[name])} ({words})" for name, words in QUANTITIES.items())
-            finest = settings[point.reference].describe()
-            said = f"errors are those against the finest setting ({finest}), known to {' and '.join(each)}"
-        references.append(f"{point.label or 'Reference'}: {said}")
-    return figure, as_sentences(*references), f"{count(left, 'other point')} not drawn" if left else ""
+    said = "errors are those against the exact answer"
+    if point.reference is not None:
+        each = (f"{show_percent(point.uncertainty[name])} ({words})" for name, words in QUANTITIES.items())
+        finest = point.settings[point.reference].describe()
+        said = f"errors are those against the finest setting ({finest}), known to {' and '.join(each)}"
+    return figure, f"{point.label or 'Reference'}: {said}"
 
 
 def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, lines: Mapping[Any, Any], markers: list[str]) -> None:
     """lines: look of each scheme. markers: of each setting."""
     errors, time, clear = point.errors[quantity], point.time, point.is_clear(quantity)
-    if not clear.any():
-        # the same for all settings
-        panel.set_axis_off()
-        return
     least = RESOLVED * point.uncertainty[quantity]
     bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > _ROUND_OFF) & np.isfinite(errors)])
     drawn, known = np.maximum(errors, bottom), np.isfinite(errors)

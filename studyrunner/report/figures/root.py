@@ -6,7 +6,6 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -14,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn
 from studyrunner.report.figures.flanks import largest_pair
-from studyrunner.report.panels import COLOURS, MAP, FloatArray
+from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.root import (
     MESH,
     RootSurface,
@@ -48,7 +47,7 @@ def _read_surface(result: Result) -> RootSurface | None:
 
 def draw_root(result: Result) -> Drawn:
     """The worn shape of the shown point, coloured with its wear depth; the mean pressure where nothing is worn."""
-    shown, surface = result.shown_point(), _read_surface(result)
+    shown, surface = result.shown, _read_surface(result)
     if surface is None or not (has_depths(result) or result.has("mean_pressure")):
         return None
     last = result.last_reached(shown)
@@ -69,7 +68,7 @@ def draw_root(result: Result) -> Drawn:
 
 def draw_fraction(result: Result, name: str) -> Drawn:
     """Fraction of the period in which pairs slip, or are open, at the shown point: a large amplitude."""
-    values, surface = np.asarray(result.at(name, result.shown_point()).values, dtype=float), _read_surface(result)
+    values, surface = np.asarray(result.at(name, result.shown).values, dtype=float), _read_surface(result)
     if surface is None:
         return None
     if not np.isfinite(values).all():
@@ -82,14 +81,14 @@ def draw_fraction(result: Result, name: str) -> Drawn:
 def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale: Scale, label: str) -> Figure:
     """The root with these nodes, and its contact surfaces from close by, coloured by values of the pairs in SI."""
     views = find_views(surface)
-    close_ups = [view for view in views[:-1] if view.body == views[0].body][:_MOST_CLOSE_UPS]
+    close_ups = views[:-1][:_MOST_CLOSE_UPS]
     ratios = [1.0] + [2.0] * len(close_ups)
     figure, (panels,) = plot.new_panels(1, len(ratios), 3.4, width_ratios=ratios)
     norm = Normalize(0.0, scale(float(of_pairs.max())).item() or 1.0)
     at_nodes = np.full(len(nodes), np.nan)
-    at_nodes[surface.contact.nodes] = scale(of_pairs[surface.contact.pairs])
-    colours, own = rgb(surface.bodies, surface.body), surface.contact.flank >= 0
-    colours[own] = mpl.colormaps[MAP](norm(at_nodes[surface.faces[own]].mean(axis=1)))[:, :3]
+    at_nodes[surface.own] = scale(of_pairs[surface.pairs])
+    colours, own = rgb(surface.bodies, surface.body), surface.flank >= 0
+    colours[own] = mpl.colormaps[mpl.rcParams["image.cmap"]](norm(at_nodes[surface.faces[own]].mean(axis=1)))[:, :3]
     for panel, view in zip(panels, [views[-1], *close_ups], strict=True):
         faces = surface.faces[view.faces]
         paint_faces(panel, nodes, faces, colours[view.faces], view)
@@ -121,9 +120,7 @@ def draw_disk(result: Result) -> Drawn:
 
 
 def draw_sector(result: Result) -> Drawn:
-    """The natural frequencies over the nodal diameter, and the mesh beside them where the file holds one."""
-    if not result.has("natural_frequency") and "natural_frequencies" not in result.recomputed:
-        return "Use study-report --natural-frequencies, or add natural_frequency to [outputs] variables."
+    """The natural frequencies over the nodal diameter, a line a mode, and the mesh beside them where there is one."""
     has_mesh = result.has(*MESH)
     ratios = [1.0, 1.7] if has_mesh else [1.0]
     figure, (panels,) = plot.new_panels(1, len(ratios), 4.0, width_ratios=ratios)
@@ -133,27 +130,21 @@ def draw_sector(result: Result) -> Drawn:
         view = from_aslant(nodes, len(faces))
         paint_faces(panels[0], nodes, faces, rgb(tuple(names.tolist()), body), view)
         draw_scale_bar(panels[0], nodes, view)
-    said = f"Of the sector at {result.describe(result.shown_point(), result.fixed)}" if result.fixed else ""
-    return figure, _draw_frequencies(result, panels[-1]), said
-
-
-def _draw_frequencies(result: Result, panel: Axes) -> str:
-    """Frequencies (nodal_diameter, mode) over the nodal diameter, one line a mode; what is seen."""
-    source = result.recomputed.get("natural_frequencies", result.dataset)
-    frequencies = source["natural_frequency"].transpose("nodal_diameter", "mode").values
-    for number, mode in enumerate(frequencies.T):
+    panel, own = panels[-1], result.dataset["natural_frequency"].transpose("nodal_diameter", "mode")
+    for number, mode in enumerate(own.values.T):
         style = {"linewidth": 0.8, "markersize": 3.5, "marker": plot.line_style(number)["marker"], "color": "0.35"}
-        label = f"_mode {number + 1}"
-        panel.plot(source["nodal_diameter"].values, mode, markerfacecolor=COLOURS[0], label=label, **style)
-    plot.set_from_zero(panel, float(np.nanmax(frequencies)))
+        style |= {"markerfacecolor": COLOURS[0], "label": f"_mode {number + 1}"}
+        panel.plot(own["nodal_diameter"].values, mode, **style)
+    plot.set_from_zero(panel, float(np.nanmax(own.values)))
     panel.set(xlabel="nodal diameter", ylabel="natural frequency (Hz)")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+    said = f"With the joint stuck, {own.sizes['mode']} modes, the lowest at {np.nanmin(own.values):.4g} Hz"
+    of = f"Of the sector at {result.describe(result.shown, result.fixed)}" if result.fixed else ""
     diameter = result.study.get("scene", {}).get("nodal_diameter")
-    text = f"With the joint stuck, {frequencies.shape[1]} modes, the lowest at {np.nanmin(frequencies):.4g} Hz"
     if not isinstance(diameter, int) or "frequency" not in result.dataset.coords:
-        return text
+        return figure, said, of
     ends = [float(end(result.dataset["frequency"].values)) for end in (np.min, np.max)]
     star: dict[str, Any] = {"marker": "*", "markersize": 11, "label": "this study", "clip_on": False, "zorder": 5}
     panel.plot([diameter, diameter], ends, color=COLOURS[1], **star)
     span = " to ".join(dict.fromkeys(f"{each:.6g}" for each in ends))
-    return f"{text}. Star: this study, {span} Hz at nodal diameter {diameter}"
+    return figure, f"{said}. Star: this study, {span} Hz at nodal diameter {diameter}", of

@@ -4,17 +4,16 @@ missions by block, with the vibration of each block.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn, Table
-from studyrunner.report.panels import COLOURS, FloatArray
+from studyrunner.report.panels import FloatArray
 from studyrunner.report.selection import (
     Choice,
     Course,
@@ -31,7 +30,17 @@ from studyrunner.units import Scale, scale_for, show_number, show_percent
 
 _MOST_LINES, _MOST_MAPS = 6, 4
 _LARGE: dict[str, Any] = {"linestyle": "none", "markersize": 9, "markerfacecolor": "none", "color": "black"}
-_ENDS = {"response_amplitude_begin": "begin", "response_amplitude": "end"}
+
+LISTED = (
+    *("excitation_frequency_begin", "excitation_frequency", "block_cycles", "sweep_rate"),
+    *("block_worn_volume", "block_worn_volume_error"),
+)
+SHARES = {"block_share": "share of the wear in a mission", "block_worn_volume": "worn volume"}
+RESPONSES = {
+    "response_amplitude_begin": "amplitude at the beginning",
+    "response_amplitude": "amplitude at the end",
+}
+"""Variables of the blocks that are drawn, in words."""
 
 
 # --- over slow time ---
@@ -43,7 +52,7 @@ def draw_history(result: Result) -> Drawn:
         return f"The file holds {result.cycle_label(0)} only: set [slow_time]."
     largest = float(np.nanmax(result.dataset["worn_volume"].values, initial=0.0))
     wears, axis = largest > NO_VOLUME, course_axis(result)
-    scale, choice = scale_for("m3", largest if wears else 0.0), _choose_lines(result, *([axis] if axis else []))
+    scale, choice = scale_for("m3", largest if wears else 0.0), choose(result, [axis] if axis else [], _MOST_LINES)
     (figure, panel), cycles = plot.new_panel(3.4), scale_for(result.counted, result.cycles)
     highest, ends = _draw_over_cycles(result, panel, "worn_volume", choice, scale), []
     for number, (point, label) in enumerate(choice):
@@ -62,7 +71,7 @@ def draw_excitation(result: Result) -> Drawn:
     """Frequency of an excitation that follows the resonance; nothing where the study gives the frequency."""
     if not result.followed or len(result.cycles) == 1:
         return None
-    choice, (figure, panel) = _choose_lines(result), plot.new_panel(3.4)
+    choice, (figure, panel) = choose(result, [], _MOST_LINES), plot.new_panel(3.4)
     _draw_over_cycles(result, panel, "excitation_frequency", choice, Scale(1.0, "Hz"))
     panel.set_ylabel("frequency (Hz)")
     return figure, f"The excitation follows the {result.followed}", choice.sentence
@@ -70,12 +79,6 @@ def draw_excitation(result: Result) -> Drawn:
 
 def _at_the_end(result: Result) -> str:
     return "at the end" if result.has("cycle_count") else f"at {result.cycle_label(-1)}"
-
-
-def _choose_lines(result: Result, *free: str) -> Choice:
-    """Combinations that have a line over slow time each, at the shown point along `free`."""
-    choice = choose(result, free, _MOST_LINES)
-    return replace(choice, points=tuple({**result.shown_point(), **point} for point in choice.points))
 
 
 def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: Choice, scale: Scale) -> float:
@@ -102,7 +105,7 @@ def _mark_events(result: Result, panel: Axes, point: Point, cycles: Scale, scale
     if np.isfinite(jump):
         volume = scale(np.interp(jump, counts, worn))
         panel.plot(cycles(jump), volume, "*", markersize=12, label="branch lost, jump", color=colour)
-    if not result.computed[tuple(point[name] for name in result.axes)] and reached.size:
+    if not result.computed[result.place(point)] and reached.size:
         last = reached[-1]
         panel.plot(cycles(float(counts[last])), scale(worn[last]), "X", markersize=9, label="ended early", color=colour)
     if result.has("exact_worn_volume"):
@@ -112,7 +115,7 @@ def _mark_events(result: Result, panel: Axes, point: Point, cycles: Scale, scale
 
 def _with_error(result: Result, point: Point) -> str:
     """The error of a final worn volume in words: " ± 3 %", with what is to be said where it is above rtol."""
-    place = tuple(point[name] for name in result.axes)
+    place = result.place(point)
     if not result.computed[place] or not 0.0 < result.errors[place] < np.inf:
         return ""
     remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
@@ -120,15 +123,6 @@ def _with_error(result: Result, point: Point) -> str:
 
 
 # --- over an axis of the study ---
-
-
-def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[Choice, list[FloatArray]]:
-    """Combinations with a result anywhere along the course, and their values (course, cycle)."""
-    choice = choose(result, [course.axis], limit)
-    found = [(point, label, course.read(result, name, point)) for point, label in choice]
-    # the shown point has a result: there is at least one
-    points, labels, fields = zip(*(one for one in found if not np.isnan(one[2]).all()), strict=True)
-    return Choice(points, labels, choice.sentence), list(fields)
 
 
 def _worn_over(result: Result) -> Course | None:
@@ -142,30 +136,28 @@ def draw_final(result: Result) -> Drawn:
     course = _worn_over(result)
     if course is None:
         return None
-    choice, fields = _read_known(result, course, "worn_volume", _MOST_LINES)
-    every = choose(result, [course.axis], _MOST_LINES).points
-    failed = np.array([np.isnan(course.read(result, "worn_volume", point)[:, 0]) for point in every])
+    choice = choose(result, [course.axis], _MOST_LINES)
+    fields = np.array([course.read(result, "worn_volume", point) for point in choice.points])
+    name = "error_estimate"
+    known = [course.read(result, name, point) if result.has(name) else fields[0, :, 0] * 0.0 for point in choice.points]
+    failed = np.isnan(fields[..., 0])
     # of a point that ended early, what was worn by then
-    reached = [np.where(np.isnan(field).all(axis=1), np.nan, np.nan_to_num(field).max(axis=1)) for field in fields]
-    largest = [float(np.nanmax(each, initial=0.0)) for each in reached]
-    scale, (figure, panel) = scale_for("m3", largest), plot.new_panel(3.4)
-    top, errors = scale(max(largest)).item(), []
-    highest = top
-    for number, ((point, label), field) in enumerate(zip(choice, fields, strict=True)):
-        error = course.read(result, "error_estimate", point) if result.has("error_estimate") else np.zeros(len(field))
-        errors.append(error)
-        look = course.line_style(number) | {"label": label or "computed"}
-        reach = plot.add_line(panel, course.values, scale(field[:, -1]), scale(error * field[:, -1]), **look)
-        highest = max(highest, min(reach, 2.0 * top))
+    reached = np.where(np.isnan(fields).all(axis=-1), np.nan, np.nan_to_num(fields).max(axis=-1))
+    number, place = map(int, np.unravel_index(int(np.nanargmax(reached)), reached.shape))
+    scale, (figure, panel) = scale_for("m3", reached), plot.new_panel(3.4)
+    highest = top = float(scale(reached[number, place]))
+    for line, (label, values, error) in enumerate(zip(choice.labels, fields[..., -1], known, strict=True)):
+        if not failed[line].all():
+            look = course.line_style(line) | {"label": label or "computed"}
+            reach = plot.add_line(panel, course.values, scale(values), scale(error * values), **look)
+            highest = max(highest, min(reach, 2.0 * top))
     _mark_care(result, panel, course, choice, scale(reached))
     plot.set_from_zero(panel, highest)
     crosses = plot.mark_failed(panel, course.values, failed)
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume {_at_the_end(result)}"))
-    number = int(np.argmax(largest))
-    place = int(np.nanargmax(reached[number]))
-    known = f" ± {show_percent(errors[number][place])}" if errors[number][place] > 0.0 else ""
-    text = f"Largest: {scale.show(largest[number], 4)}{known} at {course.at(result, place)}"
+    wrong = f" ± {show_percent(known[number][place])}" if known[number][place] > 0.0 else ""
+    text = f"Largest: {scale.show(float(reached[number, place]), 4)}{wrong} at {course.at(result, place)}"
     return figure, labelled(text, choice.labels[number]), crosses, choice.sentence
 
 
@@ -185,12 +177,12 @@ def draw_map(result: Result, name: str) -> Drawn:
     course = _worn_over(result)
     if course is None or result.has("cycle_count"):
         return None
-    cycles = scale_for(result.counted, result.cycles)
-    choice, fields = _read_known(result, course, name, _MOST_MAPS)
-    largest = [float(np.nanmax(field, initial=0.0)) for field in fields]
-    scale = scale_for("m3" if name == "worn_volume" else f"m3 per {result.counted[:-1]}", largest)
+    cycles, choice = scale_for(result.counted, result.cycles), choose(result, [course.axis], _MOST_MAPS)
+    fields = np.array([course.read(result, name, point) for point in choice.points])
+    place = tuple(map(int, np.unravel_index(int(np.nanargmax(fields)), fields.shape)))
+    scale = scale_for("m3" if name == "worn_volume" else f"m3 per {result.counted[:-1]}", fields)
     figure, panels = plot.panel_grid(choice.labels, 2.7, sharex=True)
-    norm = Normalize(0.0, scale(max(largest)).item() or 1.0)
+    norm = Normalize(0.0, scale(fields[place]).item() or 1.0)
     # half a cell at both ends: nothing is known beyond
     rows = np.clip(cell_edges(cycles(result.cycles)), cycles(result.cycles[0]), cycles(result.cycles[-1]))
     for panel, field in zip(panels.flat, fields, strict=True):
@@ -200,88 +192,58 @@ def draw_map(result: Result, name: str) -> Drawn:
     for panel in panels[-1]:
         course.set_axis(panel)
     plot.add_colour_bar(figure, panels, norm, scale.label(name.replace("_", " ")))
-    number = int(np.argmax(largest))
-    place, cycle = map(int, np.unravel_index(int(np.nanargmax(fields[number])), fields[number].shape))
-    text = f"{scale.show(largest[number], 4)} at {course.at(result, place)}, {result.cycle_label(cycle)}"
-    return figure, labelled(f"Largest: {text}", choice.labels[number]), choice.sentence
+    text = f"{scale.show(float(fields[place]), 4)} at {course.at(result, place[1])}, {result.cycle_label(place[2])}"
+    return figure, labelled(f"Largest: {text}", choice.labels[place[0]]), choice.sentence
 
 
 # --- of missions, by block ---
 
 
-def _read_blocks(result: Result) -> xr.Dataset:
-    """What belongs to blocks at the shown point."""
-    assert result.blocks is not None
-    return result.blocks.isel(result.shown_point(), missing_dims="ignore")
-
-
 def list_blocks(result: Result) -> Drawn:
     """Frequency, cycles, worn volume with its error, and share of each block at the last number of missions."""
-    blocks = _read_blocks(result)
-    nothing = np.full((len(result.cycles), blocks.sizes["block"]), np.nan)
-    worn, wrong = (
-        blocks[name].values if name in blocks else nothing for name in ("block_worn_volume", "block_worn_volume_error")
-    )
+    assert result.blocks is not None
+    blocks = result.blocks.isel(result.shown, missing_dims="ignore")
+    worn = blocks["block_worn_volume"].values
     reached = np.flatnonzero(np.isfinite(worn).all(axis=1))
     last = int(reached[-1]) if reached.size else 0
     scale, total, rows = scale_for("m3", worn[last]), float(worn[last].sum()), []
-    names = ("excitation_frequency_begin", "excitation_frequency", "block_cycles", "sweep_rate")
-    numbers = [blocks[name].values if name in blocks else nothing[0] for name in names]
-    for name, volume, error, begin, end, cycles, rate in zip(
-        blocks["block"].values, worn[last].tolist(), wrong[last].tolist(), *numbers, strict=True
-    ):
-        frequency = " to ".join(dict.fromkeys(map(show_number, (float(begin), float(end)))))
+    numbers = [
+        worn[last],
+        blocks["block_worn_volume_error"].values[last],
+        *(blocks[name].values for name in LISTED[:4]),
+    ]
+    for name, *values in zip(blocks["block"].values, *numbers, strict=True):
+        volume, error, begin, end, cycles, rate = map(float, values)
         amount = scale.show(volume, 4) if reached.size else "-"
         amount += f" ± {show_percent(error)}" if error > 0.0 else ""
         share = show_percent(volume / total) if total > NO_VOLUME else "-"
+        frequency = " to ".join(dict.fromkeys(map(show_number, (begin, end))))
         passage = f"{rate:.2g}" if rate > 0.0 else "-"
-        rows.append((str(name), frequency, show_number(float(cycles), 4), amount, share, passage))
+        rows.append((str(name), frequency, show_number(cycles, 4), amount, share, passage))
     columns = ("block", "frequency (Hz)", "cycles", "worn volume", "share", "rate over (zeta f)²")
     return Table(columns, tuple(rows), f"Wear after {result.cycle_label(last)}." if reached.size else "")
 
 
-def _draw_blocks(result: Result, panel: Axes, blocks: xr.Dataset, values: FloatArray, scale: Scale, error: str) -> None:
-    """A line a block of values (n_missions, n_blocks), with bands of their relative errors of this name."""
-    for place, name in enumerate(blocks["block"].values):
-        own = scale(values[:, place])
-        wrong = blocks[error].values[:, place] * own if error in blocks else None
-        look = plot.line_style(place, len(own)) | {"label": str(name)}
-        plot.add_line(panel, result.cycles, own, wrong, band=True, **look)
-    plot.set_from_zero(panel, float(np.nanmax(scale(values), initial=0.0)))
-
-
-def draw_shares(result: Result) -> Drawn:
-    """Above, the shares of the blocks in the wear of one mission, on top of each other; below, their worn volumes."""
-    blocks = _read_blocks(result)
-    worn, shares = blocks["block_worn_volume"].values, blocks["block_share"].values
-    if len(result.cycles) == 1 or not np.nanmax(worn, initial=0.0) > NO_VOLUME:
+def draw_blocks(result: Result, names: Mapping[str, str]) -> Drawn:
+    """Variables of the blocks at the shown point over the missions: a panel a variable, a line a block."""
+    assert result.blocks is not None
+    blocks = result.blocks.isel(result.shown, missing_dims="ignore")
+    if len(result.cycles) == 1 or not np.nanmax(blocks[list(names)[-1]].values, initial=0.0) > NO_VOLUME:
         return None
-    figure, ((above,), (below,)) = plot.new_panels(2, 1, 5.2, sharex=True)
-    colours = [COLOURS[place % len(COLOURS)] for place in range(shares.shape[1])]
-    patches = above.stackplot(result.cycles, 100.0 * np.nan_to_num(shares).T, colors=colours, alpha=0.75)
-    for patch in patches[len(COLOURS) :]:
-        # beyond the colours there are, the same ones with hatches
-        patch.set_hatch("///")
-    above.set(ylabel="share in a mission (%)", ylim=(0.0, 100.0), xlim=(0.0, result.cycles[-1]))
-    scale = scale_for("m3", worn)
-    _draw_blocks(result, below, blocks, worn, scale, "block_worn_volume_error")
-    below.set(ylabel=scale.label("worn volume"), xlabel="missions")
-    plot.add_legend(figure, below.get_lines())
-    return (figure,)
-
-
-def draw_block_responses(result: Result) -> Drawn:
-    """Amplitude of the first response over the missions, at the start of each block and at its end."""
-    if len(result.cycles) == 1:
-        return None
-    blocks = _read_blocks(result)
-    ends = [name for name in _ENDS if name in blocks]
-    figure, panels = plot.new_panels(1, len(ends), 3.6, sharey=True)
-    amplitudes = [blocks[name].isel(response=0).values for name in ends]
-    scale = scale_for("m", *amplitudes)
-    for panel, amplitude, end in zip(panels[0], amplitudes, ends, strict=True):
-        _draw_blocks(result, panel, blocks, amplitude, scale, "response_error")
-        panel.set(title=f"at the {_ENDS[end]} of the block", xlabel="missions", xlim=(0.0, result.cycles[-1]))
-    plot.set_from_zero(panels[0, 0], max(float(np.nanmax(scale(each), initial=0.0)) for each in amplitudes))
-    panels[0, 0].set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
-    return figure, f"{len(result.responses) - 1} more responses are in the file" if len(result.responses) > 1 else ""
+    figure, panels = plot.new_panels(2, 1, 5.6, sharex=True)
+    for panel, (name, words) in zip(panels[:, 0], names.items(), strict=True):
+        values = blocks[name].isel(response=0, missing_dims="ignore").values
+        wrong = "response_error" if "response" in blocks[name].dims else f"{name}_error"
+        unit = str(blocks[name].attrs.get("units", "1"))
+        scale = Scale(100.0, "%") if unit == "1" else scale_for(unit, values)
+        for place, block in enumerate(blocks["block"].values):
+            own = scale(values[:, place])
+            error = blocks[wrong].values[:, place] * own if wrong in blocks else None
+            plot.add_line(
+                panel, result.cycles, own, error, band=True, label=str(block), **plot.line_style(place, own.size)
+            )
+        plot.set_from_zero(panel, float(np.nanmax(scale(values), initial=0.0)))
+        panel.set_ylabel(scale.label(words))
+    panels[-1, 0].set(xlabel="missions", xlim=(0.0, result.cycles[-1]))
+    of_first = names is RESPONSES and len(result.responses) > 1
+    return figure, f"Of {result.responses[0]}; the others are in the file" if of_first else ""

@@ -61,7 +61,7 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
         return None
     if result.has("cycle_count"):
         notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
-    shown = result.shown_point()
+    shown = dict(result.shown)
     last = 0 if result.has_modes else result.last_reached(shown)
     floats = math.inf if result.has_modes else limit / _CHARACTERS_A_FLOAT
     arrays, kept = _fit(dict(_arrays(result)), floats, notes)
@@ -89,7 +89,7 @@ def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
             continue
         if "phase" in array.dims:
             phases = slice(None, None, -(-array.sizes["phase"] // _MOST_PHASES))
-            array = array.sel(contact=find_loops(result, result.shown_point())).isel(phase=phases)
+            array = array.sel(contact=find_loops(result, result.shown)).isel(phase=phases)
             array = array.rename(contact=_LOOPS)
         if array.size:
             yield str(name), array
@@ -196,11 +196,11 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
         notes.append(
             f"In three dimensions are {len(surface.faces)} of {len(whole.faces)} faces, those near the contact."
         )
-    views, contact, shown = find_views(surface), surface.contact, result.shown_point()
+    views, shown = find_views(surface), result.shown
     seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
-    of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": contact.flank}
-    pairs = pairs_of_scene(result, shown)[contact.pairs]
-    of_contact = {"nodes": contact.nodes, "pairs": pairs, "normals": contact.normals}
+    of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": surface.flank}
+    pairs = pairs_of_scene(result, shown)[surface.pairs]
+    of_contact = {"nodes": surface.own, "pairs": pairs, "normals": surface.normals}
     directions = [{"eye": view.to_eye, "up": view.up} for view in views]
     return {
         **{name: encode_floats(values) for name, values in (of_faces | {"seen": np.asarray(seen)}).items()},

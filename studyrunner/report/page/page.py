@@ -1,27 +1,27 @@
 """One HTML page of a result, with everything inside: opens from a disk, without a network.
 
-A template puts it together and escapes all texts; only scripts, the style sheet and the numbers are taken as they are.
+A template puts it together and escapes all texts; only scripts, the style sheet, the numbers, and the SVG files that
+matplotlib has written, are taken as they are.
 """
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from studyrunner.coordinates import COORDINATES
-from studyrunner.report.drawing import Drawing, Item, Missing, Table
+from studyrunner.report.drawing import Drawing, Item, Missing
 from studyrunner.report.page.data import build_page_data, build_root_numbers
-from studyrunner.result.certainty import advise_ended, describe_ended, describe_ends
+from studyrunner.result.certainty import advise_ended, describe_ended
 from studyrunner.result.view import CONVERGED, Result
 from studyrunner.summary.answer import summarise
-from studyrunner.summary.lines import summary_rows
 from studyrunner.system.progress import count
 from studyrunner.units import show_number, units_of
 from studyrunner.user_error import show_text
@@ -33,54 +33,39 @@ _SCRIPTS = ("panel.js", "root.js", "page.js")  # each uses what stands in those 
 _MOST_VALUES = 12
 
 
-@dataclass(frozen=True)
-class Shown:
-    """A drawing as it stands on the page: pictures for wide and narrow windows as data, and names of its files."""
-
-    name: str
-    title: str
-    caption: str
-    wide: str
-    narrow: str
-    files: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Written:
-    """What was written. n_bytes: of the page."""
-
-    n_drawings: int
-    n_tables: int
-    n_missing: int
-    n_bytes: int
-
-
-def write_page(result: Result, items: Iterable[Item], path: Path) -> Written:
-    """Write the page, and beside it the files of each drawing, into a folder that exists.
+def write_page(result: Result, items: Iterable[Item], path: Path) -> str:
+    """Write the page, and beside it the files of each drawing, into a folder that exists; what is there, in words.
 
     An older page is replaced when the new one is complete. Raises OSError where something cannot be written.
     """
-    parts = [_save(item, path.parent) if isinstance(item, Drawing) else item for item in items]
+    counts, parts = Counter[str](), list[Any]()
+    for item in items:
+        counts[type(item).__name__] += 1
+        parts.append(_save(item, path.parent) if isinstance(item, Drawing) else item)
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
         partial.write_text(_build_page(result, parts), encoding="utf-8", newline="\n")
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
-    kinds = Counter(type(part) for part in parts)
-    return Written(kinds[Shown], kinds[Table], kinds[Missing], path.stat().st_size)
+    shown = f"{count(counts['Drawing'], 'figure')}, {count(counts['Table'], 'table')}, {counts['Missing']} left out"
+    return f"{shown}, {path.stat().st_size / 1e6:.1f} MB"
 
 
-def _save(drawing: Drawing, folder: Path) -> Shown:
+def _save(drawing: Drawing, folder: Path) -> dict[str, Any]:
+    """A drawing as it stands on the page: pictures for wide and narrow windows, and names of its files.
+
+    Parts of SVG files with one id are equal: matplotlib makes the ids of what is referred to from their contents.
+    """
     paths = drawing.save(folder)
-    # in pictures of its own the ids of an SVG file, which matplotlib names alike, do not meet those of another
-    wide, narrow = (f"data:image/svg+xml;base64,{base64.b64encode(path.read_bytes()).decode()}" for path in paths)
+    wide, narrow = (text[text.index("<svg") :] for text in (path.read_text(encoding="utf-8") for path in paths))
     files = [f"{drawing.name}.{kind}" for kind in ("svg", "png", "csv")] + [paths[1].name]
-    there = tuple(name for name in files if (folder / name).exists())
-    return Shown(drawing.name, drawing.title, drawing.caption, wide, narrow, there)
+    there = [name for name in files if (folder / name).exists()]
+    about = {"name": drawing.name, "title": drawing.title, "caption": drawing.caption}
+    return {**about, "wide": wide, "narrow": narrow, "files": there}
 
 
-def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str:
+def _build_page(result: Result, parts: Sequence[Any]) -> str:
     """The page as text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
@@ -96,8 +81,7 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
         title=result.title,
         file=show_text(result.path.name),
         css=own.joinpath("page.css").read_text("utf-8"),
-        answer=summary_rows(summarise(result)),
-        ends=describe_ends(result),
+        answer=summarise(result).rows,
         endings=_endings(result),
         facts=_facts(result),
         study=result.dataset.attrs.get("study"),
@@ -115,14 +99,20 @@ def _endings(result: Result) -> list[tuple[str, list[str]]]:
     numbers, found = Counter(result.dataset["outcome"].values.ravel().tolist()), []
     for number, ending in sorted(result.endings.items()):
         if numbers[number] and number != CONVERGED:
-            meaning = " ".join((ending.sentence, *advise_ended(result, number)))
+            meaning = f"{ending.sentence} {advise_ended(result, number)}".rstrip()
             found.append((f"{count(numbers[number], 'point')}: {meaning}", describe_ended(result, number)))
     return found
 
 
 def _facts(result: Result) -> list[tuple[str, str]]:
-    """Names and values: axes, contact pairs, versions."""
-    facts = []
+    """Names and values: points, axes, contact pairs, versions."""
+    ends = {
+        "computed to the end": result.computed,
+        "ended early with values up to there": result.has_values & ~result.computed,
+        "without a result": ~result.has_values,
+    }
+    ended = ", ".join(f"{np.count_nonzero(where)} {words}" for words, where in ends.items() if where.any())
+    facts = [("points", f"{result.computed.size}: {ended}")]
     for name in result.axes:
         axis = result.dataset[name]
         numbers, units = axis.dtype.kind in "fiu", units_of(axis)

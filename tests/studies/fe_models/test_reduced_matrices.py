@@ -13,10 +13,9 @@ from studies.fe_models.from_files.model import find_files, load_model, reduce_mo
 from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.pairing import local_frames
 from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
-from studies.scene_answers import stuck_frequencies
+from studies.scene import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scene_file import read_scene, write_scene
-from studies.scenes import shrouded_sector
 from tests.studies.fe_models.matrix_files import REDUCED
 from tests.studies.shrouded_ring import stubby
 
@@ -42,7 +41,7 @@ class Sector:
     """
 
     def __init__(self):
-        model, self.joint = shrouded_sector.define_sector(PARAMETERS)
+        model, self.joint = PARAMETERS.define_sector()
         self.mesh, contact, cut = model.mesh, self.joint.contacts[0], self.joint.cut
         loose = ~self.joint.held.any(axis=1)
         self.left, self.right = cut.left[loose[cut.left]], cut.right[loose[cut.right]]

@@ -15,7 +15,6 @@ from studyrunner.report.drawing import Drawing
 from studyrunner.report.page.data import build_page_data
 from studyrunner.result.view import open_for_report
 from tests.studyrunner.faked_blocks import STUDY, FakedBlocks
-from tests.studyrunner.report.cases import numbers_of
 
 pytestmark = pytest.mark.slow
 
@@ -65,18 +64,20 @@ def test_figures_of_blocks_have_the_numbers_of_the_file(results):
     found = items(results / "one.nc")
     with xr.open_dataset(results / "one.nc") as dataset:
         one = dataset.squeeze().load()
-    lines = {name: rows for name, rows in numbers_of(found["block_shares"]).items() if name.split("|")[1] in BLOCKS}
-    for rows, name in zip(lines.values(), BLOCKS, strict=True):
-        expected = [one.mission, 1e9 * one.block_worn_volume.sel(block=name)]
-        np.testing.assert_allclose(rows[-len(one.mission) :, :2].T, expected, rtol=1e-8)
-    panels = found["block_responses"].figure.axes
-    for panel, name in zip(panels, ("response_amplitude_begin", "response_amplitude"), strict=True):
-        for place, (line, band) in enumerate(zip(panel.get_lines(), panel.collections, strict=True)):
-            values, error = 1e6 * one[name][:, place], one.response_error[:, place]
-            assert line.get_label() == one.block[place]
-            np.testing.assert_allclose(line.get_ydata(), values)
-            edges = np.unique(band.get_paths()[0].vertices[:, 1])
-            np.testing.assert_allclose(edges[[0, -1]], [(values * (1 - error)).min(), (values * (1 + error)).max()])
+    variables = ("block_share", "block_worn_volume"), ("response_amplitude_begin", "response_amplitude")
+    for figure, names in zip(("block_shares", "block_responses"), variables, strict=True):
+        for panel, name in zip(found[figure].figure.axes, names, strict=True):
+            wrong = {"block_share": None, "block_worn_volume": "block_worn_volume_error"}.get(name, "response_error")
+            factor = {"block_share": 100.0, "block_worn_volume": 1e9}.get(name, 1e6)
+            for place, line in enumerate(panel.get_lines()):
+                values = factor * one[name][:, place]
+                assert line.get_label() == BLOCKS[place]
+                np.testing.assert_allclose(line.get_data(), [one.mission, values])
+                if wrong is not None:
+                    error = one[wrong][:, place] * values
+                    edges = panel.collections[place].get_paths()[0].vertices[:, 1]
+                    ends = [(values - error)[error > 0.0].min(), (values + error)[error > 0.0].max()]
+                    np.testing.assert_allclose([edges.min(), edges.max()], ends)
 
 
 def test_the_page_holds_the_variables_of_the_blocks(results):

@@ -47,15 +47,15 @@ def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(
     half = len(pairs.area) // 2
     for body, outwards in ((0, -1.0), (1, 1.0)):
         for flank, own in ((0, slice(None, half)), (1, slice(half, None))):
-            chosen = (surface.body == body) & (surface.contact.flank == flank)
+            chosen = (surface.body == body) & (surface.flank == flank)
             assert areas[chosen].sum() == pytest.approx(pairs.area[own].sum(), rel=1e-9)
-            at = np.isin(surface.contact.nodes, surface.faces[chosen])
-            found = surface.contact.pairs[at]
+            at = np.isin(surface.own, surface.faces[chosen])
+            found = surface.pairs[at]
             assert sorted(found) == list(range(len(pairs.area)))[own]
-            places = surface.nodes[surface.contact.nodes[at]]
+            places = surface.nodes[surface.own[at]]
             np.testing.assert_allclose(places, pairs.position[found], atol=1e-12)
             # normals of pairs point out of the moving body, the blade
-            normals = outwards * surface.contact.normals[at]
+            normals = outwards * surface.normals[at]
             np.testing.assert_allclose(normals, pairs.frames[found, 0], atol=1e-9)
 
 
@@ -98,15 +98,15 @@ def test_the_faces_near_the_contact_are_kept(tmp_path):
     surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
     fewer = surface.near_contact(1000)
     assert len(fewer.faces) == 1000
-    assert (fewer.contact.flank >= 0).sum() == (surface.contact.flank >= 0).sum()
-    np.testing.assert_array_equal(fewer.nodes[fewer.contact.nodes], surface.nodes[surface.contact.nodes])
+    assert (fewer.flank >= 0).sum() == (surface.flank >= 0).sum()
+    np.testing.assert_array_equal(fewer.nodes[fewer.own], surface.nodes[surface.own])
     assert surface.near_contact(len(surface.faces)) is surface
 
 
 def test_the_figures_of_the_dovetail(result, surface):
     worn, numbers = draw_figure(result, "worn_root"), draw_figure(result, "pair_numbers")
     assert draw_figure(result, "whole_disk").figure.axes
-    depth = result.at("wear_depth", result.shown_point(), -1).values
+    depth = result.at("wear_depth", result.shown, -1).values
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
     assert f"{surface.exaggeration(float(depth.max())):g} times" in worn.caption.replace("\u00a0", "")
     written = [text.get_text() for panel in numbers.figure.axes for text in panel.texts]
@@ -146,7 +146,7 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder, result, cycle):
     for name in vtu.FIELDS:
         units = dataset[name].attrs["units"]
         field = mesh.point_data[name if units == "1" else f"{name} ({units})"]
-        np.testing.assert_array_equal(field[there], result.at(name, result.shown_point(), cycle).values[pair])
+        np.testing.assert_array_equal(field[there], result.at(name, result.shown, cycle).values[pair])
     depth, moved = mesh.point_data["wear_depth (m)"][there], mesh.point_data["worn_displacement (m)"]
     # into the blade on one side of the joint, into the disk on the other
     along = np.einsum("ij,ij->i", moved[there], pairs.frames[pair, 0])

@@ -7,20 +7,20 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.page.data import build_page_data, build_root_numbers
 from studyrunner.report.root import read_root
 from studyrunner.report.vtu import find_writer
 from studyrunner.result.opening import check_dataset
-from studyrunner.result.pairs import last_depth, of_scene, of_shown_scene
+from studyrunner.result.pairs import last_depth, of_shown_scene
 from studyrunner.result.view import Result
 from tests.studyrunner.report.cases import with_mesh
 from tests.studyrunner.report.test_page import decode
 from tests.studyrunner.results import flank_positions, mesh_file, sample_file
 
-FEW, MANY = 12, 24
+FEW = 12
 LAST_DEPTH = "wear_depth_last"
 
 
@@ -44,13 +44,10 @@ def samples():
 
 def test_a_scene_has_its_own_pairs(meshes):
     shown = of_shown_scene(meshes)
-    assert shown.shown_point() == meshes.shown_point() | {"mesh": 0}
+    assert shown.shown == meshes.shown | {"mesh": 0}
     assert [shown.dataset.sizes["contact"], sum(len(flank.pairs) for flank in find_flanks(shown))] == [FEW, FEW]
-    assert of_scene(meshes, {**meshes.shown_point(), "mesh": 1}).dataset.sizes["contact"] == MANY
     assert read_root(shown) is not None
-    np.testing.assert_array_equal(
-        shown.at("wear_depth", shown.shown_point()), meshes.at("wear_depth", meshes.shown_point())[:, :FEW]
-    )
+    np.testing.assert_array_equal(shown.at("wear_depth", shown.shown), meshes.at("wear_depth", meshes.shown)[:, :FEW])
 
 
 def test_figures_show_the_pairs_of_the_shown_scene_and_the_depth_of_the_last_count(meshes, samples):
@@ -59,7 +56,7 @@ def test_figures_show_the_pairs_of_the_shown_scene_and_the_depth_of_the_last_cou
     assert "mesh 1" in items["worn_profile"].title
     items = {item.name: item for item in draw_report(samples)}
     assert "worn_profile" in items
-    deepest = int(np.argmax(samples.at(LAST_DEPTH, samples.shown_point()).values))
+    deepest = int(np.argmax(samples.at(LAST_DEPTH, samples.shown).values))
     assert f"at pair {deepest}" in items["wear_depth"].caption
 
 
@@ -80,5 +77,5 @@ def test_the_root_of_one_scene_is_written(kind, n_files, request, tmp_path):
     result = request.getfixturevalue(kind)
     assert find_writer(result)(tmp_path) == n_files
     mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
-    expected = last_depth(result, result.shown_point())
+    expected = last_depth(result, result.shown)
     assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)
