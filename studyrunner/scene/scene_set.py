@@ -27,20 +27,18 @@ _MOST_PLANNED = 8
 class SceneSet:
     """The different scenes of a study.
 
-    studies: for each scene a study without axes of the scene, from which the scene is built.
-    parts: of the study (`parts_of`). numbers: number of the scene of each part; of its first block in a study of
-        missions.
-    of_blocks: for each part the numbers of the scenes of its blocks, or of its only vibration.
+    studies: for each scene a study without axes of the scene, from which the scene is built. parts: of the study
+    (`parts_of`). of_blocks: for each part the numbers of the scenes of its blocks, or of its only vibration.
     """
 
     studies: tuple[Study, ...]
     parts: tuple[Part, ...]
-    numbers: tuple[int, ...]
     of_blocks: tuple[tuple[int, ...], ...]
 
-    def at_block(self, place: int) -> SceneSet:
-        """The same with the scenes of one block. place: of the block in the mission."""
-        return replace(self, numbers=tuple(numbers[place] for numbers in self.of_blocks))
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Number of the scene of each part, of its first block in a study of missions."""
+        return tuple(numbers[0] for numbers in self.of_blocks)
 
 
 def find_scenes(study: Study) -> SceneSet:
@@ -59,7 +57,7 @@ def find_scenes(study: Study) -> SceneSet:
         raise UserError(study.source, "outputs.scene", True, remedy)
     number_of = {key: number for number, key in enumerate(studies)}
     of_blocks = tuple(tuple(number_of[key] for key in each) for each in keys)
-    return SceneSet(tuple(studies.values()), parts, tuple(numbers[0] for numbers in of_blocks), of_blocks)
+    return SceneSet(tuple(studies.values()), parts, of_blocks)
 
 
 def _key(study: Study) -> str:
@@ -87,36 +85,11 @@ def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
     return replace(scenes, parts=tuple(parts))
 
 
-@dataclass(frozen=True)
-class PlannedScenes:
-    """Scenes of a study as `--plan` knows them.
+def plan_scenes(study: Study, say: Callable[[str], None]) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
+    """The scenes of a study, facts of each, or of one that is as large, and the time, s, for building the others.
 
-    facts: of each scene, or of one that is as large. seconds_left: time for building the others, s.
-    """
-
-    scenes: SceneSet
-    facts: tuple[SceneFacts, ...]
-    seconds_left: float
-
-    @property
-    def largest(self) -> SceneFacts:
-        """Facts of the scene with the most pairs."""
-        return max(self.facts, key=lambda each: len(each.area))
-
-    def describe(self) -> str:
-        """Number of scenes, and of their pairs; empty for one scene."""
-        if len(self.facts) == 1:
-            return ""
-        fewest, most = min(len(each.area) for each in self.facts), len(self.largest.area)
-        of_pairs = f"{most}" if fewest == most else f"{fewest} to {most}"
-        return f"{len(self.facts)}, built once each, with {of_pairs} contact pair{'' if of_pairs == '1' else 's'}"
-
-
-def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
-    """Builds some scenes of a study: those that may differ in their sizes, at most eight.
-
-    Scenes that differ only in numbers with a fraction are taken to have the same sizes. Raises UserError where a scene
-    is wrong.
+    Scenes that differ only in numbers with a fraction are taken to have the same sizes; at most eight are built. Raises
+    UserError where a scene is wrong.
     """
     scenes, built = find_scenes(study), dict[str, SceneFacts]()
     began, facts = time.monotonic(), []
@@ -128,7 +101,7 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
                 built[sizes] = describe_scene(build_study_scene(each, say))
         facts.append(built.get(sizes) or next(reversed(built.values())))
     left = (time.monotonic() - began) / len(built) * (len(facts) - len(built))
-    return PlannedScenes(at_ratios(scenes, facts), tuple(facts), left)
+    return at_ratios(scenes, facts), tuple(facts), left
 
 
 def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
