@@ -21,14 +21,7 @@ from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.mapped_file import MappedFile, ranks_that_see, write_mapped
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
-from studyrunner.scene.answers import (
-    KeptScene,
-    SmallArray,
-    build_scene_variables,
-    exact_answers,
-    join_scene_variables,
-    scene_to_keep,
-)
+from studyrunner.scene import answers
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, model_key
 from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
 from studyrunner.study.mistakes import keys_as_given
@@ -41,29 +34,21 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel
 
 
-MODELS_A_RANK = 2
+_MODELS_A_RANK = 2
 """Models, or sets of models of the blocks of a mission, that a rank holds where a study has several scenes."""
 
 Models = TypeVar("Models")
+ModelCache = OrderedDict[tuple[int, ...], Models]
+"""The models that a rank has computed with last, by the numbers of the scenes that a task needs. Rank 0 keeps such a
+list for each rank, without models."""
 
 
-class ModelCache(OrderedDict[tuple[int, ...], Models]):
-    """The models that a rank has computed with last, by the numbers of the scenes that a task needs.
-
-    Rank 0 keeps such a list for each rank, without models.
-    """
-
-    def use(self, scenes: tuple[int, ...]) -> bool:
-        """Whether the models are there; they are then the last to be removed."""
-        if scenes in self:
-            self.move_to_end(scenes)
-        return scenes in self
-
-    def add(self, scenes: tuple[int, ...], models: Models) -> None:
-        """Adds models; removes those that were not used for longest where there are too many."""
-        self[scenes] = models
-        if len(self) > MODELS_A_RANK:
-            self.popitem(last=False)
+def hold_models(cache: ModelCache[Models], scenes: tuple[int, ...], models: Models) -> None:
+    """Adds models, or uses them again; removes those that were not used for longest where there are too many."""
+    cache[scenes] = models
+    cache.move_to_end(scenes)
+    if len(cache) > _MODELS_A_RANK:
+        cache.popitem(last=False)
 
 
 class SceneModels:
@@ -79,10 +64,11 @@ class SceneModels:
 
     def with_model(self, rank: int, task: Task) -> Task:
         """The task as a rank gets it: with the models that the rank does not have."""
-        own = self._of_ranks.setdefault(rank, ModelCache())
-        if own.use(task.scenes):
+        own = self._of_ranks.setdefault(rank, OrderedDict())
+        is_there = task.scenes in own
+        hold_models(own, task.scenes, None)
+        if is_there:
             return task
-        own.add(task.scenes, None)
         used = {number for each in self._of_ranks.values() for scenes in each for number in scenes}
         for number in self._files.keys() - used:
             self._files.pop(number).remove()
@@ -120,7 +106,7 @@ class SceneBuilt:
     """
 
     facts: SceneFacts | None
-    variables: tuple[SmallArray, ...] = ()
+    variables: tuple[answers.SmallArray, ...] = ()
     model: Packed | None = None
     error: UserError | None = None
 
@@ -135,8 +121,8 @@ class Scenes:
 
     scenes: SceneSet
     facts: tuple[SceneFacts, ...]
-    variables: tuple[SmallArray, ...]
-    kept: KeptScene | None
+    variables: tuple[answers.SmallArray, ...]
+    kept: answers.KeptScene | None
     notes: tuple[str, ...]
     models: SceneModels
 
@@ -162,10 +148,10 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
             if each.error is not None:
                 raise each.error
         facts = tuple(each.facts for each in built if each.facts is not None)
-        variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
-        kept = scene_to_keep(scenes.studies[0], building.read(0)) if len(built) == 1 else None
+        variables, notes = answers.join_scene_variables(study, scenes, [each.variables for each in built])
+        kept = answers.scene_to_keep(scenes.studies[0], building.read(0)) if len(built) == 1 else None
     models = SceneModels(building.read, seeing, store.path)
-    return Scenes(at_ratios(scenes, facts), facts, (*variables, *exact_answers(study)), kept, notes, models)
+    return Scenes(at_ratios(scenes, facts), facts, (*variables, *answers.exact_answers(study)), kept, notes, models)
 
 
 class _Building(Office):
@@ -212,7 +198,7 @@ def build_scene_task(task: SceneTask, progress: Callable[[str], None]) -> Iterat
         known = None if task.known is None else unpack_model(task.known)
     try:
         model = build_study_scene(task.study, progress, known)
-        variables = build_scene_variables(task.study, model, progress)
+        variables = answers.build_scene_variables(task.study, model, progress)
     except UserError as error:
         yield SceneBuilt(None, error=error)
         return

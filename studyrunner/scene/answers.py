@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.scene import ExactAnswer, WearQuestion, as_scene, stuck_frequencies
-from studies.scene_error import SceneError
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build
 from studyrunner.scene.scene_set import SceneSet, along_axes
@@ -56,8 +55,7 @@ def build_scene_variables(study: Study, model: ReducedModel, progress: Callable[
 
 def _mesh(study: Study) -> Iterator[SmallArray]:
     mesh = build_mesh(study)
-    if mesh is None:
-        raise SceneError("variables", "mesh", "leave it out: the scene has none")
+    assert mesh is not None, "asked of scenes that offer it"
     values: dict[str, NDArray[np.generic]] = {
         **{f"mesh_{axis}": mesh.nodes[:, column] for column, axis in enumerate("xyz")},
         "mesh_quad": mesh.quads.astype(np.int32),

@@ -151,23 +151,6 @@ def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | No
     return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
 
 
-def stuck_frequencies_of(
-    study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
-) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-    """First natural frequencies, Hz, with the joint stuck: axes along which they differ, and values along these."""
-    return along_axes(study, scenes, [np.array(each.stuck_frequency) for each in facts])
-
-
-def frequencies_of_ratios(
-    study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
-) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
-    """Excitation frequencies, Hz: their dimensions, the first one frequency_ratio; None where the study gives Hz."""
-    if study.axes.frequency_ratio is None:
-        return None
-    names, stuck = stuck_frequencies_of(study, facts, scenes)
-    return ("frequency_ratio", *names), np.multiply.outer(study.axes.frequency_ratio, stuck)
-
-
 def along_axes(study: Study, scenes: SceneSet, values: Sequence[NDArray[Any]]) -> tuple[tuple[str, ...], NDArray[Any]]:
     """Axes along which arrays of the scenes differ, and these arrays along the axes. values: of each scene, alike."""
     names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in values])
