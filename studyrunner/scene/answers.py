@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from studies.scene import ExactAnswer, WearQuestion, as_scene, stuck_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build
-from studyrunner.scene.scene_set import SceneSet, along_axes
+from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
+from studyrunner.scene.scene_set import SceneSet, along_axes, find_scenes
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.parts import parts_of
 from studyrunner.study.study import Study
-from studyrunner.user_error import UserError, show_text
+from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import Variable
 
 if TYPE_CHECKING:
@@ -97,6 +97,27 @@ def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
     with scene_errors(study.source, study.scene.path):
         datasets = tuple(scene_datasets(model, build_mesh(study)))
         return KeptScene(scene_attributes(model), datasets, describe_origin(study))
+
+
+def write_study_scene(study: Study, path: Path, progress: Callable[[str], None]) -> None:
+    """Writes the scene of a study as a scene file, as a whole or not at all.
+
+    Raises UserError where the scene is wrong, or there are several.
+    """
+    from studies.scene_file import write_scene
+
+    first, *others = find_scenes(study).studies
+    if others:
+        found = Verbatim(f"{len(others) + 1} scenes")
+        raise UserError(study.source, "scene", found, "give each key one value: a scene file holds one scene")
+    model = build_study_scene(first, progress)
+    with scene_errors(study.source, first.scene.path):
+        mesh, origin = build_mesh(first), describe_origin(first)
+    try:
+        write_scene(model, path, mesh, origin)
+    except OSError as error:
+        remedy = f"give a file that can be written: {error.strerror or error}"
+        raise UserError("command line", "--write-scene", str(path), remedy) from None
 
 
 def join_scene_variables(

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +23,6 @@ from studyrunner.study.mistakes import raise_wrong, scene_errors
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
-from studyrunner.user_error import UserError
 from studyrunner.values import Wrong
 from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
@@ -170,8 +168,10 @@ def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
 
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
     """Lengths of the dimensions after the axes."""
+    counted = {study.kind.counted: len(study.output_counts)} if study.kind.counted else {}
+    blocks = {"block": len(study.mission)} if study.mission else {}
     loops = {"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}
-    return {**study.sizes, "contact": len(facts.area), "response": len(facts.response_names), **loops}
+    return {**counted, **blocks, "contact": len(facts.area), "response": len(facts.response_names), **loops}
 
 
 def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple[int, ...]]]:
@@ -203,29 +203,6 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
     from studies.scene_file import read_mesh
 
     return read_mesh(scene.path, scene.group)
-
-
-def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] = _silent) -> None:
-    """Writes the scene of a study as a scene file, as a whole or not at all.
-
-    Raises UserError where the scene is wrong.
-    """
-    from studies.scene_file import write_scene
-
-    if study.variants:
-        names = ", ".join(f"axes.{axis.dotted}" for axis in study.scene_axes)
-        raise UserError(study.source, names, None, "give one value: a scene file holds one scene")
-    if len({json.dumps(block.scene.of_model, sort_keys=True) for block in study.block_studies}) > 1:
-        raise UserError(study.source, "mission", None, "give all blocks one scene: a scene file holds one")
-    study = next(iter(study.block_studies), study)
-    model = build_study_scene(study, progress)
-    with scene_errors(study.source, study.scene.path):
-        mesh, origin = build_mesh(study), describe_origin(study)
-    try:
-        write_scene(model, path, mesh, origin)
-    except OSError as error:
-        remedy = f"give a file that can be written: {error.strerror or error}"
-        raise UserError("command line", "--write-scene", str(path), remedy) from None
 
 
 def describe_scene(model: ReducedModel) -> SceneFacts:

@@ -160,12 +160,6 @@ class Study(Section):
         return asked | (variables.LOOPS if self.outputs.loops else {}) | (variables.COUNTS if self.to_the_end else {})
 
     @property
-    def sizes(self) -> Mapping[str, int]:
-        """Lengths of the dimensions after the axes that the study gives: slow time, and blocks of missions."""
-        counted = {self.kind.counted: len(self.output_counts)} if self.kind.counted else {}
-        return {**counted, **({"block": len(self.mission)} if self.mission else {})}
-
-    @property
     def scene_variables(self) -> tuple[str, ...]:
         """What `outputs.variables` asks of the scene, names of SCENE."""
         return tuple(name for name in self.outputs.variables if name in SCENE and name not in self.kind.asked)

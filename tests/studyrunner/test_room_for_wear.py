@@ -8,7 +8,8 @@ from solver.outcome import Outcome
 from studies import build_scene, read_scene
 from studyrunner import read_study
 from studyrunner.cli import main
-from studyrunner.scene.scene import build_study_scene, describe_scene, write_study_scene
+from studyrunner.scene.answers import write_study_scene
+from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.parts import expected_wear, parts_of
 from studyrunner.study.study_file import format_study
@@ -61,7 +62,7 @@ def test_all_that_is_made_of_the_study_has_the_width_that_it_shows(path):
     assert read_study(path) == read_study(path, {"scene.half_width": width})
     assert half_width(read_study(path, {"slow_time.cycles": 1e6})) == width
     # its scene file, and the scene in Python
-    write_study_scene(study, path.with_name("scene.h5"))
+    write_study_scene(study, path.with_name("scene.h5"), print)
     given = {key: value for key, value in study.scene.parameters if key != "friction_coefficient"}
     for again in (read_scene(path.with_name("scene.h5")), build_scene("cylinder_on_flat", **given)):
         assert describe_scene(again).digest == digest

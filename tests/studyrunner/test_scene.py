@@ -14,8 +14,9 @@ from studies.scene_file import write_scene
 from studyrunner.cli import main
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.scene import scene as scene_room
+from studyrunner.scene.answers import write_study_scene
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics, write_study_scene
+from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics
 from studyrunner.scene_building import SceneModels, SceneTask, build_scene_task
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
@@ -85,7 +86,7 @@ def test_a_changed_scene_file_makes_another_scene():
     Path("s.toml").write_text(f"{tables}contact_stiffness = [1e9, 1e10]\n")
     keys = []
     for mass in (1.0, 2.0):
-        write_study_scene(read_study("two_masses", {"scene.mass_1": mass}), Path("scene.h5"))
+        write_study_scene(read_study("two_masses", {"scene.mass_1": mass}), Path("scene.h5"), print)
         keys += [scene_room.model_key(variant) for variant in read_study("s.toml").variants]
     assert len(set(keys)) == 4
 
@@ -128,7 +129,7 @@ def test_a_scene_file_gives_each_pair_its_friction_coefficient():
     assert study.friction_coefficient is None
     assert build_study_scene(study).contact.friction_coefficient.tolist() == [0.2, 0.3, 0.4]
     assert "friction_coefficient" not in format_study(study)
-    write_study_scene(study, Path("again.h5"))
+    write_study_scene(study, Path("again.h5"), print)
     assert digest_of("s.toml", "scene.model=again.h5") == digest_of("s.toml")
 
 

@@ -210,7 +210,7 @@ COMMANDS = [
     ("s.toml --date=2026-02-29", "command line: --date"),
     ("s.toml --write-scene nowhere/out.h5", "command line: --write-scene"),
     ("s.toml --write-scene plain.h5", "command line: --write-scene"),
-    ("sdof_slider --set axes.mass=[1,2] --write-scene scene.h5", "sdof_slider: axes.mass"),
+    ("sdof_slider --set axes.mass=[1,2] --write-scene scene.h5", "sdof_slider: scene"),
     ("s.toml --set scene.worn={result='worn.nc',cycle=[0]} -o worn.nc --overwrite", "command line: -o"),
     ("s.toml --set scene.worn={result='part.nc',cycle=[0]}", "part.nc: the file"),
     ("two_masses --check", "command line: --check"),
