@@ -214,9 +214,10 @@ def format_study(study: Study) -> str:
         del given[axis.key[-1]]
         place[axis.key[-1]] = list(axis.values)
     for key in SOLVER_AXES:
-        values = tables["solver"].pop(key)
-        axes |= {key: values} if key in study.own_axes else {}
-        tables["solver"] |= {} if key in study.own_axes else {key: values[0]}
+        if key in study.own_axes:
+            axes[key] = tables["solver"].pop(key)
+        else:
+            (tables["solver"][key],) = tables["solver"][key]
     for table in ("slow_time", "wear"):
         for key in study.kind.unused.get(table, ()):
             del tables[table][key]
@@ -231,7 +232,7 @@ def _worn_states(study: Study) -> dict[str, object] | None:
     # the axis of worn states is the last one
     variants = study.variants[: len(counts)] if counts else (study,)
     depths = [list(each.scene.worn.depth[0]) for each in variants if each.scene.worn]
-    return {"depth": depths, **({"cycle": counts, "result": worn.result} if counts else {})}
+    return {"cycle": counts, "depth": depths, "result": worn.result} if counts else {"depth": depths}
 
 
 # --- overrides ---
