@@ -46,7 +46,7 @@ class FretwearAccessor:
     def summary(self) -> Summary:
         """What came out: where the joint wears most, how much, how deep, how well that is known, what failed.
 
-        `print` shows it as the last lines of a run do. ValueError: the dataset is no result of a study.
+        `print` shows it as the last lines of a run do, `.values` has the numbers. ValueError: no result of a study.
         """
         if "study" not in self._dataset.attrs:
             raise ValueError("this dataset is no result of a study: give one of open_result or run_study")
