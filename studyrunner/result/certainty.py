@@ -16,11 +16,27 @@ from studyrunner.units import show_cycles, show_percent, show_rtol
 
 _MOST_NAMED = 10
 _LEAST = 1e-4  # relative error that is shown, of any smaller one
-_SWEEPS = ("up", "down", "ramp")
 _OWN_STEPS = ("adaptive", "final")
 
 _FAR = 10.0
 """Errors of more than so many times `rtol` do not fall in proportion to it."""
+
+
+_AUTOMATIC = 'harmonics and samples of "auto", where numbers are given'
+ADVICE = {
+    "time_limit": "--retry-failed continues with a larger solver.time_limit",
+    "resonance_lost": "Try another range in loading.between, or another axes.sweep",
+    "start_failed": f"Try another axes.sweep, or {_AUTOMATIC}",
+    "branch_lost": f"Try another axes.sweep, or {_AUTOMATIC}",
+    "unstable": "Try another axes.sweep",
+    "march_failed": f"Try a smaller solver.rtol or step, or {_AUTOMATIC}",
+    "step_too_long": 'Try scheme = "adaptive", or a smaller step',
+    "sensitive": "Try a smaller solver.rtol or step; where that does not help, the joint is that sensitive: use [scatter]",
+    "inaccurate": f"Try {_AUTOMATIC}",
+    "certificate_failed": f"Try a smaller solver.tolerance, or {_AUTOMATIC}",
+    "no_final_state": "Try an end in slow_time.cycles or slow_time.until",
+}
+"""What may help, by outcome."""
 
 
 @dataclass(frozen=True)
@@ -138,85 +154,15 @@ def describe_ended(result: Result, number: int) -> list[str]:
     return [line for line in lines if line]
 
 
-# --- advice: what was used already is never named, nor what the scheme does not use ---
-
-
-def advise_ended(result: Result, number: int) -> str:
-    """A sentence on what may help the points that ended in this way, from the first of them.
-
-    Empty where the sentence of the outcome says all, where nothing is left to try, and for words not known here.
-    """
-    word = result.endings[number].word
-    if word == "time_limit":
-        return "--retry-failed continues with a larger solver.time_limit."
-    place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
-    scheme, finer, steps, sweeps = _scheme(result, place), _finer(result, place), _steps(result, place), _sweeps(result)
-    until = "" if "until" in result.study.get("slow_time", {}) else " or slow_time.until"
-    remedies = {
-        # a ramp holds the frequency
-        "resonance_lost": ("another range in loading.between", *(each for each in sweeps if "ramp" not in each)),
-        "start_failed": (*finer, *sweeps),
-        "branch_lost": (*finer, *sweeps),
-        # more harmonics make no state stable
-        "unstable": sweeps,
-        "march_failed": (*finer, *steps),
-        "step_too_long": steps,
-        "sensitive": ("a smaller rtol",) if scheme in _OWN_STEPS else steps,
-        "inaccurate": finer,
-        "certificate_failed": (*finer, "a smaller tolerance"),
-        "no_final_state": (f"{'another scheme with ' * (scheme == 'final')}an end in slow_time.cycles{until}",),
-    }.get(word, ())
-    text = f"Try {' or '.join(remedies)}." if remedies else ""
-    more = " If both still differ then, the joint itself is that sensitive: use [scatter]."
-    return text + more if word == "sensitive" and scheme in _OWN_STEPS else text
-
-
 def _advise_error(result: Result, place: tuple[int, ...], error: float) -> str:
     """What would make the error of a worn volume smaller, in a few words. error: relative, above `rtol`."""
-    finer, rtol = _finer(result, place), float(result.rtol[place])
-    if _scheme(result, place) not in _OWN_STEPS:
-        return f"set {' or '.join((*finer, *_steps(result, place)))}"
+    scheme, rtol = "adaptive", float(result.rtol[place])
+    if "scheme" in result.axes:
+        scheme = str(result.dataset["scheme"].values[place[result.axes.index("scheme")]])
+    if scheme not in _OWN_STEPS:
+        return 'set scheme = "adaptive" or a smaller step'
+    if error >= _FAR * rtol:
+        return "set a smaller solver.rtol"
     # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
     digits, exponent = f"{rtol**2 / error:.12e}".split("e")
-    smaller = f"solver.rtol = {float(f'{digits[:3]}e{exponent}'):g}" if error < _FAR * rtol else "a smaller solver.rtol"
-    return f"set {' or '.join((*finer, smaller))}"
-
-
-def _setting(result: Result, place: tuple[int, ...], name: str, missing: str) -> str:
-    """What a point was computed with: a value of an axis, or of [solver]."""
-    if name in result.axes:
-        return str(result.dataset[name].values[place[result.axes.index(name)]])
-    return str(result.study.get("solver", {}).get(name, missing))
-
-
-def _scheme(result: Result, place: tuple[int, ...]) -> str:
-    # missions and modes have neither step nor scheme, and what they take of their own controls its error
-    return _setting(result, place, "scheme", "adaptive")
-
-
-def _finer(result: Result, place: tuple[int, ...]) -> tuple[str, ...]:
-    """Harmonics and samples of a given number, which may be automatic instead."""
-    keys = ("harmonics", "samples")
-    return tuple(f'{key} = "auto"' for key in keys if _setting(result, place, key, "auto") != "auto")
-
-
-def _steps(result: Result, place: tuple[int, ...]) -> tuple[str, ...]:
-    """Steps that are shorter than those that were used, and schemes that the study does not have."""
-    scheme, schemes = _scheme(result, place), set(_values(result, "scheme"))
-    if scheme in _OWN_STEPS:
-        shorter = "a smaller rtol, which makes the steps shorter"
-        return (shorter,) if "implicit" in schemes else (f"{shorter},", 'scheme = "implicit" with a small step')
-    by_depth = scheme == "explicit" and "largest_depth" in result.study.get("slow_time", {})
-    shorter = "a smaller slow_time.largest_depth" if by_depth else "a smaller step"
-    return (shorter,) if "adaptive" in schemes else ('scheme = "adaptive"', shorter)
-
-
-def _sweeps(result: Result) -> tuple[str, ...]:
-    """Ways to the unworn state that the study does not have."""
-    # the modal amplitude of a mode is raised or lowered only
-    used = (*_values(result, "sweep"), *(("ramp",) if result.has_modes else ()))
-    return tuple(f'sweep = "{sweep}"' for sweep in _SWEEPS if sweep not in used)
-
-
-def _values(result: Result, axis: str) -> Iterator[str]:
-    yield from map(str, result.dataset[axis].values if axis in result.axes else ())
+    return f"set solver.rtol = {float(f'{digits[:3]}e{exponent}'):g}"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studyrunner.result.certainty import advise_ended, certainty_of, ended_points
+from studyrunner.result.certainty import ADVICE, certainty_of, ended_points
 from studyrunner.result.opening import as_history
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import COMPLETE_WORDS, Result
@@ -104,7 +104,7 @@ def _failures(result: Result) -> Iterator[Finding]:
         # what the message of a sensitive one holds is no result
         reason = "" if ending.word == "sensitive" else reason
         reason = f"{reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if len(reason) > _LONGEST else reason
-        advice, first = advise_ended(result, number).rstrip("."), reason[:1].upper() + reason[1:]
+        advice, first = ADVICE.get(ending.word, ""), reason[:1].upper() + reason[1:]
         if result.varying:
             first = f"First: {': '.join(filter(None, (where_is(result, point), reason)))}"
         said = (re.split(r"[.:](?:\s|$)", ending.sentence)[0] or ending.word, advice, first)

@@ -220,14 +220,6 @@ def test_points_that_failed_or_were_never_estimated_are_not_known():
     assert "computed up to 5000 cycles" in failures[0].values["reason"].replace("\N{NO-BREAK SPACE}", "")
 
 
-def test_a_mode_that_is_not_found_gets_no_advice_that_is_an_error():
-    study = read_study("modes", ("axes.modal_amplitude=1e-4", "axes.sweep=up"))
-    made = made_result(study, outcome=lambda _: int(Outcome.START_FAILED))
-    advice = summary(made).values["start_failed"]["advice"]
-    assert "down" in advice
-    assert "ramp" not in advice
-
-
 def test_the_summary_is_short_whatever_came_out():
     outcomes = [int(each) for each in Outcome]
     made = wearing(

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from studyrunner.coordinates import COORDINATES
-from studyrunner.report.drawing import Drawing, Item, Missing
+from studyrunner.report.drawing import Drawing, Item, Missing, as_sentences
 from studyrunner.report.page.data import build_page_data, build_root_numbers
-from studyrunner.result.certainty import advise_ended, describe_ended
+from studyrunner.result.certainty import ADVICE, describe_ended
 from studyrunner.result.view import CONVERGED, Result
 from studyrunner.summary.answer import summarise
 from studyrunner.system.progress import count
@@ -99,7 +99,7 @@ def _endings(result: Result) -> list[tuple[str, list[str]]]:
     numbers, found = Counter(result.dataset["outcome"].values.ravel().tolist()), []
     for number, ending in sorted(result.endings.items()):
         if numbers[number] and number != CONVERGED:
-            meaning = f"{ending.sentence} {advise_ended(result, number)}".rstrip()
+            meaning = as_sentences(ending.sentence, ADVICE.get(ending.word, ""))
             found.append((f"{count(numbers[number], 'point')}: {meaning}", describe_ended(result, number)))
     return found
 
