@@ -150,7 +150,7 @@ def _open_completion(
     kind = record_type(study, facts)
     identity = Identity(tuple(each.digest for each in scenes.facts), digest(repr(kind.descr)))
     completion = CompletionIndex(plan, identity, store, kind)
-    store.note_study(identity_of(study))
+    store.note_study(identity_of(study.study.name, study.scene.model))
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:

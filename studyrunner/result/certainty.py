@@ -31,7 +31,7 @@ ADVICE = {
     "unstable": "Try another axes.sweep",
     "march_failed": f"Try a smaller solver.rtol or step, or {_AUTOMATIC}",
     "step_too_long": 'Try scheme = "adaptive", or a smaller step',
-    "sensitive": "Try a smaller solver.rtol or step; where that does not help, the joint is that sensitive: use [scatter]",
+    "sensitive": "Try a smaller solver.rtol or step; where that fails, the joint is that sensitive: use [scatter]",
     "inaccurate": f"Try {_AUTOMATIC}",
     "certificate_failed": f"Try a smaller solver.tolerance, or {_AUTOMATIC}",
     "no_final_state": "Try an end in slow_time.cycles or slow_time.until",

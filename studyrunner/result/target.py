@@ -41,13 +41,11 @@ class Target:
         return self.path.with_name(f"{self.path.name}.progress")
 
 
-def identity_of(study: Study) -> str:
-    """Identity of a study in words: the same study with other values, such as a finer axis, has the same."""
-    return _identity(study.study.name, study.scene.model)
+def identity_of(name: str, model: str) -> str:
+    """Identity of a study in words: the same study with other values, such as a finer axis, has the same.
 
-
-def _identity(name: str, model: str) -> str:
-    """name: of the study. model: of its scene; of a file the name without folders."""
+    name: of the study. model: of its scene; of a file the name without folders.
+    """
     return f'study "{name}" (scene {os.path.basename(model)})'  # noqa: PTH119 - of an empty text as well
 
 
@@ -104,7 +102,7 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
     UserError where what exists, or its progress, is no result of run-study or belongs to another study.
     """
     target = Target(check_output(option, path, study.files))
-    own, (standing, finished) = identity_of(study), _read_result(option, target.path)
+    own, (standing, finished) = identity_of(study.study.name, study.scene.model), _read_result(option, target.path)
     for what, found in ((target.path, standing), (target.progress, read_study(target.progress))):
         if found is not None and found != own and not overwrite:
             remedy = f"give another name or {how}: {what.name} is of {found}, this is {own}"
@@ -137,7 +135,7 @@ def _read_result(option: str, path: Path) -> tuple[str | None, bool]:
             text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
             stored: Any = b"" if text is None else text.item()
             table: Any = read_toml(stored if isinstance(stored, bytes) else stored.encode(), "")
-            found = _identity(str(table["study"]["name"]), str(table["scene"]["model"]))
+            found = identity_of(str(table["study"]["name"]), str(table["scene"]["model"]))
             # version 0.4.0 does not say how many points are left
             return found, left is None or left.item() == 0
     remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"
