@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +12,6 @@ from studyrunner.result.view import WELL_ENOUGH, Point, Result
 from studyrunner.system.progress import count
 from studyrunner.units import show_cycles, show_percent, show_rtol
 
-_MOST_NAMED = 10
 _LEAST = 1e-4  # relative error that is shown, of any smaller one
 _OWN_STEPS = ("adaptive", "final")
 
@@ -131,27 +128,17 @@ def show_error(result: Result, point: Point) -> str:
 # --- points that ended otherwise ---
 
 
-def ended_points(result: Result, number: int) -> Iterator[tuple[dict[str, int], str]]:
-    """Points that ended in this way, each with what is to be said beside the outcome, which may be nothing."""
-    for index in np.argwhere(result.dataset["outcome"].values == number):
-        place, point = tuple(index.tolist()), result.point_at(index)
-        said = str(result.dataset["message"].values[place]) if result.has("message") else ""
-        if result.has_values[place] and result.counted[:-1] not in said:
-            last = show_cycles(float(result.last_cycle[place]), result.counted)
-            end = "" if result.computed[place] else f"computed up to {last}"
-            is_known = 0.0 < result.errors[place] <= WELL_ENOUGH
-            known = f"worn volume known within {show_error(result, point)}" if is_known else ""
-            said = ", ".join(filter(None, (end, known, said)))
-        yield point, said
-
-
-def describe_ended(result: Result, number: int) -> list[str]:
-    """The first points that ended in this way, with cycle, error and message, and how many more there are."""
-    first = itertools.islice(ended_points(result, number), _MOST_NAMED)
-    named = [(result.describe(point, (*result.varying, *result.fixed)), said) for point, said in first]
-    left = int(np.count_nonzero(result.dataset["outcome"].values == number)) - len(named)
-    lines = [*(": ".join(filter(None, each)) for each in named), f"and {count(left, 'more point')}" if left else ""]
-    return [line for line in lines if line]
+def first_ended(result: Result, number: int) -> tuple[dict[str, int], str]:
+    """The first point that ended in this way, and what is to be said of it beside the outcome, which may be nothing."""
+    place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
+    point, said = result.point_at(place), str(result.dataset["message"].values[place]) if result.has("message") else ""
+    if result.has_values[place] and result.counted[:-1] not in said:
+        last = show_cycles(float(result.last_cycle[place]), result.counted)
+        end = "" if result.computed[place] else f"computed up to {last}"
+        is_known = 0.0 < result.errors[place] <= WELL_ENOUGH
+        known = f"worn volume known within {show_error(result, point)}" if is_known else ""
+        said = ", ".join(filter(None, (end, known, said)))
+    return point, said
 
 
 def _advise_error(result: Result, place: tuple[int, ...], error: float) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from studyrunner.result.certainty import ADVICE, certainty_of, ended_points
+from studyrunner.result.certainty import ADVICE, certainty_of, first_ended
 from studyrunner.result.opening import as_history
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import COMPLETE_WORDS, Result
@@ -100,7 +100,7 @@ def _failures(result: Result) -> Iterator[Finding]:
         ending = result.endings[number]
         if ending.word == "converged":
             continue
-        point, reason = next(ended_points(result, number))
+        point, reason = first_ended(result, number)
         # what the message of a sensitive one holds is no result
         reason = "" if ending.word == "sensitive" else reason
         reason = f"{reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if len(reason) > _LONGEST else reason

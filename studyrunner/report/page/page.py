@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 
 from studyrunner.coordinates import COORDINATES
-from studyrunner.report.drawing import Drawing, Item, Missing, as_sentences
+from studyrunner.report.drawing import Drawing, Item, Missing
 from studyrunner.report.page.data import build_page_data, build_root_numbers
-from studyrunner.result.certainty import ADVICE, describe_ended
-from studyrunner.result.view import CONVERGED, Result
+from studyrunner.result.view import Result
 from studyrunner.summary.answer import summarise
 from studyrunner.system.progress import count
 from studyrunner.units import show_number, units_of
@@ -82,7 +81,6 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
         file=show_text(result.path.name),
         css=own.joinpath("page.css").read_text("utf-8"),
         answer=summarise(result).rows,
-        endings=_endings(result),
         facts=_facts(result),
         study=result.dataset.attrs.get("study"),
         parts=[part for part in parts if not isinstance(part, Missing)],
@@ -92,16 +90,6 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
         data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c") if data else "",
         scripts=[get_plotlyjs(), "\n".join(own.joinpath(name).read_text("utf-8") for name in _SCRIPTS)] if data else [],
     )
-
-
-def _endings(result: Result) -> list[tuple[str, list[str]]]:
-    """How points ended but `converged`: how many, what that means and what may help; and lines on these points."""
-    numbers, found = Counter(result.dataset["outcome"].values.ravel().tolist()), []
-    for number, ending in sorted(result.endings.items()):
-        if numbers[number] and number != CONVERGED:
-            meaning = as_sentences(ending.sentence, ADVICE.get(ending.word, ""))
-            found.append((f"{count(numbers[number], 'point')}: {meaning}", describe_ended(result, number)))
-    return found
 
 
 def _facts(result: Result) -> list[tuple[str, str]]:
