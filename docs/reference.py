@@ -12,8 +12,8 @@ from collections.abc import Iterable, Mapping
 from solver.outcome import Outcome
 from studies.fe_models.deck.read import HARMLESS, KEYWORDS
 from studies.fe_models.from_files.parameters import Parameters
-from studies.scene_help import list_keys, scene_help
-from studies.scenes import BUNDLED
+from studies.scene import list_keys
+from studies.scenes import BUNDLED, scene_help
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
 from studyrunner.report.contents import CAPTIONS, FIGURES
 from studyrunner.study.keys import key_list
@@ -75,7 +75,7 @@ def _keywords() -> str:
     )
     return "\n\n".join(
         (
-            "Without blanks. Read as well: `*PART` and `*INSTANCE` with `NAME` and `PART`, `*INCLUDE` with `INPUT`.",
+            "Without blanks. Read as well: `*INCLUDE` with `INPUT`.",
             _table(("read", "parameters that are acted upon", "parameters that are skipped"), rows),
             f"Procedures, with any parameters: {_names(procedures)}.",
             f"Skipped: {_names(sorted(HARMLESS))}.",

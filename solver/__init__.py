@@ -25,10 +25,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from solver.balance_functions import HarmonicBalance as HarmonicBalance
-    from solver.balance_functions import balance_of as balance_of
     from solver.compliant_contact import with_contact_stiffness as with_contact_stiffness
     from solver.forced_response import FrequencyResponse as FrequencyResponse
+    from solver.forced_response import HarmonicBalance as HarmonicBalance
+    from solver.forced_response import balance_of as balance_of
     from solver.forced_response import frequency_response as frequency_response
     from solver.histories import integrate_mission as integrate_mission
     from solver.histories import march_wear as march_wear
@@ -38,41 +38,32 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel as ReducedModel
     from solver.model_from_matrices import build_model as build_model
     from solver.nonlinear_modes import Backbone as Backbone
+    from solver.nonlinear_modes import ModalResponse as ModalResponse
     from solver.nonlinear_modes import backbone as backbone
+    from solver.nonlinear_modes import modal_response as modal_response
     from solver.outcome import Outcome as Outcome
     from solver.results.history import WearHistory as WearHistory
-    from solver.results.periodic_motion import PeriodicMotion as PeriodicMotion
+    from solver.results.state_report import PeriodicMotion as PeriodicMotion
     from solver.settings import SolverSettings as SolverSettings
-    from solver.single_mode_theory import ModalResponse as ModalResponse
-    from solver.single_mode_theory import modal_response as modal_response
     from solver.whole_response import ResponseCurve as ResponseCurve
     from solver.whole_response import response_curve as response_curve
 
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
-_PLACES = {
-    "Backbone": "nonlinear_modes",
-    "Block": "missions.mission",
-    "FrequencyResponse": "forced_response",
-    "HarmonicBalance": "balance_functions",
-    "MissionHistory": "missions.mission",
-    "ModalResponse": "single_mode_theory",
-    "Outcome": "outcome",
-    "Passage": "missions.mission",
-    "PeriodicMotion": "results.periodic_motion",
-    "ReducedModel": "model",
-    "ResponseCurve": "whole_response",
-    "SolverSettings": "settings",
-    "WearHistory": "results.history",
-    "backbone": "nonlinear_modes",
-    "balance_of": "balance_functions",
-    "build_model": "model_from_matrices",
-    "frequency_response": "forced_response",
-    "integrate_mission": "histories",
-    "march_wear": "histories",
-    "modal_response": "single_mode_theory",
-    "response_curve": "whole_response",
-    "with_contact_stiffness": "compliant_contact",
+_NAMES = {
+    "compliant_contact": "with_contact_stiffness",
+    "forced_response": "FrequencyResponse HarmonicBalance balance_of frequency_response",
+    "histories": "integrate_mission march_wear",
+    "missions.mission": "Block MissionHistory Passage",
+    "model": "ReducedModel",
+    "model_from_matrices": "build_model",
+    "nonlinear_modes": "Backbone ModalResponse backbone modal_response",
+    "outcome": "Outcome",
+    "results.history": "WearHistory",
+    "results.state_report": "PeriodicMotion",
+    "settings": "SolverSettings",
+    "whole_response": "ResponseCurve response_curve",
 }
+_PLACES = {name: place for place, names in _NAMES.items() for name in names.split()}
 
 if not TYPE_CHECKING:
     __all__ = list(_PLACES)

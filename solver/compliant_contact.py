@@ -1,18 +1,14 @@
 """Compliance of the contact itself: a spring in series with each pair.
 
-Rough surfaces touch at their asperities only. The asperities let two bodies approach, and move along each other, by
-more than the smooth bodies deform. Per unit of area they are springs between the bodies, of the stiffnesses kappa_N and
-kappa_T, N/m3. With the relative displacements v of the bodies and u of the contact,
+Rough surfaces touch at their asperities only: per unit of area these are springs between the bodies, of the stiffnesses
+kappa_N and kappa_T, N/m3, here linear and without damping. With the relative displacements v of the bodies and u of the
+contact,
 
-    Z v = F - lambda,      lambda = kappa alpha (v - u),
+    Z v = F - lambda,      lambda = kappa alpha (v - u).
 
-so that the condensed compliance of the joint grows by that of the springs: `Z_r^-1 + (kappa alpha)^-1`. The springs are
-linear and have no damping. Those of real surfaces stiffen with the pressure.
-
-kappa_T is `TANGENTIAL_RATIO` kappa_N. For one circular contact that sticks Mindlin, "Compliance of elastic bodies in
-contact", J. Appl. Mech. 16 (1949), gives the ratio 2 (1 - nu) / (2 - nu). Randomly rough surfaces have the same ratio
-(Campana, Persson and Mueser, "Transverse and normal interfacial stiffness of solids with randomly rough surfaces",
-J. Phys.: Condens. Matter 23 (2011) 085001).
+kappa_T is `TANGENTIAL_RATIO` kappa_N: 2 (1 - nu) / (2 - nu) for one circular contact that sticks (Mindlin, J. Appl.
+Mech. 16 (1949)), and for randomly rough surfaces (Campana, Persson and Mueser, J. Phys.: Condens. Matter 23 (2011)
+085001).
 """
 
 from __future__ import annotations

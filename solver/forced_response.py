@@ -1,25 +1,25 @@
-"""The forced response of a joint over frequency: one frequency response from a model in Python."""
+"""Periodic states of a joint that is excited: over frequency, and one of them as equations with their Jacobian."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import get_args
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.accuracy.resolved_state import first_response
+from solver.arguments import check_case, check_number, check_numbers, worn_model
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to
 from solver.presentation import Presented
-from solver.results.history import StartState
-from solver.results.state_report import evaluated
-from solver.results.verdict import describe_cut_off, first_cut_off
+from solver.results.history import StartState, describe_cut_off, first_cut_off
+from solver.results.state_report import PeriodicMotion, evaluated, periodic_motion
 from solver.settings import Direction, SolverSettings
-from solver.structure.fourier import to_complex
-from solver.structure.joint import build_case, friction_of_pairs
+from solver.structure.joint import Case, build_case
 
 
 @dataclass(frozen=True, repr=False)
@@ -47,6 +47,55 @@ class FrequencyResponse(Presented):
     message: tuple[str, ...]
     branch: IntArray
     fold_frequency: FloatArray
+
+
+@dataclass(frozen=True)
+class HarmonicBalance:
+    """The equations `residual(z) = 0` of the periodic states of a joint at one frequency and excitation amplitude.
+
+    The unknown z (size,), N, has the predicted forces of the relative displacements (Eq. (10) in `solver/PHYSICS.md`),
+    each with its harmonics 0, cos 1, sin 1, cos 2, ... The tangential history of the pairs is fixed.
+
+    - frequency, excitation_amplitude: Hz, N. orders: harmonics above the static one. n_samples: samples of a period.
+    - state (size,): the solution to which the sweep comes, N; NaN where none was found.
+    - outcome, message: how the search for this solution ended.
+    """
+
+    frequency: float
+    excitation_amplitude: float
+    orders: tuple[int, ...]
+    n_samples: int
+    state: FloatArray
+    outcome: Outcome
+    message: str
+    _balance: Balance = field(repr=False, compare=False)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.state.size
+
+    def residual(self, z: ArrayLike) -> FloatArray:
+        """Residual (size,), N, of Eq. (8). Raises ValueError where z has another shape, or is not finite."""
+        return self._evaluate(z).residual.ravel()
+
+    def jacobian(self, z: ArrayLike) -> FloatArray:
+        """Derivative (size, size) of the residual, dimensionless, Eq. (16); errors as in `residual`.
+
+        Exact away from states in which a sample just changes its status.
+        """
+        pairs = np.arange(self._balance.joint.contact.n_contact)
+        return self._balance.linearise(self._evaluate(z)).dense(pairs)
+
+    def motion(self, z: ArrayLike | None = None) -> PeriodicMotion:
+        """Fourier coefficients and time signals of z, of `state` if not given; errors as in `residual`."""
+        return periodic_motion(self._balance.joint, self._evaluate(self.state if z is None else z))
+
+    def _evaluate(self, z: ArrayLike) -> Evaluation:
+        given = np.array(z, np.float64)
+        if given.shape != self.state.shape or not np.isfinite(given).all():
+            raise ValueError(f"z: give {self.size} finite numbers in shape ({self.size},), not shape {given.shape}")
+        return self._balance.evaluate(given.reshape(-1, self._balance.joint.basis.synthesis.shape[0]))
 
 
 def frequency_response(
@@ -110,92 +159,64 @@ def _read(
     elif outcome is Outcome.INACCURATE:
         error, name = max((start.wear_rate_error, "wear rate"), (start.response_error, "response"))
         message = f"the {name} {known_to(error, settings.rtol)}"
-    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
-    return response, largest_responses(joint, at), outcome, message
+    return first_response(joint, at), largest_responses(joint, at), outcome, message
 
 
-def check_case(
+def balance_of(
     model: ReducedModel,
+    frequency: float,
     excitation_amplitude: float,
     friction_coefficient: ArrayLike | None,
+    *,
+    sweep: Direction = "up",
+    settings: SolverSettings | None = None,
+    wear_depth: ArrayLike | None = None,
+) -> HarmonicBalance:
+    """The harmonic balance of a joint at one frequency, Hz, with its residual and exact Jacobian as functions.
+
+    A sweep gives the harmonics where the settings leave them open, the tangential history and a solution. Where the
+    sweep finds no solution, the functions are there all the same, without history.
+
+    All other parameters and errors as in `frequency_response`.
+    """
+    settings = SolverSettings() if settings is None else settings
+    wanted = check_number("frequency", frequency, above=0.0)
+    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    start, _, balance, at = balance_at_start(worn_model(model, wear_depth), friction, load, wanted, sweep, settings)
+    unknown = np.full((balance.joint.component_index.size, len(balance.joint.basis.synthesis)), np.nan)
+    return functions_of(balance, unknown if at is None else at.predicted_h, start.outcome, start.message)
+
+
+def balance_at_start(
+    model: ReducedModel,
+    friction: float | FloatArray | None,
+    load: float,
+    frequency: float,
     sweep: Direction,
     settings: SolverSettings,
-) -> tuple[float, float | FloatArray | None]:
-    """Checked excitation amplitude and friction coefficient. Raises ValueError."""
-    load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
-    friction = check_friction(model, friction_coefficient)
-    check_word("sweep", sweep, get_args(Direction))
-    check_settings(model, settings)
-    return load, friction
-
-
-def check_settings(model: ReducedModel, settings: SolverSettings) -> None:
-    """Raises ValueError where a setting is not allowed, or does not fit to the model or to another setting."""
-    if not isinstance(settings, SolverSettings):
-        raise ValueError("settings: give SolverSettings(...)")
-    for name in ("harmonics", "samples"):
-        given = getattr(settings, name)
-        if given != "auto" and (not isinstance(given, int | np.integer) or given < 1):
-            raise ValueError(f'settings.{name}: give a whole number from 1 on, or "auto", instead of {given!r}')
-    for name in ("tolerance", "rtol"):
-        if check_number(f"settings.{name}", getattr(settings, name), above=0.0) >= 1.0:
-            raise ValueError(f"settings.{name}: give a number between 0 and 1")
-    highest = 1 if settings.harmonics == "auto" else settings.harmonics
-    if not model.holds(highest):
-        raise ValueError(f"the model does not hold the nodal diameters that harmonics up to {highest} see")
-    if settings.samples != "auto" and settings.samples <= 2 * highest:
-        raise ValueError(f"settings.samples: give more than {2 * highest}, twice the harmonics")
-
-
-def worn_model(model: ReducedModel, wear_depth: ArrayLike | None) -> ReducedModel:
-    """The model whose pairs a wear depth (n_contact,), m, has opened; as given for None. Raises ValueError."""
-    if wear_depth is None:
-        return model
-    depth = check_numbers("wear_depth", wear_depth, least=0.0)
-    if depth.size != model.contact.n_contact:
-        raise ValueError(f"wear_depth: give a depth, m, for each of {model.contact.n_contact} pairs, not {depth.size}")
-    return replace(model, contact=replace(model.contact, gap=model.contact.gap + depth))
-
-
-def check_friction(model: ReducedModel, given: ArrayLike | None) -> float | FloatArray | None:
-    """One number, one for each pair (n_contact,), or None for those of the model. Raises ValueError where none fits, or
-    where the model is none.
+) -> tuple[StartState, Case, Balance, Evaluation | None]:
+    """State to which a sweep comes at a frequency, Hz, the case with its harmonics and samples, its balance and its
+    evaluation; where there is no state, None and a balance without history.
     """
-    if not isinstance(model, ReducedModel):
-        raise ValueError(f"model: give what build_scene, read_scene or build_model gives, instead of {model!r}")
-    friction: float | FloatArray | None = None
-    if given is not None:
-        numbers = check_numbers("friction_coefficient", given, least=0.0)
-        friction = numbers if numbers.size > 1 else float(numbers[0])
-    friction_of_pairs(model, friction)
-    return friction
+    ((_, start),) = follow_branch(model, friction, load, np.array([frequency]), sweep, settings)
+    fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)
+    case = build_case(model, friction, start.penalty_omega, fixed, start.resolution)
+    joint, n_contact = case.joint(2.0 * np.pi * frequency, load), model.contact.n_contact
+    if start.state is None:
+        return start, case, Balance(joint, np.zeros((n_contact, 2)), np.zeros(n_contact)), None
+    return start, case, *evaluated(joint, start.state)
 
 
-def check_word(name: str, given: str, known: tuple[str, ...]) -> None:
-    """Raises ValueError where a word is not in the list of known words."""
-    if given not in known:
-        raise ValueError(f"{name}: give one of {', '.join(known)} instead of {given!r}")
-
-
-def check_number(name: str, given: ArrayLike, *, above: float = -math.inf, least: float = -math.inf) -> float:
-    """One number. Raises ValueError where there are more, or as `check_numbers`."""
-    found = check_numbers(name, given, above=above, least=least)
-    if found.size != 1:
-        raise ValueError(f"{name}: give one number")
-    return float(found[0])
-
-
-def check_numbers(name: str, given: ArrayLike, *, above: float = -math.inf, least: float = -math.inf) -> FloatArray:
-    """The numbers as a vector. Raises ValueError where there is none, or where a number is not finite or too small."""
-    try:
-        found = np.atleast_1d(np.array(given, np.float64))
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: give numbers instead of {given!r}") from None
-    if found.ndim != 1 or not found.size:
-        raise ValueError(f"{name}: give one number, or a list of numbers, instead of shape {found.shape}")
-    if not np.isfinite(found).all():
-        raise ValueError(f"{name}: give finite numbers")
-    if (found <= above).any() or (found < least).any():
-        limit = f"above {above:g}" if above > -math.inf else f"of at least {least:g}"
-        raise ValueError(f"{name}: give values {limit} instead of {found.min():g}")
-    return found
+def functions_of(balance: Balance, predicted_h: FloatArray, outcome: Outcome, message: str) -> HarmonicBalance:
+    """The functions of a balance, and a state of predicted forces (n_rel, 2H+1), N."""
+    joint = balance.joint
+    return HarmonicBalance(
+        frequency=joint.omega / (2.0 * np.pi),
+        excitation_amplitude=joint.excitation_amplitude,
+        orders=joint.basis.orders,
+        n_samples=joint.basis.n_samples,
+        state=predicted_h.ravel(),
+        outcome=outcome,
+        message=message or ("" if outcome is Outcome.CONVERGED else outcome.sentence),
+        _balance=balance,
+    )

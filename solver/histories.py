@@ -10,11 +10,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.arguments import check_case, check_number, check_numbers, check_word, worn_model
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
-from solver.forced_response import check_case, check_number, check_numbers, check_word, worn_model
 from solver.loading_history.start_states import follow_branch
 from solver.missions.history import integrate_missions
-from solver.missions.mission import Begin, Block, Mission, MissionHistory, Passage
+from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest, Passage
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import (
@@ -30,8 +30,7 @@ from solver.settings import (
 )
 from solver.structure.joint import friction_of_pairs
 from solver.wear.history import integrate_together
-from solver.wear.integrate import WearRequest
-from solver.wear.step import steps_of
+from solver.wear.problem import WearRequest, steps_of
 
 
 def march_wear(
@@ -189,7 +188,7 @@ def integrate_mission(
     wanted = tuple(sorted({0, *(int(count) for count in counts)}))
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
     return integrate_missions(
-        Mission(checked, per_pressure, wanted, settings, law, until, sweep, largest_step and int(largest_step))
+        MissionRequest(checked, per_pressure, wanted, settings, law, until, sweep, largest_step and int(largest_step))
     )
 
 
@@ -202,28 +201,22 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
         if block.way == "continue":
             # the way from another amplitude is a ramp of this one
             check_number("excitation_amplitude", load, above=0.0)
-        found = replace(block, excitation_amplitude=load, friction_coefficient=friction)
-        if isinstance(block.frequency, Passage):
-            return replace(found, frequency=_checked_passage(block, block.frequency))
-        if block.cycles is None:
+        at, cycles = block.frequency, block.cycles
+        if isinstance(at, Passage):
+            at = Passage(*(check_number(f"frequency.{name}", value, above=0.0) for name, value in vars(at).items()))
+            if at.start == at.stop:
+                raise ValueError("frequency.stop: give another frequency than start")
+            if cycles is not None:
+                raise ValueError("cycles: the cycles of a passage follow from its rate: leave them out")
+            if block.way != at.sweep:
+                raise ValueError(f'begin: this passage goes {at.sweep}: give "{at.sweep}"')
+        elif cycles is None:
             raise ValueError("cycles: missing: only a passage has cycles of its own")
-        frequency = check_number("frequency", block.frequency, above=0.0)
-        return replace(found, frequency=frequency, cycles=check_number("cycles", block.cycles, above=0.0))
+        else:
+            at, cycles = check_number("frequency", at, above=0.0), check_number("cycles", cycles, above=0.0)
+        return replace(block, excitation_amplitude=load, friction_coefficient=friction, frequency=at, cycles=cycles)
     except ValueError as error:
         raise ValueError(f"{_called(place, block)}: {error}") from error
-
-
-def _checked_passage(block: Block, passage: Passage) -> Passage:
-    """The passage of a block with its numbers checked."""
-    names = ("start", "stop", "rate")
-    found = Passage(*(check_number(f"frequency.{name}", getattr(passage, name), above=0.0) for name in names))
-    if found.start == found.stop:
-        raise ValueError("frequency.stop: give another frequency than start")
-    if block.cycles is not None:
-        raise ValueError("cycles: the cycles of a passage follow from its rate: leave them out")
-    if block.way != found.sweep:
-        raise ValueError(f'begin: this passage goes {found.sweep}: give "{found.sweep}"')
-    return found
 
 
 def _check_neighbours(before: Block, block: Block, place: int) -> None:

@@ -21,18 +21,13 @@ class ContactInterface:
     """Contact pairs, `n_contact` of them.
 
     - dofs (n_contact, 3) int: indices of the closing, the first and the second tangential *relative* displacement of
-      each pair in every `LinearModel` of the scene (blade minus disk; the closing displacement is positive when the
-      pair closes); -1 where the pair has no such displacement.
-    - area (n_contact,): weight alpha of the pair, m2, Eq. (7).
-    - gap (n_contact,): initial gap, m.
-    - normal_load (n_contact,): constant normal force, N, compression positive, of pairs without a closing displacement;
-      not used for other pairs.
-    - position (n_contact, 3): m, NaN where unknown.
-    - surface: text label of each pair, e.g. "intrados".
-    - friction_coefficient (n_contact,): for each pair; None where the study gives the friction coefficient.
-    - edge (n_contact,): True for pairs at which the modelled contact ends but the bodies continue, e.g. the last strip
-      of a half-space. Load or wear of such a pair shows that the contact is cut off. None where the bodies end with
-      their pairs.
+      each pair in every `LinearModel` of the scene (blade minus disk; positive when the pair closes); -1 for none.
+    - area (n_contact,): weight alpha of the pair, m2, Eq. (7). gap (n_contact,): initial gap, m.
+    - normal_load (n_contact,): constant normal force, N, compression positive, of pairs without a closing displacement.
+    - position (n_contact, 3): m, NaN where unknown. surface: label of each pair, e.g. "intrados".
+    - friction_coefficient (n_contact,): None where the study gives it.
+    - edge (n_contact,): True for pairs at which the modelled contact ends but the bodies continue: load or wear of such
+      a pair shows that the contact is cut off. None where the bodies end with their pairs.
     """
 
     dofs: IntArray
@@ -87,16 +82,14 @@ class LinearModel:
         return LinearModel(*(np.conj(part) for part in parts))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReducedModel:
-    """A scene: linear structure(s), the contact pairs on them and the names of the responses.
+    """A scene: linear structure(s), the contact pairs on them and the names of the responses. Equal to itself alone.
 
-    - linear: linear model for each nodal diameter k in 0..n_sectors // 2; a structure that is no cyclic sector has the
-      key 0 only. The contact displacements have equal indices in all linear models.
-    - contact: the contact pairs.
-    - response_names: a name for each reported response.
-    - n_sectors: number of sectors of the cyclic structure; 0 for a structure that is no cyclic sector.
-    - nodal_diameter: d of the travelling wave that excites the sector; harmonic n moves in nodal diameter n d.
+    - linear: structure for each nodal diameter k in 0..n_sectors // 2, with equal indices of the contact displacements;
+      the key 0 only for a structure that is no cyclic sector.
+    - n_sectors: of the cyclic structure; 0 for none. nodal_diameter: d of the travelling wave that excites the sector;
+      harmonic n moves in nodal diameter n d.
     """
 
     linear: Mapping[int, LinearModel]

@@ -45,12 +45,11 @@ def build_model(
       for none.
     - contact_dofs (n_contact, 3) int: index in x of the closing, the first and the second tangential relative
       displacement of each pair; -1 where the pair has no such displacement.
-    - area (n_contact,) or one number for all, m2: the weight alpha of Eq. (7).
+    - area, gap, normal_load (n_contact,) or one number: weight alpha of Eq. (7), m2; initial gap, m; constant normal
+      force of pairs without a closing displacement, N, compression positive.
     - load_harmonic (n,): complex, N per unit excitation amplitude, load(t) = Re(F exp(i omega t)), at nodal diameter d.
-    - load_static (n,): N, at nodal diameter 0; none if not given.
+      load_static (n,): N, at nodal diameter 0.
     - response: indices (n_response,) of x, or a matrix (n_response, n). All of x if not given.
-    - gap, normal_load (n_contact,) or one number: initial gap, m; constant normal force of pairs without a closing
-      displacement, N, compression positive.
     - position (n_contact, 3), m, surface, response_names: labels that do not change the results.
     - n_sectors, nodal_diameter: of the cyclic structure and of the wave, 0 to n_sectors - 1; 0 for no sector.
 
@@ -66,20 +65,22 @@ def build_model(
     linear = {
         k: _linear(k, tables, load_static if k == 0 else None, load_harmonic if k == excited else None) for k in waves
     }
-    dofs = _pairs(contact_dofs, min(len(each.stiffness) for each in linear.values()))
-    n_contact, n_response = len(dofs), len(linear[0].response)
+    dofs = _array("contact_dofs", contact_dofs, (-1, 3))
+    dofs = _indices("contact_dofs", dofs, -1, min(len(each.stiffness) for each in linear.values()))
+    used, n_contact, n_response = dofs[dofs >= 0], len(dofs), len(linear[0].response)
+    _check("contact_dofs", len(np.unique(used)) == used.size, "give each displacement to one pair only")
+    _check("contact_dofs", n_contact > 0 and bool((dofs >= 0).any(axis=1).all()), "give every pair a displacement")
     nowhere = np.full((n_contact, 3), np.nan)
     contact = ContactInterface(
         dofs=dofs,
-        area=_numbers("area", area, (n_contact,), repeat=True),
-        gap=_numbers("gap", gap, (n_contact,), repeat=True),
-        normal_load=_numbers("normal_load", normal_load, (n_contact,), repeat=True),
-        position=nowhere if position is None else _numbers("position", position, nowhere.shape),
+        area=_array("area", area, (n_contact,), repeat=True),
+        gap=_array("gap", gap, (n_contact,), repeat=True),
+        normal_load=_array("normal_load", normal_load, (n_contact,), repeat=True),
+        position=nowhere if position is None else _array("position", position, nowhere.shape),
         surface=_names("surface", ("",) * n_contact if surface is None else surface, n_contact),
     )
     _check("area", bool((contact.area > 0.0).all()), "give a positive area, m2, to every contact pair")
-    loose = np.flatnonzero(~contact.has_normal & (contact.normal_load <= 0.0))
-    for pair in loose[:1]:
+    for pair in np.flatnonzero(~contact.has_normal & (contact.normal_load <= 0.0))[:1]:
         _check("normal_load", False, f"give pair {pair} more than 0 N, as it has no closing displacement to press it")
     default_names = [f"response {index}" for index in range(n_response)]
     names = _names("response_names", default_names if response_names is None else response_names, n_response)
@@ -95,63 +96,46 @@ def _linear(
         if isinstance(table, Mapping):
             _check(name, k in table, f"give it for nodal diameter {k}, as the stiffness")
         given[name] = table[k] if isinstance(table, Mapping) else table
-    n = len(np.atleast_1d(_numbers("stiffness", given["stiffness"], None, real=k == 0)))
-    matrices = {}
+    real, n = k == 0, len(np.atleast_1d(_array("stiffness", given["stiffness"], None, real=k == 0)))
+    nothing, matrices = np.zeros(n), {}
     for name in ("stiffness", "mass", "damping"):
-        found = _numbers(name, np.zeros((n, n)) if given[name] is None else given[name], (n, n), real=k == 0)
+        found = _array(name, np.zeros((n, n)) if given[name] is None else given[name], (n, n), real=real)
         asymmetry = float(np.abs(found - found.conj().T).max(initial=0.0))
         symmetric = asymmetry <= _SYMMETRIC * float(np.abs(found).max(initial=0.0))
-        _check(name, symmetric, f"give a {'Hermitian' if k else 'symmetric'} matrix")
+        _check(name, symmetric, f"give a {'symmetric' if real else 'Hermitian'} matrix")
         matrices[name] = found
-    nothing = np.zeros(n)
+    # matrix (n_response, n) of the responses, from a matrix or from indices
+    response = np.eye(n) if given["response"] is None else _array("response", given["response"], None, real=real)
+    response = np.eye(n)[_indices("response", response, 0, n)] if response.ndim == 1 else response
+    static, harmonic = (nothing if load is None else load for load in (load_static, load_harmonic))
     return LinearModel(
         **matrices,
-        load_static=_numbers("load_static", nothing if load_static is None else load_static, (n,)),
-        load_harmonic=_numbers(
-            "load_harmonic", nothing if load_harmonic is None else load_harmonic, (n,), real=False
-        ).astype(np.complex128),
-        response=np.eye(n) if given["response"] is None else _response(given["response"], n, real=k == 0),
+        load_static=_array("load_static", static, (n,)),
+        load_harmonic=_array("load_harmonic", harmonic, (n,), real=False).astype(np.complex128),
+        response=_shaped("response", response, (-1, n)),
     )
 
 
-def _response(given: ArrayLike, n: int, *, real: bool) -> FloatArray:
-    """Matrix (n_response, n) of the responses, from a matrix or from indices."""
-    found = _numbers("response", given, None, real=real)
-    return np.eye(n)[_indices("response", found, 0, n)] if found.ndim == 1 else _shaped("response", found, (-1, n))
-
-
-def _pairs(given: ArrayLike, n: int) -> IntArray:
-    found = _indices("contact_dofs", _numbers("contact_dofs", given, (-1, 3)), -1, n)
-    used = found[found >= 0]
-    _check("contact_dofs", len(np.unique(used)) == used.size, "give each displacement to one pair only")
-    _check("contact_dofs", len(found) > 0 and bool((found >= 0).any(axis=1).all()), "give every pair a displacement")
-    return found
-
-
-def _numbers(
+def _array(
     name: str, given: ArrayLike, shape: tuple[int, ...] | None, *, real: bool = True, repeat: bool = False
 ) -> Any:
-    """A copy as an array of finite real or complex numbers.
-
-    shape: -1 for any length, None for any shape. repeat: whether one number stands for all.
-    """
+    """A copy as an array of finite numbers; shape as in `_shaped`; repeat: whether one number stands for all."""
     try:
         found = np.array(given)
     except ValueError:
         raise ValueError(f"{name}: give rows of equal length") from None
     _check(name, found.dtype.kind in "iufc", "give numbers")
-    if real and found.dtype.kind == "c":
-        # matrices that are real often come as complex ones
-        _check(name, not found.imag.any(), "give real numbers")
-        found = found.real
-    found = found.astype(np.complex128 if found.dtype.kind == "c" else np.float64)
-    if repeat and found.ndim == 0 and shape is not None:
-        found = np.full(shape, found)
+    # matrices that are real often come as complex ones
+    _check(name, not (real and np.imag(found).any()), "give real numbers")
+    found = found.real.astype(np.float64) if real or found.dtype.kind != "c" else found.astype(np.complex128)
     _check(name, bool(np.isfinite(found).all()), "give finite numbers")
-    return found if shape is None else _shaped(name, found, shape)
+    if shape is None:
+        return found
+    return np.full(shape, found) if repeat and found.ndim == 0 else _shaped(name, found, shape)
 
 
 def _shaped(name: str, found: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """The array, of a shape in which -1 stands for any length."""
     fits = found.ndim == len(shape) and all(want in (-1, size) for want, size in zip(shape, found.shape, strict=True))
     _check(name, fits, f"give shape {shape} instead of {found.shape}".replace("(-1,", "(any number,"))
     return found

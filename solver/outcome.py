@@ -64,25 +64,20 @@ class Outcome(IntEnum):
         """Sentence for the user about what has happened. The remedy depends on settings that are not known here."""
         return _SENTENCES[self]
 
-    @property
-    def sentence_of_mode(self) -> str:
-        """The same of a point of a nonlinear mode."""
-        return _OF_MODES.get(self, _SENTENCES[self])
-
 
 COMPLETE = frozenset(outcome for outcome in Outcome if outcome.complete)
 """Outcomes of points that were computed to the end."""
 
 _SENTENCES = {
-    Outcome.CONVERGED: "The point was computed to the end. error_estimate is the error of its worn volume,"
-    " response_error that of its vibration.",
+    Outcome.CONVERGED: "The point was computed to the end; see the variables of its estimated errors.",
     Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",
-    Outcome.START_FAILED: "No periodic vibration was found at the start of the sweep, even with the excitation raised"
-    " gradually.",
-    Outcome.BRANCH_LOST: "The sweep could not follow the vibration to this frequency.",
+    Outcome.START_FAILED: "No periodic vibration was found where the sweep or the nonlinear mode begins, even with the"
+    " excitation raised gradually; see the variable message.",
+    Outcome.BRANCH_LOST: "The vibration could not be followed to this frequency or amplitude. A nonlinear mode may turn"
+    " back before it (a fold), meet another mode, or end where the whole joint slides.",
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided.",
-    Outcome.INACCURATE: "The point was computed to the end, but at some cycle counts the estimated error of response or"
-    " wear rate is above rtol: see response_error and wear_rate_error.",
+    Outcome.INACCURATE: "The point was computed to the end, but the estimated error of a vibration, a wear rate, a"
+    " natural frequency or a damping ratio is above rtol: see the variables of these errors.",
     Outcome.SENSITIVE: "The point was computed to the end, but its worn volume depends strongly on the step or on the"
     " start state: two computations of nearly the same case differ by more than half.",
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",
@@ -91,11 +86,10 @@ _SENTENCES = {
     " Such vibrations are not computed, and the vibration that repeats after one period is unstable.",
     Outcome.STEP_TOO_LONG: "A step on the slow time scale wears off so much at once that many times the normal forces"
     " of the joint would move. The end of this step is no result; message names the step and how long it may be.",
-    Outcome.NO_FINAL_STATE: "Wear does not come to an end, so the point has no final state. message gives the steady"
-    " wear rate.",
+    Outcome.NO_FINAL_STATE: "Wear does not come to an end, so the point has no final state. message gives its rate.",
     Outcome.CONTACT_CUT_OFF: "The contact goes on beyond the modelled pairs: a pair at their edge carries load or"
-    " wears, so the computed scar is too narrow and too deep. Give the model pairs farther out: a bundled scene needs"
-    " a larger half_width, or none so that it is chosen, and as many more strips or patches.",
+    " wears. Give the model pairs farther out: a bundled scene needs a larger half_width, or none, and as many more"
+    " strips or patches.",
     Outcome.ADRIFT: "The whole joint slips in every period, and the mean friction does not hold its parts: they drift"
     " along each other, and there is no periodic vibration. Less excitation, more friction or a stop would hold them.",
     Outcome.UNSETTLED: "The vibration does not settle: after some hundred periods it does not repeat, as happens where"
@@ -103,27 +97,15 @@ _SENTENCES = {
     Outcome.RESONANCE_LOST: "The excitation follows the resonance, but there was no resonance in the range, or the"
     " resonance left the range: message says where. The values before are valid.",
     Outcome.STATIC_SLIDING: "The joint has no static state: the static load pushes a part along its contacts with more"
-    " force than friction can bear, and nothing else holds the part. More friction or normal force, less load along the"
-    " contacts, or a support would hold it.",
-    Outcome.STATIC_OPEN: "The joint has no static state: the static load lifts or tips a part off its contacts, and"
-    " nothing else holds the part. Check direction and place of the static load, gaps and supports.",
+    " force than friction can bear. More friction or normal force, less load, or a support would hold it.",
+    Outcome.STATIC_OPEN: "The joint has no static state: the static load lifts or tips a part off its contacts. Check"
+    " direction and place of the static load, gaps and supports.",
     Outcome.TIME_LIMIT: "The computation took longer than its time limit and was stopped.",
     Outcome.EXCEPTION: "The computation ended with an unexpected error; see the variable message.",
     Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",
     Outcome.NOT_COMPUTED: "The run ended before this point was computed. The same command continues.",
     Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give the"
     " structure damping or a support.",
-}
-
-
-_OF_MODES = {
-    Outcome.CONVERGED: "The point was computed to the end. Its errors are natural_frequency_error and"
-    " damping_ratio_error.",
-    Outcome.START_FAILED: "The mode was not found where its amplitudes begin; see the variable message.",
-    Outcome.BRANCH_LOST: "The mode could not be followed to this amplitude. The mode may turn back before it (a fold),"
-    " meet another mode, or end where the whole joint slides.",
-    Outcome.INACCURATE: "The point was computed to the end, but the estimated error of natural frequency or damping"
-    " ratio is above rtol: see natural_frequency_error and damping_ratio_error.",
 }
 
 

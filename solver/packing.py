@@ -1,7 +1,7 @@
 """Values of the solver as text and plain arrays for a file: the state of a history or of a sweep, a reduced model.
 
-`unpack(pack(value))` is equal to `value` to the last bit, and its arrays are stored by rows (C order). The memory order
-of an array determines the last bits of sums over it: a computation that may be resumed goes on from the unpacked value.
+`unpack(pack(value))` is equal to `value` to the last bit, with arrays stored by rows (C order). The memory order
+changes the last bits of sums: a computation that may be resumed goes on from the unpacked value.
 """
 
 from __future__ import annotations
@@ -42,8 +42,9 @@ def packable(known: type[T]) -> type[T]:
 
 
 def pack(value: object) -> Packed:
-    """Text and arrays of a value: numbers, texts, None, arrays, tuples, lists, dicts with text keys, outcomes and
-    packable classes. Raises TypeError for any other value: a bug.
+    """Text and arrays of numbers, texts, None, arrays, tuples, lists, dicts, outcomes and packable classes.
+
+    Raises TypeError for any other value: a bug.
     """
     arrays: list[NDArray[np.generic]] = []
     text = json.dumps(_described(value, arrays))
@@ -64,10 +65,7 @@ def in_rows(value: T) -> T:
 
 
 def pack_model(model: ReducedModel) -> Packed | None:
-    """The model; None where arrays are not stored by rows: the last bits of all results would change.
-
-    No bundled scene has such arrays.
-    """
+    """The model; None where arrays are not stored by rows: the last bits of all results would change."""
     values = [value for part in (*model.linear.values(), model.contact) for value in vars(part).values()]
     if not all(value.flags.c_contiguous for value in values if isinstance(value, np.ndarray)):
         return None

@@ -10,19 +10,17 @@ from solver.packing import packable
 
 ROUND_OFF = 1e-9
 """Fraction of a quantity that is round-off after a computation of many steps. Changes of a periodic tangential state:
-1e-12 and below in good states. Eigenvalues of a stiffness over the largest one: 1e-15 for the free direction of the
-dovetail, -1.6e-6 for the next one, by spin softening. Its inverse is practically infinite."""
+1e-12 and below. Eigenvalues of a stiffness over the largest one: 1e-15 for the free direction of the dovetail, -1.6e-6
+for the next one. Its inverse is practically infinite."""
 
 NEGLIGIBLE = 1e-6
 """Fraction of a quantity that has no meaning although it may be more than round-off: a vibration over its mean, at a
-tolerance of 1e-8; pressure and depth at the edge of a contact over the largest ones (open strips carry exactly 0; under
-a stroke whose scar is cut off the last one carries 0.96 of the largest pressure); the squared frequency of a rigid
-motion (with 1e-4 the modes of dovetail and foot are equal to 1e-8)."""
+tolerance of 1e-8; pressure and depth at the edge of a contact over the largest ones (a scar that is cut off: 0.96); the
+squared frequency of a rigid motion (with 1e-4 the modes of dovetail and foot are equal to 1e-8)."""
 
 DIFFERENCE = 1e-7
-"""Step of a finite difference over the natural size of its variable: round-off of 1e-16 gives an error of 1e-9.
-Derivatives by the frequency agree to 1e-5 with central differences a hundred times as long. With ten and a hundred
-times the value nonlinear modes are equal to 1e-9 and take up to 15 % longer."""
+"""Step of a finite difference over the natural size of its variable: round-off of 1e-16 gives an error of 1e-9. With
+ten and a hundred times the value nonlinear modes are equal to 1e-9 and take up to 15 % longer."""
 
 FIRST_HARMONICS = 3
 """Harmonics of the first state with automatic harmonics: the smallest number that shows friction."""
@@ -38,9 +36,8 @@ FINE_SAMPLES = 2048
 them by 1e-6 only, and a peak of harmonic 20 is found to 0.05 %."""
 
 ROUGH_SHARE = 1e-3
-"""Largest residual of a state that is no result, as a fraction of rtol. With a tenth and with ten times this value the
-motion of the dovetail is equal to 1e-4; with the tolerance of a result nodes take 1.4 times the iterations, and
-reference solutions 1.3 times for errors that are equal to three digits (16 pairs, 212.42 to 213 Hz)."""
+"""Largest residual of a state that is no result, over rtol. With a tenth and ten times this value the motion of the
+dovetail is equal to 1e-4; with the tolerance of a result nodes take 1.4 times the iterations."""
 
 Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
@@ -63,9 +60,8 @@ TARGETS: tuple[Quantity, ...] = get_args(Quantity)
 class WearTarget:
     """Wear at which a history ends.
 
-    - quantity: "wear_depth" of the deepest pair, m; "worn_volume" of all pairs, m3; or "frequency_shift", the relative
-      change of the resonance of the vibration (`results.state_report`), up or down.
-    - value: above 0.
+    quantity: "wear_depth" of the deepest pair, m; "worn_volume" of all pairs, m3; or "frequency_shift", the relative
+    change of the resonance of the vibration (`results.state_report`), up or down. value: above 0.
     """
 
     quantity: Quantity
@@ -76,10 +72,10 @@ class WearTarget:
 class ToTheEnd:
     """In place of cycle counts: a history until wear has come to an end.
 
-    - n_outputs: number of states in the result, the first and the last included, spaced evenly in worn volume and
-      cycles; at least 2.
-    - final_share: the history ends where the wear rate of each pair is below this share of its own largest wear rate so
-      far. The largest wear rate of a pair counts as at least `final_share` of the largest of all pairs.
+    - n_outputs: states in the result, with the first and the last one, spaced evenly in worn volume and cycles; at
+      least 2.
+    - final_share: the history ends where the wear rate of each pair is below this share of its largest one so far,
+      which counts as at least `final_share` of the largest of all pairs.
     """
 
     n_outputs: int
@@ -90,10 +86,8 @@ class ToTheEnd:
 class FollowedFrequency:
     """Excitation whose frequency follows the structure while the joint wears.
 
-    - of: "resonance" for phase resonance, the vibration in quadrature with the excitation: the product `F^H x` of the
-      first harmonics of excitation and displacements has no real part, so that the excitation does most work. "peak"
-      for the largest amplitude of the first response, in its first harmonic.
-    - low, high: range of the frequency, Hz.
+    of: "resonance" for phase resonance, where the product `F^H x` of the first harmonics of excitation and motion has
+    no real part; "peak" for the largest amplitude of the first response, in its first harmonic. low, high: Hz.
     """
 
     of: Followed
@@ -106,12 +100,11 @@ class SolverSettings:
     """Resolution and accuracy of a computation.
 
     - harmonics: number H of harmonics above the static one, or "auto": as many as the state needs for `rtol`.
-    - samples: number N of equally spaced time samples in a period at which the contact law is applied; more than 2 H,
-      or "auto".
+    - samples: number N of time samples in a period at which the contact law is applied; more than 2 H, or "auto".
     - tolerance: largest accepted scaled residual of the harmonic balance.
     - rtol: relative error of response and wear rate for which automatic harmonics and samples are chosen.
-    - time_limit: CPU seconds, without the time of compiling kernels, after which a computation is given up. The limit
-      holds for a start state with its loading history, and for a wear history.
+    - time_limit: CPU seconds, without compiling kernels, after which a start state with its loading history, or a wear
+      history, is given up.
     """
 
     harmonics: int | Automatic = "auto"

@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solver.accuracy.refinement import refine
-from solver.balance_functions import HarmonicBalance, balance_at_start, functions_of, start_of
+from solver.accuracy.resolved_state import first_response
+from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
-from solver.forced_response import check_case, check_number, check_numbers, worn_model
+from solver.forced_response import HarmonicBalance, balance_at_start, functions_of
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import BalanceAt, Failure, State, largest_responses
+from solver.harmonic_balance.state import BalanceAt, State, largest_responses
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.presentation import NOT_IN_DATASETS, Presented, new_axes, unit_of
 from solver.settings import Direction, SolverSettings
 from solver.stability.floquet import Multipliers, Stability, find_multipliers
-from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 _LEAST_PART = 0.1  # of the first value: how far a curve may turn back
 _FEWEST_STEPS = 50  # of a curve without folds: enough for a drawing
 
-_Branch = tuple[list[State], list[int], Failure]
-"""States in the order of the curve, indices of the folds among them, and how the curve ends."""
+_Branch = tuple[list[State], list[int], Outcome, str]
+"""States in the order of the curve, indices of the folds among them, and how the curve ends, in words."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,16 +134,15 @@ def response_curve(
     most = int(check_number("most_points", most_points, least=2.0))
     sweep: Direction = ("up" if first < last else "down") if over_frequency else "ramp"
     load, friction = check_case(model, loads[0], friction_coefficient, sweep, settings)
-    worn = worn_model(model, wear_depth)
-    start, case = start_of(worn, friction, load, float(omegas[0]) / (2.0 * np.pi), sweep, settings)
-    balance, at = balance_at_start(case, start, float(omegas[0]), load)
+    worn, omega = worn_model(model, wear_depth), float(omegas[0])
+    start, case, balance, at = balance_at_start(worn, friction, load, omega / (2.0 * np.pi), sweep, settings)
 
     def balance_at(value: float, history: FloatArray) -> Balance:
-        joint = case.joint(value, load) if over_frequency else case.joint(float(omegas[0]), value)
+        joint = case.joint(value, load) if over_frequency else case.joint(omega, value)
         return Balance(joint, history, balance.wear_depth)
 
     if at is None or not start.outcome.complete:
-        branch: _Branch = [], [], Failure(start.outcome, start.message)
+        branch: _Branch = [], [], start.outcome, start.message
     else:
         # a branch may turn back behind its start before it comes to the last value
         back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
@@ -172,7 +171,7 @@ def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency
             if passed[0] == back:
                 said = "the curve turns back as far as {}: begin farther away"
             elif end is not None:
-                return points, folds, Failure(Outcome.CONVERGED)
+                return points, folds, Outcome.CONVERGED, ""
             break
         points.append(reached)
         if len(points) >= most:
@@ -180,26 +179,25 @@ def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency
             break
     at = points[-1].parameter
     end_at = f"{at / (2.0 * np.pi):.6g} Hz" if over_frequency else f"{at:.6g} N"
-    return points, folds, Failure(Outcome.BRANCH_LOST, said.format(end_at))
+    return points, folds, Outcome.BRANCH_LOST, said.format(end_at)
 
 
 def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool) -> ResponseCurve:
     """The curve of a branch, each point with its error and multipliers."""
-    points, folds, ended = branch
-    n_response, n_points = len(case.model.linear[0].response), len(points)
-    response = np.empty((n_points, n_response), np.complex128)
-    peak, error = np.empty((n_points, n_response)), np.full(n_points, np.nan)
+    points, folds, outcome, message = branch
+    n_points = len(points)
+    response = np.empty((n_points, len(case.model.response_names)), np.complex128)
+    peak, error = np.empty(response.shape), np.full(n_points, np.nan)
     found: list[Multipliers] = []
     stability: list[Stability] = []
     balances: list[HarmonicBalance] = []
     for index, point in enumerate(points):
         balance, at = balance_at(point.parameter, point.history), point.evaluation
         joint, run = balance.joint, Run(case.settings.tolerance)
-        response[index] = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
-        peak[index] = largest_responses(joint, at)
+        response[index], peak[index] = first_response(joint, at), largest_responses(joint, at)
         if errors:
             # NaN where no state with other harmonics is found
-            estimate = refine(case, joint.omega, joint.excitation_amplitude, point, run).estimate.response
+            estimate = refine(case, joint, point, run).estimate.response
             error[index] = estimate if np.isfinite(estimate) else np.inf
         found.append(find_multipliers(case, joint, at, run))
         stability.append(found[-1].stability(odd=not run.fresh().is_stable(balance, at)))
@@ -215,7 +213,7 @@ def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency
         stability=tuple(stability),
         multipliers=tuple(each.values for each in found),
         multiplier_error=np.array([each.error for each in found]),
-        outcome=ended.outcome,
-        message=ended.message,
+        outcome=outcome,
+        message=message,
         _balances=tuple(balances),
     )

@@ -6,9 +6,9 @@ For use in Python, from this package itself:
 - `read_scene`: that of a scene file;
 - `SceneError`: what both raise, in one sentence.
 
-`scenes` makes reduced models, one file a scene; `scene_file` reads and writes scene files (`model_check`
-what they must obey, `hdf5` how datasets are read); `scene_answers` what scenes tell beside the
-model. The `.toml` files are the bundled studies, `notebooks` read their results.
+`scenes` makes reduced models, one file a scene, and `scene` is what all of them have; `scene_file` reads and writes
+scene files (`model_check` what they must obey, `hdf5` how datasets are read). The `.toml` files are the bundled
+studies, `notebooks` read their results.
 """
 
 from __future__ import annotations

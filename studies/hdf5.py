@@ -5,7 +5,8 @@ No link, external storage or virtual dataset is followed: what is missing behind
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.scene_error import SceneError
+
+Datasets = Mapping[str, h5py.Dataset]
+"""Datasets by name with the groups above."""
 
 LARGEST_TOTAL = 2**31
 """Bytes of all datasets together: three real matrices of 9400 rows, or 14 nodal diameters of 500 pairs with damping as
@@ -38,18 +42,14 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
     with path.open("rb"):  # says why, where h5py only says that a file cannot be opened
         pass
     try:
-        file = h5py.File(path, "r")
-    except (OSError, RuntimeError, ValueError) as error:
-        raise SceneError("model", f"{path.name} is no HDF5 file, or damaged", "give a scene file in HDF5") from error
-    try:
-        with file:
+        with h5py.File(path, "r") as file:
             yield file
     except SceneError:
         raise
     except (OSError, RuntimeError, ValueError, TypeError, KeyError, ArithmeticError, MemoryError, SystemError) as error:
         # the library has no one way to say that bytes make no sense, or that a filter is not there
-        reason = " ".join(str(error).split())
-        raise SceneError("model", f"{path.name} is damaged ({reason})", "write the file again") from error
+        found = f"{path.name} is no HDF5 file, or damaged ({' '.join(str(error).split())})"
+        raise SceneError("model", found, "give a scene file in HDF5, or write it again") from error
 
 
 def find_datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
@@ -65,12 +65,21 @@ def find_datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
     for key, link in links:
         if not isinstance(link, h5py.HardLink):
             raise SceneError(key, "a link", "store the data itself under this name")
-        item = _open(group, key)
-        if not isinstance(item, h5py.Dataset) or _only_names_a_dimension(item):
+        try:
+            item = group[key]
+            # a type without equivalent in NumPy only shows when it is asked for
+            kind = item.dtype if isinstance(item, h5py.Dataset) else None
+        except (KeyError, TypeError, ValueError) as error:
+            raise SceneError(key, "damaged or of an unknown type", "write it again as numbers or text") from error
+        # a dimension without variable, in the sense of NetCDF
+        if kind is None or (item.ndim == 1 and item.is_scale and "_Netcdf4Dimid" in item.attrs):
             continue
+        if not _is_number(kind) and h5py.check_string_dtype(kind) is None:
+            raise SceneError(key, f"type {kind}", "give numbers or text")
         if item.external or item.is_virtual:
             raise SceneError(key, "data in another file", "store the data in this file")
-        total += _bytes_in_memory(item)
+        # numbers become real or complex ones of double precision
+        total += math.prod(item.shape or ()) * max(16 if kind.kind in "cV" else 8, kind.itemsize)
         if total > LARGEST_TOTAL:
             remedy = f"reduce the model: all datasets together may take {LARGEST_TOTAL / 2**30:g} GiB"
             raise SceneError(key, f"shape {item.shape} is too large", remedy)
@@ -78,22 +87,45 @@ def find_datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
     return found
 
 
-def is_number(kind: np.dtype[Any]) -> bool:
-    """Whether a type is that of real or complex numbers."""
-    names = kind.names
-    if names in (("r", "i"), ("real", "imag")):
-        return all(kind[name].kind in "iuf" and not kind[name].shape for name in names)
-    return kind.kind in "iufc" and h5py.check_enum_dtype(kind) is None
+def read_dataset(datasets: Datasets, key: str, kind: str) -> Any:
+    """Values of a dataset: "any" numbers (float64 or complex128), "real" or "whole" ones, "flags", or a row of "text".
+
+    Raises SceneError.
+    """
+    if key not in datasets:
+        raise SceneError(key, "missing", "give this dataset")
+    dataset = datasets[key]
+    if not dataset.shape:
+        raise SceneError(key, "a single value or nothing", "give an array")
+    if kind == "text":
+        if h5py.check_string_dtype(dataset.dtype) is None or dataset.ndim != 1:
+            raise SceneError(key, f"type {dataset.dtype} of shape {dataset.shape}", "give a row of text")
+        return tuple(_as_text(key, text) for text in dataset[()])
+    if not _is_number(dataset.dtype):
+        raise SceneError(key, f"type {dataset.dtype}", "give numbers")
+    values, names = dataset[()], dataset.dtype.names
+    if names is not None:
+        parts, values = values, np.empty(dataset.shape, dtype=np.complex128)
+        values.real, values.imag = parts[names[0]], parts[names[1]]
+    values = values.astype(np.complex128 if values.dtype.kind == "c" else np.float64)
+    if kind == "real" and np.iscomplexobj(values):
+        raise SceneError(key, "complex", "give real numbers")
+    if kind == "flags":
+        wrong = values[(values != 0) & (values != 1)]
+        if wrong.size:
+            raise SceneError(key, str(wrong.flat[0]), "give 0 or 1")
+        return np.asarray(values == 1)
+    return as_whole(key, values) if kind == "whole" else values
 
 
-def read_texts(dataset: h5py.Dataset, key: str) -> tuple[str, ...]:
-    """A row of texts in UTF-8. Raises SceneError."""
-    if h5py.check_string_dtype(dataset.dtype) is None or dataset.ndim != 1:
-        raise SceneError(key, f"type {dataset.dtype} of shape {dataset.shape}", "give a row of text")
-    try:
-        return tuple(text if isinstance(text, str) else text.decode("utf-8") for text in dataset[()])
-    except UnicodeDecodeError as error:
-        raise SceneError(key, "text that is not UTF-8", "write it in UTF-8") from error
+def as_whole(key: str, values: Any) -> Any:
+    """Numbers that are whole, of any type: MATLAB writes them as floating ones. Raises SceneError."""
+    with np.errstate(invalid="ignore"):
+        whole = values.real.astype(np.int64)
+    wrong = values[whole != values]
+    if wrong.size:
+        raise SceneError(key, str(wrong.flat[0]), "give whole numbers")
+    return whole
 
 
 def read_attribute(group: h5py.HLObject, name: str) -> NDArray[np.generic] | None:
@@ -110,40 +142,22 @@ def read_attribute(group: h5py.HLObject, name: str) -> NDArray[np.generic] | Non
 def read_text_attribute(group: h5py.HLObject, name: str) -> str:
     """A text that is an attribute, "" where there is none. Raises SceneError where it is no text in UTF-8."""
     value = read_attribute(group, name)
-    text = "" if value is None else value.item()
-    if isinstance(text, bytes):
-        try:
-            text = text.decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise SceneError(name, "text that is not UTF-8", "write it in UTF-8") from error
+    return "" if value is None else _as_text(name, value.item())
+
+
+def _as_text(key: str, value: object) -> str:
+    try:
+        text = value.decode("utf-8") if isinstance(value, bytes) else value
+    except UnicodeDecodeError as error:
+        raise SceneError(key, "text that is not UTF-8", "write it in UTF-8") from error
     if not isinstance(text, str):
-        raise SceneError(name, str(text), "give a text")
+        raise SceneError(key, str(text), "give a text")
     return text
 
 
-def _open(group: h5py.Group, key: str) -> h5py.HLObject:
-    try:
-        item = group[key]
-        # a type without equivalent in NumPy only shows when it is asked for
-        kind = item.dtype if isinstance(item, h5py.Dataset) else None
-    except (KeyError, TypeError, ValueError) as error:
-        raise SceneError(key, "damaged or of an unknown type", "write it again as numbers or text") from error
-    if kind is not None and not is_number(kind) and h5py.check_string_dtype(kind) is None:
-        raise SceneError(key, f"type {kind}", "give numbers or text")
-    return item
-
-
-def _only_names_a_dimension(item: h5py.Dataset) -> bool:
-    """Whether a dataset is a dimension without variable, in the sense of NetCDF."""
-    return item.ndim == 1 and item.is_scale and "_Netcdf4Dimid" in item.attrs and "NAME" in item.attrs
-
-
-def _bytes_in_memory(dataset: h5py.Dataset) -> int:
-    """Memory of the values, as numbers of 8 bytes or complex numbers of 16 at least; in whole numbers of Python."""
-    kind = dataset.dtype
-    size = int(kind.itemsize)
-    if is_number(kind):
-        size = 16 if kind.kind in "cV" else 8
-    for length in dataset.shape or ():
-        size *= int(length)
-    return size
+def _is_number(kind: np.dtype[Any]) -> bool:
+    """Whether a type is that of real or complex numbers."""
+    names = kind.names
+    if names in (("r", "i"), ("real", "imag")):
+        return all(kind[name].kind in "iuf" and not kind[name].shape for name in names)
+    return kind.kind in "iufc" and h5py.check_enum_dtype(kind) is None

@@ -39,7 +39,10 @@ def check_model(model: ReducedModel, n_harmonics: int = 1, *, grouped: bool | No
     """
     grouped = is_grouped(model) if grouped is None else grouped
     check_sector(model.n_sectors, model.nodal_diameter)
-    _check_names(model.response_names, "response/names")
+    names = model.response_names
+    if not names or "" in names or len(set(names)) < len(names):
+        found = ", ".join(f'"{name}"' for name in names) or "no name"
+        raise SceneError("response/names", found, "give at least one response, each with a name of its own")
     check_harmonics(model, n_harmonics)
     for k, linear in model.linear.items():
         if not 0 <= k <= model.n_sectors // 2:
@@ -61,9 +64,8 @@ def check_sector(n_sectors: int, nodal_diameter: int) -> None:
     A nodal diameter above half the number of sectors is a wave that travels backwards.
     """
     if n_sectors < 0:
-        raise SceneError(
-            "n_sectors", str(n_sectors), "give the number of sectors, or 0 for a structure that is no sector"
-        )
+        remedy = "give the number of sectors, or 0 for a structure that is no sector"
+        raise SceneError("n_sectors", str(n_sectors), remedy)
     if not 0 <= nodal_diameter <= max(n_sectors - 1, 0):
         raise SceneError("nodal_diameter", str(nodal_diameter), f"give 0 to {max(n_sectors - 1, 0)}")
 
@@ -90,49 +92,23 @@ def check_order(contact: ContactInterface) -> None:
         raise SceneError("contact/dofs", found, remedy)
 
 
-def _check_names(names: tuple[str, ...], key: str) -> None:
-    if not names:
-        raise SceneError(key, "no name", "give at least one response")
-    seen: set[str] = set()
-    for name in names:
-        if not name:
-            raise SceneError(key, "an empty name", "name every response")
-        if name in seen:
-            raise SceneError(key, f'"{name}" stands there more than once', "give every response a name of its own")
-        seen.add(name)
-
-
 def _check_contact(contact: ContactInterface, n: int) -> None:
     dofs = contact.dofs
     if dofs.ndim != 2 or dofs.shape[1] != 3 or len(dofs) == 0:
         remedy = "give one row of 3 indices for each pair, at least one row"
-        if dofs.ndim == 2 and dofs.shape[0] == 3:
-            remedy += TRANSPOSED
-        raise SceneError("contact/dofs", f"shape {dofs.shape}", remedy)
+        turned = TRANSPOSED if dofs.ndim == 2 and dofs.shape[0] == 3 else ""
+        raise SceneError("contact/dofs", f"shape {dofs.shape}", remedy + turned)
     n_contact = len(dofs)
-    shapes: dict[str, tuple[Any, tuple[int, ...]]] = {
-        "area": (contact.area, (n_contact,)),
-        "gap": (contact.gap, (n_contact,)),
-        "normal_load": (contact.normal_load, (n_contact,)),
-        "position": (contact.position, (n_contact, 3)),
-    }
-    for name in ("friction_coefficient", "edge"):
-        if getattr(contact, name) is not None:
-            shapes[name] = (getattr(contact, name), (n_contact,))
-    for name, (values, shape) in shapes.items():
-        _check_shape(f"contact/{name}", values, shape)
-        _check_finite(f"contact/{name}", values, nan_allowed=name == "position")
+    for name in ("area", "gap", "normal_load", "position", "friction_coefficient", "edge"):
+        values = getattr(contact, name)
+        if values is not None:
+            _check_shape(f"contact/{name}", values, (n_contact, 3) if name == "position" else (n_contact,))
+            infinite = np.isinf(values) if name == "position" else ~np.isfinite(values)
+            _refuse(f"contact/{name}", values, infinite, "give finite numbers")
     if len(contact.surface) != n_contact:
-        raise SceneError(
-            "contact/surface", f"{len(contact.surface)} labels", f"give one label for each of {n_contact} pairs"
-        )
-
-    outside = np.argwhere((dofs < -1) | (dofs >= n))
-    if len(outside):
-        pair, direction = outside[0]
-        raise SceneError(
-            "contact/dofs", f"{dofs[pair, direction]} at {_at(outside[0])}", f"give -1 or an index from 0 to {n - 1}"
-        )
+        found = f"{len(contact.surface)} labels"
+        raise SceneError("contact/surface", found, f"give one label for each of {n_contact} pairs")
+    _refuse("contact/dofs", dofs, (dofs < -1) | (dofs >= n), f"give -1 or an index from 0 to {n - 1}")
     used, counts = np.unique(dofs[dofs >= 0], return_counts=True)
     if (counts > 1).any():
         found = f"index {used[counts > 1][0]} is used twice"
@@ -140,18 +116,13 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
     without = np.flatnonzero((dofs < 0).all(axis=1))
     if len(without):
         raise SceneError("contact/dofs", f"pair {without[0]} has no direction", "give it at least one, or leave it out")
-    flat = np.flatnonzero(contact.area <= 0)
-    if len(flat):
-        raise SceneError("contact/area", f"{contact.area[flat[0]]} at {_at(flat[:1])}", "give a positive area in m2")
+    _refuse("contact/area", contact.area, contact.area <= 0, "give a positive area in m2")
     if contact.friction_coefficient is not None:
-        negative = np.flatnonzero(contact.friction_coefficient < 0)
-        if len(negative):
-            value = contact.friction_coefficient[negative[0]]
-            raise SceneError("contact/friction_coefficient", f"{value} at {_at(negative[:1])}", "give 0 or more")
-    loose = np.flatnonzero((dofs[:, 0] < 0) & (contact.normal_load <= 0))
-    if len(loose):
-        remedy = "give a positive normal force in N to a pair without closing displacement"
-        raise SceneError("contact/normal_load", f"{contact.normal_load[loose[0]]} at {_at(loose[:1])}", remedy)
+        friction = contact.friction_coefficient
+        _refuse("contact/friction_coefficient", friction, friction < 0, "give 0 or more")
+    loose = (dofs[:, 0] < 0) & (contact.normal_load <= 0)
+    remedy = "give a positive normal force in N to a pair without closing displacement"
+    _refuse("contact/normal_load", contact.normal_load, loose, remedy)
 
 
 def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
@@ -165,15 +136,13 @@ def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
         _check_shape(prefix + name, matrix, (n, n))
     for name, vector in vectors.items():
         _check_shape(prefix + name, vector, (n,))
+    _check_shape(f"{prefix}response/dofs", linear.response, (n_response, n))
+    for name, values in {**matrices, **vectors, "response/dofs": linear.response}.items():
+        _refuse(prefix + name, values, ~np.isfinite(values), "give finite numbers")
     for name, matrix in matrices.items():
-        _check_finite(prefix + name, matrix)
         _check_hermitian(prefix + name, matrix)
-    for name, vector in vectors.items():
-        _check_finite(prefix + name, vector)
     if np.iscomplexobj(linear.load_static):
         raise SceneError(f"{prefix}load/static", "complex", "give real forces")
-    _check_shape(f"{prefix}response/dofs", linear.response, (n_response, n))
-    _check_finite(f"{prefix}response/dofs", linear.response)
 
     try:
         cholesky(linear.mass + _NEGATIVE_MASS * _largest(linear.mass) * np.eye(n))
@@ -183,9 +152,8 @@ def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
     # For a positive semidefinite mass, K + i M is singular only where a motion has neither stiffness nor mass.
     singular = _singular(_scaled(linear.stiffness) + 1j * _scaled(linear.mass))
     if singular:
-        raise SceneError(
-            f"{prefix}stiffness", f"singular together with mass: {singular}", "give every motion stiffness or mass"
-        )
+        found = f"singular together with mass: {singular}"
+        raise SceneError(f"{prefix}stiffness", found, "give every motion stiffness or mass")
 
 
 def _check_static(linear: LinearModel, contact: ContactInterface, prefix: str) -> None:
@@ -198,10 +166,8 @@ def _check_static(linear: LinearModel, contact: ContactInterface, prefix: str) -
     away = np.setdiff1d(np.arange(len(linear.stiffness)), contact.dofs)
     singular = _singular(linear.stiffness[np.ix_(away, away)])
     if singular:
-        where = singular if len(away) == len(linear.stiffness) else f"{singular} among those without contact"
-        raise SceneError(
-            f"{prefix}stiffness", f"singular: {where}", "support every motion by stiffness or by a contact pair"
-        )
+        found = f"singular: {singular}, of the displacements without contact"
+        raise SceneError(f"{prefix}stiffness", found, "support every motion by stiffness or by a contact pair")
 
 
 def _check_shape(key: str, values: NDArray[Any], shape: tuple[int, ...]) -> None:
@@ -210,10 +176,12 @@ def _check_shape(key: str, values: NDArray[Any], shape: tuple[int, ...]) -> None
         raise SceneError(key, f"shape {values.shape}", f"give shape {shape}{turned}")
 
 
-def _check_finite(key: str, values: NDArray[Any], *, nan_allowed: bool = False) -> None:
-    wrong = np.argwhere(np.isinf(values) if nan_allowed else ~np.isfinite(values))
-    if len(wrong):
-        raise SceneError(key, f"{values[tuple(wrong[0])]} at {_at(wrong[0])}", "give finite numbers")
+def _refuse(key: str, values: NDArray[Any], wrong: NDArray[np.bool_], remedy: str) -> None:
+    """Raises SceneError about the first of the values that are wrong."""
+    places = np.argwhere(wrong)
+    if len(places):
+        at = ", ".join(str(int(index)) for index in places[0])
+        raise SceneError(key, f"{values[tuple(places[0])]} at index {at}", remedy)
 
 
 def _check_hermitian(key: str, matrix: Matrix) -> None:
@@ -256,7 +224,3 @@ def _scaled(matrix: Matrix) -> Matrix:
 
 def _largest(matrix: Matrix) -> float:
     return float(np.abs(matrix).max())
-
-
-def _at(index: NDArray[np.intp]) -> str:
-    return "index " + ", ".join(str(int(i)) for i in index)

@@ -18,7 +18,8 @@ pairs of one surface are (`contact/position`) are drawn in contact, as are faces
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,12 +29,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
-from studies.hdf5 import find_datasets, is_number, open_hdf5, read_attribute, read_text_attribute, read_texts
+from studies.hdf5 import (
+    Datasets,
+    as_whole,
+    find_datasets,
+    open_hdf5,
+    read_attribute,
+    read_dataset,
+    read_text_attribute,
+)
 from studies.model_check import PAIRS_ARE_ROWS, check_model, check_order, check_sector, is_grouped
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
-
-Datasets = Mapping[str, h5py.Dataset]
 
 CONTACT = {
     "dofs": "whole",
@@ -88,10 +95,16 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
     "model"; OSError where the file is missing or cannot be opened.
     """
     with _open_scene(Path(path), group) as (root, datasets):
-        model = _read_model(root, datasets)
+        prefixes = _prefixes(datasets)
+        grouped = prefixes != {0: ""}
+        n_sectors, nodal_diameter = (_read_count(root, name, required=grouped) for name in ATTRIBUTES)
+        check_sector(n_sectors, nodal_diameter)
+        linear = {k: _read_linear(datasets, prefix, real=k == 0) for k, prefix in prefixes.items()}
+        names = _read_names(datasets, [f"{prefix}response/names" for prefix in prefixes.values()])
+        model = ReducedModel(linear, _read_contact(datasets), names, n_sectors, nodal_diameter)
         # results are written here
         shows_order = bool(group) or _shows_order(datasets)
-    check_model(model, n_harmonics, grouped=_is_grouped(datasets))
+    check_model(model, n_harmonics, grouped=grouped)
     if not shows_order:
         check_order(model.contact)
     return model
@@ -100,7 +113,13 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
 def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
     """The mesh of a scene file, None where it has none. Raises what `read_scene` raises."""
     with _open_scene(Path(path), group) as (_, datasets):
-        return _read_mesh(datasets) if any(key.startswith("mesh/") for key in datasets) else None
+        return _read_mesh(datasets) if _holds_mesh(datasets) else None
+
+
+def has_mesh(path: str | Path, group: str = "") -> bool:
+    """Whether a scene file has a mesh. Raises what `read_scene` raises."""
+    with _open_scene(Path(path), group) as (_, datasets):
+        return _holds_mesh(datasets)
 
 
 def read_origin(path: str | Path) -> dict[str, str]:
@@ -112,108 +131,91 @@ def read_origin(path: str | Path) -> dict[str, str]:
         return {name: text for name in ORIGIN if (text := read_text_attribute(file, name))}
 
 
-def has_mesh(path: str | Path, group: str = "") -> bool:
-    """Whether a scene file has a mesh. Raises what `read_scene` raises."""
-    with _open_scene(Path(path), group) as (_, datasets):
-        return any(key.startswith("mesh/") for key in datasets)
-
-
 @contextmanager
-def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, dict[str, h5py.Dataset]]]:
+def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets]]:
     """Group and datasets of a scene, found and looked at, but not read."""
     with open_hdf5(path) as file:
         root = file.get(group) if group else file
         if not isinstance(root, h5py.Group):
             raise SceneError(group, "missing", f"give a file with a group {group}")
         datasets = find_datasets(root)
-        _refuse_unknown(datasets, _is_grouped(datasets))
+        prefixes = _prefixes(datasets)
+        known = [f"contact/{name}" for name in CONTACT] + [f"mesh/{name}" for name in MESH]
+        known += [prefix + name for prefix in prefixes.values() for name in LINEAR]
+        for key in datasets:
+            if key not in (*known, "response/names"):
+                remedy = f"remove it, known are {', '.join(known[: len(CONTACT) + len(MESH)] + list(LINEAR))}"
+                where = "" if prefixes == {0: ""} else ", the latter in nd/<nodal diameter>/"
+                raise SceneError(key, "unknown dataset", remedy + where)
         yield root, datasets
 
 
-def _is_grouped(datasets: Iterable[str]) -> bool:
-    return any(key.startswith("nd/") for key in datasets)
+def _prefixes(datasets: Datasets) -> dict[int, str]:
+    """Beginnings of the names of the datasets of each nodal diameter; of 0 alone where the file has no groups `nd`."""
+    found = {int(match[1]) for key in datasets if (match := re.match(r"nd/(0|[1-9][0-9]*)/", key))}
+    return {k: f"nd/{k}/" for k in sorted(found)} or {0: ""}
 
 
-def _read_model(root: h5py.Group, datasets: Datasets) -> ReducedModel:
-    grouped = _is_grouped(datasets)
-    n_sectors, nodal_diameter = (_read_count(root, name, required=grouped) for name in ATTRIBUTES)
-    check_sector(n_sectors, nodal_diameter)
-    prefixes = {0: ""}
-    if grouped:
-        prefixes = {
-            k: f"nd/{k}/" for k in sorted({int(key.split("/")[1]) for key in datasets if key.startswith("nd/")})
-        }
-    linear = {k: _read_linear(datasets, prefix, real=k == 0) for k, prefix in prefixes.items()}
-    shared = "response/names" in datasets
-    own = {key: _read(datasets, key if key in datasets or not shared else "response/names", "text")
-           for key in (f"{prefix}response/names" for prefix in prefixes.values())}  # fmt: skip
-    first = next(iter(own.values()))
-    for key, others in own.items():
-        if others != first:
-            raise SceneError(key, ", ".join(others), f"give the same names as elsewhere: {first}")
-    return ReducedModel(linear, _read_contact(datasets), first, n_sectors, nodal_diameter)
+def _holds_mesh(datasets: Datasets) -> bool:
+    return any(key.startswith("mesh/") for key in datasets)
 
 
 def _read_mesh(datasets: Datasets) -> SurfaceMesh:
-    axes = [_read(datasets, f"mesh/{axis}", "real") for axis in "xyz"]
+    axes = [read_dataset(datasets, f"mesh/{axis}", "real") for axis in "xyz"]
     n_nodes = axes[0].size
     for axis, values in zip("xyz", axes, strict=True):
-        if values.shape != (n_nodes,):
-            raise SceneError(f"mesh/{axis}", f"shape {values.shape}", f"give shape ({n_nodes},), as mesh/x has")
-        if not np.isfinite(values).all():
-            raise SceneError(f"mesh/{axis}", "not finite", "give finite numbers")
-    quads = _read(datasets, "mesh/quad", "whole")
+        if values.shape != (n_nodes,) or not np.isfinite(values).all():
+            found = f"shape {values.shape}" if values.shape != (n_nodes,) else "not finite"
+            raise SceneError(f"mesh/{axis}", found, "give one finite number for each node")
+    quads = read_dataset(datasets, "mesh/quad", "whole")
     if quads.ndim != 2 or quads.shape[1] != 4:
         raise SceneError("mesh/quad", f"shape {quads.shape}", "give one row of 4 nodes for each face")
-    outside = quads[(quads < 0) | (quads >= n_nodes)]
-    if len(outside):
-        raise SceneError("mesh/quad", str(outside[0]), f"give nodes from 0 to {n_nodes - 1}")
-    parts = _read(datasets, "mesh/part", "text")
+    _check_indices("mesh/quad", quads, n_nodes)
+    parts = read_dataset(datasets, "mesh/part", "text")
     if len(parts) != len(quads):
         raise SceneError("mesh/part", f"{len(parts)} labels", f"give one label for each of {len(quads)} faces")
     return SurfaceMesh(np.stack(axes, axis=1), quads, parts)
 
 
-def _refuse_unknown(datasets: Iterable[str], grouped: bool) -> None:
-    known = {*(f"contact/{name}" for name in CONTACT), *(f"mesh/{name}" for name in MESH)}
-    for key in datasets:
-        if key in known or (grouped and key == "response/names"):
-            continue
-        dataset = key
-        if grouped:
-            group, number, *below = [*key.split("/"), ""]
-            if group != "nd" or not number.isdecimal() or str(int(number)) != number:
-                raise SceneError(key, "unknown dataset", "remove it, or move it into nd/<nodal diameter>/")
-            dataset = "/".join(below[:-1])
-        if dataset not in LINEAR:
-            raise SceneError(key, "unknown dataset", f"remove it, known are {', '.join([*sorted(known), *LINEAR])}")
+def _check_indices(key: str, indices: NDArray[np.int64], n: int) -> None:
+    outside = indices[(indices < 0) | (indices >= n)]
+    if outside.size:
+        raise SceneError(key, str(outside[0]), f"give indices from 0 to {n - 1}")
 
 
 def _read_count(root: h5py.Group, name: str, *, required: bool) -> int:
     value = read_attribute(root, name)
-    if value is None:
-        if required:
-            raise SceneError(name, "missing", f"give the attribute {name} to a file with groups nd/<k>")
-        return 0
-    number = value.item()
-    if value.dtype.kind not in "iuf" or not abs(number) < 2**31 or number != np.floor(number):
+    if value is None and required:
+        raise SceneError(name, "missing", f"give the attribute {name} to a file with groups nd/<k>")
+    number: Any = 0 if value is None else value.item()
+    if not isinstance(number, int | float) or not abs(number) < 2**31 or number != int(number):
         raise SceneError(name, str(number), "give a whole number as the attribute")
     return int(number)
+
+
+def _read_names(datasets: Datasets, keys: list[str]) -> tuple[str, ...]:
+    """Names of the responses, the same in all groups, or beside them."""
+    shared = "response/names"
+    names = {key: read_dataset(datasets, key if key in datasets or shared not in datasets else shared, "text")
+             for key in keys}  # fmt: skip
+    first: tuple[str, ...] = names[keys[0]]
+    for key, others in names.items():
+        if others != first:
+            raise SceneError(key, ", ".join(others), f"give the same names as elsewhere: {first}")
+    return first
 
 
 def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
     def matrix(name: str) -> Any:
         """Numbers as they are, but without the imaginary part where it is zero and cannot be anything else."""
-        values = _read(datasets, prefix + name, "any")
+        values = read_dataset(datasets, prefix + name, "any")
         return values.real.copy() if real and not values.imag.any() else values
 
     stiffness, mass, response = matrix("stiffness"), matrix("mass"), matrix("response/dofs")
     key, n = f"{prefix}response/dofs", len(stiffness)
     if response.ndim == 1:
-        indices = _whole(key, response)
-        outside = indices[(indices < 0) | (indices >= n)]
-        if len(outside):
-            raise SceneError(key, str(outside[0]), f"give indices from 0 to {n - 1}, or a matrix")
+        indices = as_whole(key, response)
+        _check_indices(key, indices, n)
         response = np.eye(n)[indices]
     key = f"{prefix}damping"
     damping = matrix("damping") if key in datasets else np.zeros(stiffness.shape)
@@ -228,17 +230,15 @@ def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
         mass=mass,
         damping=damping,
         stiffness=stiffness,
-        load_static=_read(datasets, f"{prefix}load/static", "real"),
-        load_harmonic=_read(datasets, f"{prefix}load/harmonic", "any").astype(np.complex128),
+        load_static=read_dataset(datasets, f"{prefix}load/static", "real"),
+        load_harmonic=read_dataset(datasets, f"{prefix}load/harmonic", "any").astype(np.complex128),
         response=response,
     )
 
 
 def _read_contact(datasets: Datasets) -> ContactInterface:
-    present = {
-        name: kind for name, kind in CONTACT.items() if f"contact/{name}" in datasets or name in ("dofs", "area")
-    }
-    found = {name: _read(datasets, f"contact/{name}", kind) for name, kind in present.items()}
+    keys = [name for name in CONTACT if f"contact/{name}" in datasets or name in ("dofs", "area")]
+    found = {name: read_dataset(datasets, f"contact/{name}", CONTACT[name]) for name in keys}
     n_contact = len(found["dofs"])
     absent = {"gap": np.zeros(n_contact), "normal_load": np.zeros(n_contact), "surface": ("",) * n_contact}
     return ContactInterface(**{**absent, "position": np.full((n_contact, 3), np.nan), **found})
@@ -254,42 +254,6 @@ def _shows_order(datasets: Datasets) -> bool:
         return True
     shapes = [dataset.shape for key, dataset in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
     return any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)
-
-
-def _whole(key: str, values: Any) -> Any:
-    # MATLAB writes whole numbers as floating ones.
-    with np.errstate(invalid="ignore"):
-        whole = values.real.astype(np.int64)
-    wrong = values[whole != values]
-    if wrong.size:
-        raise SceneError(key, str(wrong.flat[0]), "give whole numbers")
-    return whole
-
-
-def _read(datasets: Datasets, key: str, kind: str) -> Any:
-    """Values of a dataset: "any" numbers (float64 or complex128), "real" or "whole" ones, "flags", or "text"."""
-    if key not in datasets:
-        raise SceneError(key, "missing", "give this dataset")
-    dataset = datasets[key]
-    if not dataset.shape:
-        raise SceneError(key, "a single value or nothing", "give an array")
-    if kind == "text":
-        return read_texts(dataset, key)
-    if not is_number(dataset.dtype):
-        raise SceneError(key, f"type {dataset.dtype}", "give numbers")
-    values, names = dataset[()], dataset.dtype.names
-    if names is not None:
-        parts, values = values, np.empty(dataset.shape, dtype=np.complex128)
-        values.real, values.imag = parts[names[0]], parts[names[1]]
-    values = values.astype(np.complex128 if values.dtype.kind == "c" else np.float64)
-    if kind == "real" and np.iscomplexobj(values):
-        raise SceneError(key, "complex", "give real numbers")
-    if kind == "flags":
-        wrong = values[(values != 0) & (values != 1)]
-        if wrong.size:
-            raise SceneError(key, str(wrong.flat[0]), "give 0 or 1")
-        return np.asarray(values == 1)
-    return _whole(key, values) if kind == "whole" else values
 
 
 def scene_attributes(model: ReducedModel) -> dict[str, int]:

@@ -13,7 +13,7 @@ from studyrunner.mpi.ranks import Ranks, launcher_size
 from studyrunner.result.opening import open_result
 from studyrunner.result.provenance import check_date
 from studyrunner.result.target import check_result
-from studyrunner.run import RunOptions, compute_study
+from studyrunner.run import RunOptions, compute_study, open_progress
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay
@@ -35,9 +35,8 @@ def run_study(
 ) -> xr.Dataset:
     """Run a study in this process, as the command `run-study` does, and open its result.
 
-    The result is that of the command, to the last bit, and a run that was ended early goes on when it is called again,
-    from here or by the command. This process computes alone, with one thread of the linear algebra; for several
-    processes give `mpiexec -n 8 run-study study.toml -o output.nc`.
+    The result is that of the command, to the last bit, and a run that was ended early goes on, from here or by the
+    command. This process computes alone, with one thread; for several give `mpiexec -n 8 run-study study.toml`.
 
     Parameters
     ----------
@@ -88,7 +87,7 @@ def run_study(
         raise UserError("run_study", error.key, error.value, error.remedy) from None
     shown = ProgressDisplay(quiet=not progress)
     # the scene as well: with two threads its matrices differ in the last bits, and start states with them
-    with threadpool_limits(1):
+    with threadpool_limits(1), open_progress(target) as store:
         given = RunOptions(fresh, retry_failed, checked, "the same call")
-        compute_study(Ranks(), study, target, given, shown, shown.say)
-    return open_result(target.path)
+        compute_study(Ranks(), study, target, store, given, shown)
+        return open_result(target.path)

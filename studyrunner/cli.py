@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from studyrunner.mpi.ranks import (
-    POLL_SECONDS,
-    LauncherError,
-    RankInterrupted,
-    Ranks,
-    job_size,
-    launcher_rank,
-    start_ranks,
-)
+from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, RankInterrupted, Ranks, launcher_rank, start_ranks
 from studyrunner.system.machine import MachineFaultError
 from studyrunner.system.process import (
     INTERRUPTED,
@@ -29,11 +23,9 @@ from studyrunner.system.process import (
     raise_ending,
     take_endings,
 )
-from studyrunner.user_error import StorageError, UserError, show_text
+from studyrunner.user_error import StorageError, UserError
 
 if TYPE_CHECKING:
-    import argparse
-
     from studyrunner.study.study import Study
 
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3
@@ -45,16 +37,38 @@ _SECONDS_FOR_RANK_0 = 60.0
 """Time that rank 0 has for writing the result, s, before another interrupted rank ends the run."""
 
 _SECONDS_FOR_A_LINE = 2.0
-_SECONDS_WITHOUT_A_WORD = 3.0
+
+
+_DESCRIPTION = """\
+Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
+
+Alone, under "mpiexec -n N run-study ..." or under "srun run-study ...": the result is the same."""
+
+_EPILOG = """\
+examples:
+  run-study --new my_study                               writes my_study.toml, a study to start from
+  run-study                                              the bundled study "dovetail" -> dovetail.nc
+  run-study --plan                                       what that would compute, and how long it takes
+  mpiexec -n 2 run-study my_study.toml -o worn.nc        a study of one's own on two cores
+  run-study my_study.toml --check                        mass, pairs, frequencies of a finite-element model
+  run-study worn.nc -o again.nc                          the study of a result file again
+  run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[192.0, 192.5]'
+
+exit status:
+  0  all points were computed to the end, each with its error; the last lines say how many are known to rtol
+  1  unexpected failure
+  2  bad input, nothing was computed: a line for each mistake says what is wrong
+  3  finished and saved, but some points failed, not computed to the end; their `outcome` says why
+  130  ended by Ctrl-C, SIGTERM, SIGHUP or SIGUSR1; the file holds the points that were computed until then
+
+A run that was ended, in whatever way, goes on where it was when the same command is given again. What it needs for that
+is in the file OUT.nc.progress; with it a study that is changed computes only what is new. It may be removed."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks.
 
-    Parameters
-    ----------
-    arguments
-        None for those of the process, which ends here if the run did not come to its end.
+    arguments: None for those of the process, which ends here if the run did not come to its end.
     """
     try:
         take_endings()
@@ -86,7 +100,11 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
             for rank in range(1, ranks.size):
                 ranks.send(None, rank)
         else:
-            status = _follow(ranks)
+            from studyrunner.mpi.schedule import follow_rank_0
+            from studyrunner.task_runs import evaluator
+
+            follow_rank_0(ranks, evaluator())
+            status = CONVERGED
         if arguments is None:
             # it has come to its end: what comes while MPI and the interpreter end is of no use to anybody
             begin_ending()
@@ -137,30 +155,16 @@ def _leave_to_rank_0(ranks: Ranks, reason: object) -> bool:
     return False
 
 
-def _follow(ranks: Ranks) -> int:
-    from studyrunner.mpi.schedule import follow_rank_0
-    from studyrunner.task_runs import evaluator
-
-    follow_rank_0(ranks, evaluator())
-    return CONVERGED
-
-
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     try:
-        from studyrunner.options import parse_options
-
-        options = parse_options(arguments)
+        options = _parse_options(arguments)
         raise_ending()
         from studyrunner.study.study_file import read_study
 
         study = read_study(options.study, options.overrides)
         raise_ending()
-        if options.plan:
-            return _show_plan(study)
-        if options.check:
-            return _check(study)
-        if options.write_scene is not None:
-            return _write_scene(study, options.write_scene)
+        if options.plan or options.check or options.write_scene is not None:
+            return _describe(study, options)
         return _compute(ranks, study, options)
     except UserError as error:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
@@ -171,81 +175,51 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     return BAD_INPUT
 
 
-def _slow_steps() -> Callable[[str], None]:
-    """Takes lines on how a scene is built, and prints those of a scene that takes long."""
-    began = time.monotonic()
-
-    def say(doing: str) -> None:
-        raise_ending()
-        seconds = time.monotonic() - began
-        if seconds > _SECONDS_WITHOUT_A_WORD:
-            print(f"[{seconds:5.0f} s] {doing}", file=sys.stderr, flush=True)
-
-    return say
-
-
-def _show_plan(study: Study) -> int:
-    from studyrunner.kinds.estimate import largest_memory
-    from studyrunner.kinds.kind import build_tasks
-    from studyrunner.plan import doubts_of_study, format_plan
-    from studyrunner.scene.answers import remarks_of_study
-    from studyrunner.scene.pairs import contact_changes
-    from studyrunner.scene.scene_set import plan_scenes
-
-    before = largest_memory()
-    planned = plan_scenes(study, _slow_steps())
-    built_with = largest_memory() - before
-    contacts = contact_changes(study, planned.scenes, planned.facts)
-    plan = build_tasks(study, [each.n_displacements for each in planned.facts], contacts, planned.scenes)
-    seconds = time.process_time() + planned.seconds_left
-    lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
-    said = *remarks_of_study(study), *(("note", doubt) for doubt in doubts_of_study(study, planned.largest))
-    print(*lines, *(f"{label:<10} {show_text(text)}" for label, text in said), sep="\n", flush=True)
-    error = last_error(sys.stdout)
-    if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
-        raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
-    return CONVERGED
-
-
-def _check(study: Study) -> int:
-    from studyrunner.result.target import check_output
+def _describe(study: Study, options: argparse.Namespace) -> int:
+    """What the options --plan, --check and --write-scene print and write."""
+    from studyrunner.plan import plan_lines
+    from studyrunner.result.target import check_output, check_scene_file
     from studyrunner.scene.answers import check_study_model
-
-    picture = Path(f"{study.study.name}.check.png")
-    target = check_output("--check", picture, study.files)
-    print(check_study_model(study, target, _slow_steps()), flush=True)
-    print(f"{picture}: the contact pairs and their frames", flush=True)
-    return CONVERGED
-
-
-def _write_scene(study: Study, path: Path) -> int:
-    from studyrunner.result.target import check_scene_file
     from studyrunner.scene.scene import write_study_scene
+    from studyrunner.system.progress import ProgressDisplay
 
-    write_study_scene(study, check_scene_file("--write-scene", path, study), _slow_steps())
-    print(f"{path}: the scene of study {study.study.name}", flush=True)
+    step = ProgressDisplay().step
+    if options.plan:
+        print(*plan_lines(study, step), sep="\n", flush=True)
+        error = last_error(sys.stdout)
+        if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
+            raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
+    elif options.check:
+        picture = Path(f"{study.study.name}.check.png")
+        print(check_study_model(study, check_output("--check", picture, study.files), step), flush=True)
+        print(f"{picture}: the contact pairs and their frames", flush=True)
+    else:
+        path = options.write_scene
+        write_study_scene(study, check_scene_file("--write-scene", path, study), step)
+        print(f"{path}: the scene of study {study.study.name}", flush=True)
     return CONVERGED
 
 
 def _compute(ranks: Ranks, study: Study, options: argparse.Namespace) -> int:
     from solver.outcome import COMPLETE
     from studyrunner.result.target import check_result
-    from studyrunner.run import RunOptions, compute_study
+    from studyrunner.run import RunOptions, compute_study, open_progress
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", path, study, overwrite=options.overwrite)
-    display, announced = ProgressDisplay(), job_size() if ranks.size == 1 else 0
-    idle = f"one process, although the job has room for {announced}: srun or mpiexec starts them"
-    given = RunOptions(options.fresh, options.retry_failed, options.date)
-    outcomes = compute_study(ranks, study, target, given, display, _slow_steps(), [idle] if announced > 1 else [])
+    display, given = ProgressDisplay(), RunOptions(options.fresh, options.retry_failed, options.date)
+    with open_progress(target) as store:
+        outcomes = compute_study(ranks, study, target, store, given, display)
+        # no other run replaces the result meanwhile
+        answer = _answer(target.path)
     n_points, n_complete = outcomes.total(), sum(outcomes[number] for number in COMPLETE)
     counts = f"{count(n_points, 'point')}, {n_complete} computed, {n_points - n_complete} failed"
-    print(f"{path}: {counts}, {format_seconds(display.seconds)}", *_answer(target.path), sep="\n", flush=True)
+    print(f"{path}: {counts}, {format_seconds(display.seconds)}", *answer, sep="\n", flush=True)
     return SOME_FAILED if n_complete < n_points else CONVERGED
 
 
-def _answer(path: Path) -> tuple[str, ...]:
+def _answer(path: Path) -> Sequence[str]:
     """What came out, in lines, read from the result."""
     # where they are used: they take a second to load
     from studyrunner.result.opening import open_result
@@ -257,6 +231,68 @@ def _answer(path: Path) -> tuple[str, ...]:
     except UserError as error:
         # the result is there all the same, but larger than what is read
         return (f"no summary: {error}",)
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
+
+
+def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """Options from the command line, by their names.
+
+    study: text. output, write_scene: paths or None. overrides: texts. date: checked, or None. The others are flags.
+
+    Raises UserError; SystemExit after --help, --new and the like.
+    """
+    look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+    parser = _Parser("run-study", description=_DESCRIPTION, epilog=_EPILOG, **look)
+    add, flag, path = parser.add_argument, dict[str, Any](action="store_true"), dict[str, Any](type=Path)
+    which = "TOML file, result file or bundled study (default: dovetail)"
+    add("study", nargs="?", default="dovetail", metavar="STUDY", help=which)
+    add("-o", dest="output", metavar="OUT.nc", help="result file (default: <study name>.nc, here)", **path)
+    version = f"fretwear {metadata.version('fretwear')}"
+    add("--version", action="version", version=version, help="print the version")
+    add("--new", metavar="NAME", help="write NAME.toml, a study to start from, and stop")
+    add("--from", dest="deck", metavar="DECK", help="with --new: a study of this deck", **path)
+    add("--plan", help="print what would be computed; compute nothing", **flag)
+    add("--check", help="print what a finite-element model is, draw its contact pairs; then stop", **flag)
+    changed = "override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated"
+    add("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help=changed)
+    add("--write-scene", metavar="PATH.h5", help="write the scene as a scene file and stop", **path)
+    add("--scene-help", metavar="SCENE", help="print what a bundled scene is, and its parameters")
+    add("--fresh", help="start over: forget what an earlier run of it has left", **flag)
+    add("--overwrite", help="replace the result of another study", **flag)
+    add("--retry-failed", help="compute points that failed in an earlier run once more", **flag)
+    date = "date_created of the result: a date, or now; without it equal runs have equal files"
+    add("--date", nargs="?", const="now", metavar="ISO", help=date)
+    found = parser.parse_args(list(arguments))
+    if found.deck is not None and found.new is None:
+        remedy = "give --new NAME beside it: the name of the new study"
+        raise UserError("command line", "--from", str(found.deck), remedy)
+    if found.scene_help is not None or found.new is not None:
+        print(_scene_help(found.scene_help) if found.new is None else _new_study(found.new, found.deck), flush=True)
+        parser.exit()
+    if found.date is not None:
+        from studyrunner.result.provenance import check_date  # where it is used: it takes a second to load
+
+        found.date = check_date(found.date, "command line", "--date")
+    return found
+
+
+def _scene_help(scene: str) -> str:
+    from studies.scenes import BUNDLED, scene_help
+
+    if scene not in BUNDLED:
+        raise UserError("command line", "--scene-help", scene, f"give one of {', '.join(BUNDLED)}")
+    return scene_help(scene)
+
+
+def _new_study(name: str, deck: Path | None) -> str:
+    from studyrunner.study.keys import write_new_study
+
+    path = write_new_study(name, deck)
+    return f"{path}: run-study {path} computes it"
 
 
 if __name__ == "__main__":

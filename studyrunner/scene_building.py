@@ -180,6 +180,7 @@ class _Building(Office):
     """Rank 0 while the scenes are built. found: those that are, by number."""
 
     def __init__(self, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> None:
+        super().__init__()
         self._keys = [model_key(study) for study in scenes.studies]
         self._studies = scenes.studies
         self._store = store

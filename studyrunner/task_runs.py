@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -11,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error
+from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.kinds.task import Keep, Result, StartResult, Task
-from studyrunner.mpi.dispatch import CostModel
+from studyrunner.kinds.task import Keep, PointResult, Result, StartResult, Task
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Office, Run
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task
@@ -29,10 +28,6 @@ Models = Mapping[int, "ReducedModel"]
 _LATE = 0.3
 """Expected further time of a task that takes longer than estimated, over the time that it is late. For an estimate with
 an uncertainty factor of two the mean further time is this fraction."""
-
-_FAR = 2.0
-"""Times the estimate, from which on a task is expected to take about as long again as it has taken: it is at a fold,
-which takes up to five times as long as other points, or more."""
 
 
 def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
@@ -60,9 +55,23 @@ def evaluator() -> Run:
         if isinstance(task, SceneTask):
             yield from build_scene_task(task, keep)
             return
-        left = dict.fromkeys(task.places)
+        left, last, is_limited = dict.fromkeys(task.places), task.resume, False
+
+        def keep_last(progress: Packed | str) -> None:
+            nonlocal last
+            last = progress if isinstance(progress, Packed) else last
+            keep(progress)
+
         try:
-            for result in compute_task(replace(task, models=()), own_models(task), keep):
+            for result in compute_task(replace(task, models=()), own_models(task), keep_last):
+                if isinstance(result, PointResult):
+                    outcome, message = result.values["outcome"], result.values["message"]
+                    if outcome == Outcome.EXCEPTION and tells_of_machine(message):
+                        # the solver takes whatever breaks it off for an end
+                        raise MachineFaultError(message)
+                    # a history that its time limit has ended goes on from there when it gets more
+                    is_limited = is_limited or outcome == Outcome.TIME_LIMIT
+                    result = replace(result, progress=last) if is_limited else result
                 left.pop(result.place, None)
                 yield result
         except Exception as error:
@@ -85,14 +94,13 @@ class TaskProgress(Office):
     """
 
     def __init__(self, completion: CompletionIndex) -> None:
-        self.costs = CostModel()
+        super().__init__()
         self.n_points = completion.n_points_finished
         self._completion = completion
         self._sweeps = completion.sweeps_left()
         self.tasks = [*self._sweeps, *(task for task in completion.plan.results if not completion.is_finished(task))]
         self._n_given: Counter[str] = Counter()
-        self._words: dict[str, str] = {}  # where a sweep is
-        self._shares: dict[str, tuple[float, float]] = {}  # what of a task is done, and when it said so, s
+        self._words: dict[str, str] = {}  # where a task is
         self._suspects: list[Task] = []  # they wait for the one that is under way
         self._tried = ""
         self._left: dict[str, float] = defaultdict(float)  # estimated seconds, by group
@@ -110,24 +118,21 @@ class TaskProgress(Office):
         """Takes a result; returns tasks that the result makes possible."""
         self._n_given[task.key] += 1
         is_last = self._n_given[task.key] == task.n_results
-        if is_last:
-            del self._n_given[task.key]
         self._left[task.group] -= task.cost / task.n_results
-        self._shares.pop(task.key, None)
         self._completion.add(task, result)
         self.n_points += len(task.points(result.place))
         new = self._start(task, result) if isinstance(result, StartResult) else ()
-        if task.key == self._tried and is_last:
-            self._tried = ""
-            new, self._suspects = [*new, *self._suspects], []
+        if is_last:
+            del self._n_given[task.key]
+            if task.key == self._tried:
+                self._tried = ""
+                new, self._suspects = [*new, *self._suspects], []
         return self._without_suspects(new)
 
     def keep(self, task: Task, progress: object) -> None:
         """Takes the progress of a task as `Keep` does."""
         if isinstance(progress, str):
             self._words[task.key] = progress
-        elif isinstance(progress, float):
-            self._shares[task.key] = progress, time.monotonic()
         else:
             self._completion.keep(task, progress)
 
@@ -135,14 +140,11 @@ class TaskProgress(Office):
         """State of the tasks. running: as `Dispatcher.running`."""
         factors = {group: self.costs.correction(((group,),)) for group in self._left}
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
-        done = sum(map(self.costs.measured, factors))
-        longest = 0.0
+        done, longest = sum(self.costs.sums.get(group, (0.0, 0.0, 0))[0] for group in factors), 0.0
         for task, _, elapsed in running:
             expected = task.cost / task.n_results * factors[task.group]
-            still = self._still(task, expected, elapsed)
-            left += still - expected
-            done += elapsed
-            longest = max(longest, still)
+            still = max(expected - elapsed, _LATE * elapsed)
+            left, done, longest = left + still - expected, done + elapsed, max(longest, still)
         return Standing(
             n_done=self.n_points,
             n_points=self._completion.plan.n_points,
@@ -151,30 +153,9 @@ class TaskProgress(Office):
             running=tuple(self._describe(task, n_left) for task, n_left, _ in running),
         )
 
-    def _still(self, task: Task, expected: float, elapsed: float) -> float:
-        """Time left, s, of a running task: by its expected time at first, then more and more by the share that is done.
-
-        What a task takes that is late already, or stands still, is a guess.
-        """
-        planned = max(expected - elapsed, _LATE * elapsed, elapsed - _FAR * expected)
-        share, came = self._shares.get(task.key, (0.0, 0.0))
-        if share == 0.0:
-            return planned
-        since = min(time.monotonic() - came, elapsed)
-        by_share = max((elapsed - since) * (1.0 - share) / share - since, _LATE * since)
-        weight = min(1.0, 2.0 * share)
-        return (1.0 - weight) * planned + weight * by_share
-
-    def _without_suspects(self, tasks: Iterable[Task]) -> list[Task]:
-        """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""
-        now = []
-        for task in tasks:
-            if not self._completion.is_suspect(task) or self._tried in ("", task.key):
-                self._tried = task.key if self._completion.is_suspect(task) else self._tried
-                now.append(task)
-            else:
-                self._suspects.append(task)
-        return now
+    def _describe(self, task: Task, n_left: int) -> str:
+        what = task.describe(task.places[task.n_results - n_left])
+        return f"{what} ({self._words[task.key]})" if task.key in self._words else what
 
     def _start(self, sweep: Task, result: StartResult) -> Sequence[Task]:
         """The tasks that begin from a start state, whose cost is known better now."""
@@ -185,11 +166,17 @@ class TaskProgress(Office):
                 self._left[task.group] += sign * task.cost
         return new
 
-    def _describe(self, task: Task, n_left: int) -> str:
-        what = task.describe(task.places[task.n_results - n_left])
-        if task.key in self._shares:
-            return f"{what} ({100.0 * self._shares[task.key][0]:.0f} %)"
-        return f"{what} ({self._words[task.key]})" if task.key in self._words else what
+    def _without_suspects(self, tasks: Iterable[Task]) -> list[Task]:
+        """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""
+        now = []
+        for task in tasks:
+            is_suspect = self._completion.is_suspect(task)
+            if is_suspect and self._tried not in ("", task.key):
+                self._suspects.append(task)
+            else:
+                self._tried = task.key if is_suspect else self._tried
+                now.append(task)
+        return now
 
 
 class StudyRun(TaskProgress):
@@ -197,9 +184,7 @@ class StudyRun(TaskProgress):
 
     def __init__(self, completion: CompletionIndex, models: SceneModels, display: ProgressDisplay) -> None:
         super().__init__(completion)
-        self._store = completion.store
-        self._models = models
-        self.display = display
+        self._store, self._models, self._display = completion.store, models, display
         self._n_compiled: int | None = n_compiled()
 
     def prepare(self, rank: int, task: Task) -> Task:
@@ -211,6 +196,6 @@ class StudyRun(TaskProgress):
         """Writes and shows what is due."""
         if self._n_compiled is not None and n_compiled() > self._n_compiled:
             self._n_compiled = None
-            self.display.say("the solver is compiled for this machine, once after an installation")
+            self._display.say("the solver is compiled for this machine, once after an installation")
         self._store.tick()
-        self.display.tick(lambda: self.look(running()))
+        self._display.tick(lambda: self.look(running()))

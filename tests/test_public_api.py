@@ -36,7 +36,7 @@ from fretwear import (
     response_curve,
     run_study,
 )
-from studies.scenes.den_hartog import DenHartogSlider
+from studies.scenes.sdof_slider import DenHartogSlider
 from studyrunner.cli import main
 from tests.solver.models import OMEGA, random_model
 from tests.studyrunner.faked_runs import Solver

@@ -2,12 +2,8 @@
 
 A state is solved again with more harmonics and with more samples. Each solve begins from the state. The change, times a
 safety factor for the rest of the series, is the error. Automatic settings take more harmonics or more samples until the
-error is below `rtol`:
-
-- A state without even harmonics goes on without them.
-- A state in which nothing slips or opens keeps the first harmonic only, which is then exact.
-- Masses that ratchet are brought to rest first (`solver.continuation.natural`).
-- Where Newton's method diverges from a state with fewer harmonics, new ones begin as those of the force samples.
+error is below `rtol`. A state without even harmonics goes on without them; one in which nothing slips or opens keeps
+the first harmonic only, which is then exact. Masses that ratchet are brought to rest first.
 """
 
 from __future__ import annotations
@@ -16,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
 from solver.accuracy.harmonic_levels import (
     HARMONIC_LEVELS,
     fewer,
@@ -26,11 +21,11 @@ from solver.accuracy.harmonic_levels import (
     shifted,
     shortest_contact,
 )
-from solver.accuracy.resolved_state import FAINT_SHARE, ResolvedState
+from solver.accuracy.resolved_state import FAINT_SHARE, NOTHING, UNKNOWN, Estimate, ResolvedState
 from solver.harmonic_balance.state import State
 from solver.newton.linear_solver import SMALL_JOINT
 from solver.newton.run import Run
-from solver.settings import FINE_SAMPLES, Resolution
+from solver.settings import FINE_SAMPLES, Resolution, first_resolution
 from solver.stability.disturbances import EXPENSIVE_UNKNOWNS
 from solver.structure.joint import Case, Joint
 
@@ -81,47 +76,37 @@ of 48 pairs with nine harmonics may take 200."""
 
 
 @dataclass(frozen=True)
-class Refined:
+class Refined(ResolvedState):
     """A state with the harmonics and samples that it needs, or with the most that are allowed.
 
-    case, point: the case with the resolution of the state, and the state, with the parameter of the given one.
     estimate: estimated errors of the state.
     accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given.
         Always true for fixed settings.
     """
 
-    case: Case
-    point: State
     estimate: Estimate
     accurate: bool
 
 
-def refine(
-    case: Case, omega: float, excitation_amplitude: float, point: State, run: Run, most: float = MOST_UNKNOWNS
-) -> Refined:
+def refine(case: Case, joint: Joint, point: State, run: Run, *, node: bool = False) -> Refined:
     """Estimate the error of a state at fixed wear depth; refine the state to an error below rtol in automatic settings.
 
     The result is the last state found, with its error, where none is accurate.
 
-    case, point: the state and the case with its harmonics and samples. omega, excitation_amplitude: rad/s, N.
-    most: most unknowns of a joint of 48 pairs with more harmonics.
+    case, joint, point: the state, its joint, and the case with its harmonics and samples.
+    node: whether the state is a node of a sweep: with at least the first harmonics of automatic settings, as the next
+        node may slip, and limited unknowns, as the difference to the reference sweep shows what they miss.
     """
-    given = ResolvedState(case, case.joint(omega, excitation_amplitude), point)
-    return _Search(run, run.budget.iterations, most).refined(given.at_rest(run))
-
-
-def state_difference(case: Case, joint: Joint, one: State, other: State) -> Estimate:
-    """Relative differences of response and wear rate of two states of one joint."""
-    return ResolvedState(case, joint, one).difference(ResolvedState(case, joint, other))
+    return _Search(run, run.budget.iterations, node).refined(ResolvedState(case, joint, point).at_rest(run))
 
 
 @dataclass(frozen=True)
 class _Search:
-    """The search for a resolution. begun: Newton iterations at its start. run, most: as in `refine`."""
+    """The search for a resolution. begun: Newton iterations at its start. run, node: as in `refine`."""
 
     run: Run
     begun: int
-    most: float
+    node: bool
 
     def refined(self, here: ResolvedState) -> Refined:
         """The state at the resolution that suffices, or the last state found."""
@@ -138,8 +123,7 @@ class _Search:
             by_harmonics, richer = self._harmonics_error(here)
             estimate = by_samples + by_harmonics
             if not settings.automatic:
-                known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
-                return Refined(here.case, here.point, known, True)
+                return _ended(here, estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan))
             holds = here.holds()
             if holds and estimate.largest <= settings.rtol:
                 return self._relaxed(here, estimate)
@@ -155,27 +139,28 @@ class _Search:
             if following is None:
                 # slip that only many samples show is no reason to reject an accurate motion
                 judged = estimate.response if faint else estimate.largest
-                return Refined(here.case, here.point, estimate, judged <= settings.rtol)
+                return _ended(here, estimate, accurate=judged <= settings.rtol)
             here = following
 
     def _linear(self, here: ResolvedState) -> Refined | ResolvedState:
         """Result for a state in which nothing slips or opens, or the state with more samples that show some slip."""
         settings, samples = here.case.settings, here.case.resolution.samples
-        if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
-            here = here.solve_at(Resolution((1,), samples), self.run) or here
+        lowest = first_resolution(settings).orders if self.node else (1,)
+        if settings.harmonics == "auto" and here.case.resolution.orders != lowest:
+            here = here.solve_at(Resolution(lowest, samples), self.run) or here
         # without an event the harmonics are exact, so that one solve with the finest samples is enough
         orders = here.case.resolution.orders
         finest = here.solve_at(Resolution(orders, max(FINE_SAMPLES, 2 * samples)), self.run)
         if finest is None or nothing_happens(finest.point.evaluation):
-            return Refined(here.case, here.point, NOTHING, True)
-        if settings.samples == "auto":
-            while (samples := 2 * samples) < finest.case.resolution.samples:
-                level = here.solve_at(Resolution(orders, samples), self.run)
-                if level is not None and not nothing_happens(level.point.evaluation):
-                    return level
-            return finest
-        missing = here.difference(finest).times(TWO_LEVELS_SAFETY)
-        return Refined(here.case, here.point, missing, not settings.automatic or missing.largest <= settings.rtol)
+            return _ended(here, NOTHING)
+        if settings.samples != "auto":
+            missing = here.difference(finest).times(TWO_LEVELS_SAFETY)
+            return _ended(here, missing, accurate=not settings.automatic or missing.largest <= settings.rtol)
+        while (samples := 2 * samples) < finest.case.resolution.samples:
+            level = here.solve_at(Resolution(orders, samples), self.run)
+            if level is not None and not nothing_happens(level.point.evaluation):
+                return level
+        return finest
 
     def _samples_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing samples, and the state with more samples that gave it.
@@ -195,11 +180,10 @@ class _Search:
         """Estimated error by missing harmonics, and the state with more harmonics that gave it.
 
         The error is the difference to a state with more harmonics (`_levels_to_compare`), else to one with fewer, which
-        is larger. The error is unknown where the state with more harmonics does not resolve the shortest contact.
+        is larger.
         """
         resolution, limit = here.case.resolution, here.limit(COMPARED_UNKNOWNS)
-        seeing, levels = _levels_to_compare(here)
-        higher = [shifted(resolution, level) for level in range(1, levels + 1)]
+        higher = [shifted(resolution, level) for level in range(1, _levels_to_compare(here) + 1)]
         higher = [each for each in higher if here.case.model.holds(each.highest) and here.unknowns(each) <= limit]
         richer, found = self._compared(here, higher[-1]) if higher else None, len(higher)
         above, below = shifted(resolution, 1), shifted(resolution, -1)
@@ -207,15 +191,12 @@ class _Search:
         if richer is None and here.case.settings.harmonics == "auto" and seen:
             # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
             richer, found = here.solve_at(above, self.run, with_tail=True), 1
-        if seeing > 2 and (richer is None or found < seeing):
-            return UNKNOWN, richer
         other = richer
         if other is None and below.highest < resolution.highest:
-            other = self._compared(here, below)
+            other, found = self._compared(here, below), 2
         if other is None:
             return UNKNOWN, None
-        single = richer is not None and found == 1
-        return here.difference(other).times(ONE_LEVEL_SAFETY if single else TWO_LEVELS_SAFETY), richer
+        return here.difference(other).times(ONE_LEVEL_SAFETY if found == 1 else TWO_LEVELS_SAFETY), richer
 
     def _compared(self, here: ResolvedState, resolution: Resolution) -> ResolvedState | None:
         """The state with other harmonics and samples, as accurately as a comparison needs; None where not found."""
@@ -240,7 +221,7 @@ class _Search:
 
     def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
-        unknowns, most = here.unknowns(resolution), here.limit(self.most)
+        unknowns, most = here.unknowns(resolution), here.limit(NODE_UNKNOWNS if self.node else MOST_UNKNOWNS)
         # the contact law costs unknowns times samples
         if unknowns * resolution.samples > SAMPLES_OF_UNKNOWNS * most:
             return False
@@ -255,31 +236,33 @@ class _Search:
 
     def _relaxed(self, here: ResolvedState, estimate: Estimate) -> Refined:
         """An accurate state with as few harmonics and samples as it needs for a fraction of rtol."""
-        enough = KEPT_FRACTION * here.case.settings.rtol
+        settings = here.case.settings
+        enough, lowest = KEPT_FRACTION * settings.rtol, first_resolution(settings).highest if self.node else 1
         while estimate.largest <= KEPT_FRACTION * enough:
-            lower = fewer(here.case.resolution, here.case.settings)
-            level = here.solve_at(lower, self.run) if lower != here.case.resolution else None
-            if level is None:
+            lower = fewer(here.case.resolution, settings)
+            if lower == here.case.resolution or lower.highest < lowest:
                 break
-            larger = level.difference(here).times(TWO_LEVELS_SAFETY) + estimate
-            if larger.largest > enough or not level.holds():
+            level = here.solve_at(lower, self.run)
+            larger = UNKNOWN if level is None else level.difference(here).times(TWO_LEVELS_SAFETY) + estimate
+            if level is None or larger.largest > enough or not level.holds():
                 break
             here, estimate = level, larger
-        return Refined(here.case, here.point, estimate, True)
+        return _ended(here, estimate)
 
 
-def _levels_to_compare(here: ResolvedState) -> tuple[int, int]:
-    """Levels up that resolve the shortest contact, and levels up for a comparison; both at least two.
+def _ended(here: ResolvedState, estimate: Estimate, *, accurate: bool = True) -> Refined:
+    return Refined(here.case, here.joint, here.point, estimate, accurate)
 
-    As far as cheap, the comparison resolves the shortest contact well, with one period of its highest harmonic (half a
-    period just resolves the contact), and structure and penalty agree beyond its highest harmonic (`reach`).
+
+def _levels_to_compare(here: ResolvedState) -> int:
+    """Levels up for a comparison, at least two: as far as cheap, such that one period of the highest harmonic is as
+    short as the shortest contact, and structure and penalty agree beyond this harmonic (`reach`).
     """
     resolution, at, model = here.case.resolution, here.point.evaluation, here.case.model
     levels = [shifted(resolution, level) for level in range(3, len(HARMONIC_LEVELS))]
     cheap = 2 + sum(here.unknowns(each) <= FAR_UNKNOWNS and model.holds(each.highest) for each in levels)
     if cheap == 2:
-        return 2, 2
+        return 2
     contact = shortest_contact(at.status_t, at.force_t[:, 0], FAINT_SHARE * here.case.settings.rtol)
     highest = reach(model, here.joint.omega, resolution.highest)
-    seeing, far, reaching = (levels_to(resolution, wanted) for wanted in (0.5 / contact, 1.0 / contact, highest))
-    return min(seeing, cheap), min(max(far, reaching), cheap)
+    return min(max(levels_to(resolution, wanted) for wanted in (1.0 / contact, highest)), cheap)

@@ -1,19 +1,20 @@
-"""A state at one resolution (harmonics and samples), the same state at others, and the difference of both."""
+"""A state at one resolution (harmonics and samples), the same state at others, and their difference as an error."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from solver.accuracy.certificate import SMALL_WORK, certify
-from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import half_wave_symmetric, lacks_even
 from solver.continuation.natural import ratchets, shake_down
+from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import State, largest_responses, transfer
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
+from solver.packing import packable
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
@@ -24,6 +25,44 @@ contact need not be resolved."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
+
+
+def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
+    """First harmonic of the responses (n_response,), m, of a state."""
+    return to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+
+
+@packable
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated relative errors of a state.
+
+    response: of the first harmonic of the response.
+    wear_rate: of the total wear rate.
+    weight: factor on `wear_rate` in `largest`; less than 1 where almost nothing wears.
+    """
+
+    response: float
+    wear_rate: float
+    weight: float = 1.0
+
+    @property
+    def largest(self) -> float:
+        """The larger error, with the weight of the wear rate."""
+        return max(self.response, self.weight * self.wear_rate)
+
+    def __add__(self, other: Estimate) -> Estimate:
+        """Sum of the errors of two causes: the worst case."""
+        weight = max(self.weight, other.weight)
+        return Estimate(self.response + other.response, self.wear_rate + other.wear_rate, weight)
+
+    def times(self, factor: float) -> Estimate:
+        """The errors times a safety factor."""
+        return Estimate(factor * self.response, factor * self.wear_rate, self.weight)
+
+
+NOTHING = Estimate(0.0, 0.0)
+UNKNOWN = Estimate(np.inf, np.inf)
 
 
 @dataclass(frozen=True)
@@ -41,14 +80,14 @@ class ResolvedState:
         balance, start = transfer(self.case, joint, self.point.evaluation, with_tail=with_tail)
         point = run.fresh().state(balance, start, self.point.parameter)
         # the mean position of a mass depends a little on the harmonics
-        return None if point is None else replace(self, case=case, joint=joint, point=point).at_rest(run)
+        return None if point is None else ResolvedState(case, joint, point).at_rest(run)
 
     def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
         fraction = FAINT_SHARE * self.case.settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
-        return replace(self, point=shake_down(self.joint, self.point, fraction, run))
+        return ResolvedState(self.case, self.joint, shake_down(self.joint, self.point, fraction, run))
 
     def with_its_symmetry(self, run: Run) -> ResolvedState:
         """The state without even harmonics where its forces have none, and with them where its forces have some."""
@@ -75,8 +114,7 @@ class ResolvedState:
 
     def response(self) -> ComplexArray:
         """First harmonic of the responses (n_response,), m."""
-        structure = self.joint.structure
-        return to_complex(structure.response_h(self.joint.to_relative(self.point.evaluation.displacement_h)))[:, 0]
+        return first_response(self.joint, self.point.evaluation)
 
     @cached_property
     def peaks(self) -> FloatArray:

@@ -1,9 +1,8 @@
 """Coulomb friction with separation at one sample: contact force, derivative, mean normal force. Floats and arrays only.
 
-The arguments of the law, Eqs. (11)-(15), are a *predicted* force `p`, the contact force of a pair that does not move,
-and a force-like tangential state `x = eps X_T` (X_T: corrected slip, m). Compression is positive (PHYSICS, section 2:
-the print has the opposite sign in the normal test). With x' the state at the sample before and the trial force
-`p_T - x'`, the law is:
+Arguments of the law, Eqs. (11)-(15), are the *predicted* force `p` and the tangential state `x = eps X_T`, N (X_T:
+corrected slip, m). Compression is positive (PHYSICS, section 2: the print has the opposite sign in the normal test).
+With x' the state at the sample before:
 
 - separated, `p_N <= 0`: no force, and the state follows freely, `x = p_T`;
 - stick, `|p_T - x'| < mu p_N`: `lambda_T = p_T - x'`, `x = x'`;
@@ -14,8 +13,8 @@ derivative during slip is
 
     d lambda_T = mu n d p_N + (mu p_N / |p_T - x'|) (1 - n n^T) (d p_T - d x').
 
-The law takes the normal force at the sample; its harmonics, Eqs. (11), (12), are those of its means around each sample
-(`closed_fraction`).
+Friction follows the normal force at the sample; the harmonics of the normal force, Eqs. (11), (12), are those of its
+means around each sample (`closed_fraction`).
 """
 
 from __future__ import annotations
@@ -123,9 +122,8 @@ def advance_monodromy(
 def closed_fraction(force: float, neighbour: float) -> tuple[float, float, float]:
     """Mean normal force over the half step towards a neighbour, and its derivatives by both predicted normal forces.
 
-    `force` is positive. The predicted normal force is linear between two samples; the half step next to an opening has
-    the weight of the closed fraction of the step. Without it each change of a status is a corner of the residual, and a
-    branch with hard impacts breaks up into small folds.
+    The predicted normal force is linear between two samples. Without this each change of a status is a corner of the
+    residual, and a branch with hard impacts breaks up into small folds. `force` is positive.
     """
     if neighbour >= 0.0:
         return force, 1.0, 0.0
@@ -136,7 +134,7 @@ def closed_fraction(force: float, neighbour: float) -> tuple[float, float, float
 
 @njit(cache=True)
 def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
-    """Mean normal force (n_contact, N), N, around each sample, from which the harmonics are computed."""
+    """Mean normal force (n_contact, N), N, around each sample."""
     n_contact, _, n_samples = predicted_t.shape
     mean = np.zeros((n_contact, n_samples))
     for pair in range(n_contact):
@@ -153,9 +151,8 @@ def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
 def mean_normal_tangent(
     pairs: IntArray, predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, out: FloatArray
 ) -> None:
-    """Derivative of the harmonics of `mean_normal_force` of some pairs (n,) by those of the predicted normal force.
-
-    out (n_contact, 3m, 3m): receives the derivative in the first m rows and columns.
+    """Derivative of the harmonics of `mean_normal_force` of some pairs (n,) by those of the predicted normal force,
+    into the first m rows and columns of out (n_contact, 3m, 3m).
     """
     m, n_samples = synthesis.shape
     basis_t, analysis_t = np.ascontiguousarray(synthesis.T), np.ascontiguousarray(analysis.T)

@@ -1,10 +1,8 @@
 """Elastic pairs through a period: force, state and slip work of the periodic state, and their exact derivatives.
 
-Floats and arrays only; `coulomb` has the law of a sample. The first period starts from the tangential history. Each
-next period starts from the end of the period before, until the state repeats; a pair that slips or opens is marched at
-least twice. Where the direction of slip varies, the change of the state falls slowly, by a constant factor in each
-period. So after a few periods Newton's method on the periodicity gives the start, with the monodromy of the march. The
-next period has to confirm this start.
+Floats and arrays only; `coulomb` has the law of a sample. The first period starts from the tangential history, the next
+ones from the end of the period before, until the state repeats. Where the direction of slip varies, its change falls
+slowly. So after a few periods Newton's method on the periodicity gives the start, which the next period confirms.
 
 Derivatives have 3m columns for the harmonics of the predicted force, those of one component after the other, and 2 for
 the state at the start of the period.
@@ -22,24 +20,22 @@ from solver.model import FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
 MOST_PERIODS = 400
-"""Largest number of periods; then a state that is not periodic is accepted. Pairs with a turning slip direction need up
-to about 20 with Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""
+"""Most periods; then a state that is not periodic is accepted. Pairs with a turning slip direction need up to 20 with
+Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""
 
 PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
 SMALLEST_DETERMINANT = ROUND_OFF  # of 1 - monodromy: below it a part of the state does not fade
 
 Tangents = tuple[FloatArray, FloatArray]
-"""Receive derivatives by the harmonics of the predicted force: of the harmonics of the friction force, in the last 2m
-rows of (n_contact, 3m, 3m), dimensionless; and of the slip work as in `Period`, (n_contact, 3m)."""
+"""Derivatives by the harmonics of the predicted force: of those of friction, in the last 2m rows of
+(n_contact, 3m, 3m), and of the slip work as in `Period`, (n_contact, 3m)."""
 
 
 class Period(NamedTuple):
-    """A period of pairs; the marches fill all but the predicted force, friction coefficients and start.
+    """A period of pairs, as in `law.Marched`; the marches fill all but predicted_t, friction and start.
 
-    - friction (n_contact,): friction coefficients.
-    - change (n_contact,): change over the last period of the tangential state; of masses of the velocity, as a force
-      m v / dt, N.
-    - all others: as in `law.Marched`; `slip_work` of elastic pairs times the tangential penalty, N * N.
+    friction (n_contact,): coefficients. change (n_contact,): of the tangential state over the last period, of masses of
+    the velocity, as a force m v / dt, N. slip_work: of elastic pairs times the tangential penalty, N * N.
     """
 
     predicted_t: FloatArray
@@ -128,10 +124,8 @@ def solve_periodicity(monodromy: FloatArray, change_1: float, change_2: float) -
 
 @njit(cache=True)
 def _slip_work(normal_t: FloatArray, state_t: FloatArray) -> float:
-    """Slip work of a period times the tangential penalty, N * N, by the trapezoidal rule.
-
-    Eqs. (7), (21) with the sliding velocity (the print has the displacement): sum of the mean normal force of both
-    ends times the increment of the tangential state.
+    """Slip work of a period times the tangential penalty, N * N, by the trapezoidal rule, Eqs. (7), (21) with the
+    sliding velocity (the print has the displacement).
     """
     work = 0.0
     for n in range(normal_t.size):
@@ -181,10 +175,10 @@ def _advance(
     friction: float,
     basis: FloatArray,
 ) -> tuple[float, float, int]:
-    """State and status at a sample; derivatives `dforce` (2, w) of the friction force and `dstate` (2, w), in place.
+    """State and status at a sample; derivatives `dforce` (2, w) of friction and `dstate` (2, w), in place.
 
     Eqs. (13)-(15), with the dependence on all earlier samples of the period. dstate, first, second: at the sample
-    before. predicted (3,): predicted force, N. basis (m,): derivative of a time sample by its harmonics.
+    before. predicted (3,): N. basis (m,): derivative of a time sample by its harmonics.
     """
     pressed, pull_1, pull_2 = predicted[0], predicted[1], predicted[2]
     normal, _, _, next_1, next_2, status = contact_sample(pressed, pull_1, pull_2, friction, first, second)
@@ -232,12 +226,10 @@ def _add_slip_work(
 def _start_tangent(
     dstate: FloatArray, predicted_t: FloatArray, friction: float, start: FloatArray, periods: int, basis_t: FloatArray
 ) -> FloatArray:
-    """Derivative (2, w - 2) of the start of the last period.
+    """Derivative (2, w - 2) of the start of the last period, from that of its end (2, w).
 
-    Where the periodicity does not determine the start (the pair has come to stick), from the periods before.
-
-    - dstate (2, w): derivative of the end of the last period.
-    - start (2,), periods: state at the start of the first period, N; number of periods before the last one.
+    Where the periodicity does not determine the start (the pair has come to stick), from the `periods` before, from
+    the `start` (2,), N, of the first one.
     """
     width = dstate.shape[1] - 2
     if periods == 0:
@@ -255,9 +247,8 @@ def _start_tangent(
 
 @njit(cache=True)
 def periodic_start(dend: FloatArray) -> tuple[FloatArray, bool]:
-    """Derivative (2, w - 2) of the start of a period that repeats, and whether the periodicity determines it.
-
-    dend (2, w): derivative of the end of the period.
+    """Derivative (2, w - 2) of the start of a period that repeats, from that of its end (2, w), and whether there is
+    one.
     """
     width, found = dend.shape[1] - 2, False
     dstart = np.zeros((2, width))
@@ -279,8 +270,8 @@ def assemble(
 ) -> None:
     """Derivatives of a pair: of the harmonics of friction into `tangent` (3m, 3m), of the slip work into (3m,).
 
-    dforce_t (N, 2, w), work (w,): derivatives with the start of the period held, and in the last two columns by the
-    start. dstart (2, w - 2): derivative of the start.
+    dforce_t (N, 2, w), work (w,): derivatives, in the last two columns by the start of the period. dstart (2, w - 2):
+    of the start.
     """
     (m, n_samples), width = analysis_t.shape, dstart.shape[1]
     work_tangent[:] = work[:width] + work[width] * dstart[0] + work[width + 1] * dstart[1]

@@ -1,11 +1,8 @@
 """The contact law of all pairs of a joint through one period, its exact derivative, and the motion that goes with it.
 
-Alternating frequency-time method: predicted force to samples, contact law, contact force back to harmonics. Two kinds
-of pairs stand behind the methods of `ContactLaw`; `solver.structure.penalty` chooses the kind:
-
-- *elastic* pairs, at displacement level: Eqs. (9)-(15), motion `(p - lambda) / eps` (`elastic_pairs`);
-- *inertial* pairs, masses that sit directly on rigid ground: motion by Newton's law (`sliding_masses`). Their
-  tangential state is a displacement, m, where that of elastic pairs is a force, N.
+Alternating frequency-time method: predicted force to samples, contact law, contact force back to harmonics. Pairs are
+*elastic*, at displacement level with the motion `(p - lambda) / eps`, Eqs. (9)-(15) (`elastic_pairs`), or *inertial*,
+masses directly on rigid ground that move by Newton's law (`sliding_masses`). `solver.structure.penalty` chooses.
 """
 
 from __future__ import annotations
@@ -29,16 +26,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Marched:
-    """Contact forces and states of the pairs under a predicted force, at N samples.
+    """Contact forces and states of the pairs under a predicted force, at N samples of the last period.
 
-    - predicted_t, force_t (n_contact, 3, N): predicted and contact force, N, compression positive; tangential ones of
-      inertial pairs as means over the steps.
-    - force_h (n_contact, 3, m): harmonics of the contact force, N.
-    - state_t (n_contact, 2, N+1): tangential state from the start of the last period on.
-    - start (n_contact, 2): tangential state at the start of the first period, N; of inertial pairs the velocity at the
-      start of the last period, m/s.
-    - status_t (n_contact, N): SEPARATED, STICK or SLIP.
-    - periods (n_contact,): number of periods that were marched.
+    - predicted_t, force_t (n_contact, 3, N): N, compression positive; tangential ones of inertial pairs are means over
+      the steps. force_h (n_contact, 3, m): harmonics of the contact force, N.
+    - state_t (n_contact, 2, N+1): tangential state, N of elastic and m of inertial pairs.
+    - start (n_contact, 2): state at the start of the first period, N; of inertial pairs the velocity at the start, m/s.
+    - status_t (n_contact, N): SEPARATED, STICK or SLIP. periods (n_contact,): number of periods marched.
     - periodicity_error: change of the tangential state over the last period, N.
     - slip_work (n_contact,): integral of normal force times slip distance over a period, J.
     """
@@ -55,16 +49,16 @@ class Marched:
 
     @property
     def stuck(self) -> BoolArray:
-        """Pairs (n_contact,) that stick during the whole period and so transmit the predicted force."""
+        """Pairs (n_contact,) that stick during the whole period and transmit the predicted force."""
         # the start of a period that was marched more than once may depend on the force
         return np.asarray((self.status_t == STICK).all(axis=1) & (self.periods == 1))
 
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """The law of the pairs of a joint at one frequency omega, rad/s: predicted force to contact force, motion, history.
+    """The law of the pairs of a joint at one frequency omega, rad/s.
 
-    friction_coefficient: (n_contact,). Harmonics are on the axis of length m = 2H+1. The tangential history of a pair
+    friction_coefficient: (n_contact,). Harmonics are on the axis of length m = 2H+1. The tangential history
     (n_contact, 2), m, is the corrected slip X_T of an elastic pair and the mean position of an inertial one.
     """
 
@@ -81,7 +75,7 @@ class ContactLaw:
 
     @cached_property
     def rate_dependent(self) -> bool:
-        """Whether the law depends on velocities, and so on the frequency: where masses sit on rigid ground."""
+        """Whether the law depends on velocities: where masses sit on rigid ground."""
         return bool(self.penalty.inertial.any())
 
     @property
@@ -91,10 +85,7 @@ class ContactLaw:
     # --- forces ---
 
     def march(self, predicted_h: FloatArray, history: FloatArray) -> Marched:
-        """March all pairs through the period.
-
-        predicted_h (n_contact, 3, m): predicted force, N. history (n_contact, 2): tangential history, m.
-        """
+        """March all pairs through the period under a predicted force (n_contact, 3, m), N."""
         basis, inertial, penalty = self.basis, self.penalty.inertial, self.penalty
         predicted_t = predicted_h @ basis.synthesis
         predicted_t[inertial, 1:] = (predicted_h[inertial, 1:] * basis.step_mean) @ basis.synthesis
@@ -124,39 +115,27 @@ class ContactLaw:
         return friction_limit(self.friction_coefficient, at.slip_work)
 
     def tangent(self, at: Marched) -> tuple[FloatArray, FloatArray]:
-        """Exact derivatives with respect to the harmonics of the predicted force of each pair, with the periodicity.
+        """Exact derivatives by the harmonics of the predicted force of each pair, with the periodicity.
 
-        Returns the derivatives of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the
-        slip work (n_contact, 3m), m. Tangential displacements that do not exist count as sticking.
+        Returns those of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the slip work
+        (n_contact, 3m), m. Entries of displacements that a pair does not have are without meaning.
         """
         contact, basis, inertial = self.contact, self.basis, self.penalty.inertial
-        n_contact, m = contact.n_contact, basis.synthesis.shape[0]
-        tangent, work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
-        stuck, absent, none = at.stuck, contact.dofs < 0, np.zeros(n_contact)
+        n_contact, size, stuck, none = contact.n_contact, 3 * len(basis.synthesis), at.stuck, np.zeros(len(at.periods))
+        tangent, work_tangent = np.zeros((n_contact, size, size)), np.zeros((n_contact, size))
         # an open pair transmits nothing
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
-        slides = switching & ~absent[:, 1:].all(axis=1)
+        slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
         marched = at.predicted_t, self.friction_coefficient, at.start, at.force_t, at.state_t, at.status_t
         period, out = Period(*marched, at.periods, none, none), (tangent, work_tangent)
         march_tangent(np.flatnonzero(slides & ~inertial), period, basis.synthesis, basis.analysis, out)
         if self.rate_dependent:
             series = basis.synthesis, basis.step_mean, basis.analysis
             mass_tangent(np.flatnonzero(slides & inertial), period, self._masses, *series, out)
-        work_tangent /= self.state_stiffness[:, None]
-        # the derivatives of a pair are those of all three directions: nothing acts along those that it does not have
-        pair, component = np.nonzero(absent)
-        by_component = tangent.reshape(n_contact, 3, m, 3, m)
-        by_component[pair, component] = 0.0
-        by_component[pair, :, :, component] = 0.0
-        work_tangent.reshape(n_contact, 3, m)[pair, component] = 0.0
         closing = np.flatnonzero(contact.has_normal & switching)
         mean_normal_tangent(closing, at.predicted_t, basis.synthesis, basis.analysis, tangent)
-        passes = stuck[:, None] | absent
-        passes[:, 0] = stuck & contact.has_normal
-        pair, component = np.nonzero(passes)
-        own = m * component[:, None] + np.arange(m)
-        tangent[pair[:, None], own, own] = 1.0
-        return tangent, work_tangent
+        tangent[stuck] = np.eye(size)
+        return tangent, work_tangent / self.state_stiffness[:, None]
 
     # --- motion ---
 
@@ -170,10 +149,7 @@ class ContactLaw:
 
     @cached_property
     def compliance(self) -> ComplexArray:
-        """Displacement per force (n_contact, 3, H+1), m/N, in each harmonic, from the static one on.
-
-        1 / eps for elastic pairs; for inertial pairs exactly as in the steps of the march.
-        """
+        """Displacement per force (n_contact, 3, H+1), m/N, in each harmonic: 1 / eps, or that of the marched masses."""
         penalty, inertial, orders = self.penalty, self.penalty.inertial, np.array(self.basis.orders, np.float64)
         found: ComplexArray = np.repeat((1.0 + 0.0j) / penalty.stiffness[:, :, None], orders.size + 1, axis=2)
         if orders.size:
@@ -185,23 +161,23 @@ class ContactLaw:
         return found
 
     def origin(self, history: FloatArray) -> FloatArray:
-        """Mean tangential position (n_contact, 2), m, at which no mean force acts: the history of inertial pairs."""
+        """Mean tangential position (n_contact, 2), m, without mean force: the history of inertial pairs."""
         return np.where(self.penalty.inertial[:, None], history, 0.0)
 
     # --- tangential history ---
 
     @property
     def state_stiffness(self) -> FloatArray:
-        """Tangential state over slip (n_contact,), N/m; 1 for inertial pairs, whose state is the displacement."""
+        """Tangential state over slip (n_contact,), N/m; 1 for inertial pairs."""
         return np.where(self.penalty.inertial, 1.0, self.penalty.tangential)
 
     def final_history(self, at: Marched, displacement_h: FloatArray) -> FloatArray:
-        """Tangential history that a state with the motion `displacement_h` (n_contact, 3, m), m, leaves."""
+        """Tangential history that a state leaves; displacement_h (n_contact, 3, m): its motion, m."""
         at_end = at.state_t[:, :, -1] / self.state_stiffness[:, None]
         return np.where(self.penalty.inertial[:, None], displacement_h[:, 1:, 0], at_end)
 
     def middle_history(self, at: Marched, history: FloatArray) -> FloatArray:
-        """The history with the middle of the slip in the closed samples for the elastic pairs that slip."""
+        """The history with the middle of the slip in closed samples for elastic pairs that slip."""
         slips = (at.status_t == SLIP).any(axis=1) & ~self.penalty.inertial
         closed, slip = (at.status_t[slips] != SEPARATED)[:, None, :], at.state_t[slips, :, 1:]
         low, high = np.where(closed, slip, np.inf).min(axis=2), np.where(closed, slip, -np.inf).max(axis=2)
@@ -212,9 +188,9 @@ class ContactLaw:
     def history_along(
         self, history: FloatArray, pairs: BoolArray, first: FloatArray, last: FloatArray, parts: FloatArray
     ) -> FloatArray:
-        """The history after a march at each of some `parts` of the way between two predicted forces.
+        """The history after marches at some `parts` of the way between two predicted forces (n_contact, 3, N), N.
 
-        pairs (n_contact,): pairs that are marched; inertial ones keep their history. first, last (n_contact, 3, N), N.
+        pairs (n_contact,): pairs that are marched; inertial ones keep their history.
         """
         moving, stiffness = pairs & ~self.penalty.inertial, self.state_stiffness[:, None]
         limit = friction_limit(self.friction_coefficient, last[:, 0].max(axis=1))[moving].max(initial=0.0)
@@ -228,8 +204,8 @@ class ContactLaw:
     def history_from(self, other: Penalty, history: FloatArray, mean: FloatArray, last: FloatArray) -> FloatArray:
         """The history of a state with another penalty.
 
-        A pair that becomes inertial begins at its mean position `mean` (n_contact, 2), m, one that becomes elastic at
-        its position `last` at the end of the period, which equals the corrected slip.
+        A pair that becomes inertial begins at its mean position (n_contact, 2), m, one that becomes elastic at its
+        position `last` at the end of the period.
         """
         inertial = self.penalty.inertial
         changed = np.where(inertial[:, None], mean, last)
@@ -238,11 +214,11 @@ class ContactLaw:
     # --- masses on rigid ground: ratcheting, and harmonics above the highest one ---
 
     def drift(self, at: Marched) -> FloatArray:
-        """Distance (n_contact, 2), m, by which the inertial pairs move on in a period; 0 for elastic pairs."""
+        """Distance (n_contact, 2), m, by which inertial pairs move on in a period; 0 for elastic pairs."""
         return np.where(self.penalty.inertial[:, None], at.state_t[:, :, -1] - at.state_t[:, :, 0], 0.0)
 
     def change_force(self, at: Marched) -> FloatArray:
-        """Change of the tangential state over the last period (n_contact,), N; of a drift the mean force of drag."""
+        """Change of the tangential state over the period (n_contact,), N; of a drift the mean force of drag."""
         change = np.hypot(*(at.state_t[:, :, -1] - at.state_t[:, :, 0]).T)
         drag = self.penalty.drag * self.omega / (2.0 * np.pi)
         return np.asarray(np.where(self.penalty.inertial, drag, 1.0) * change)
@@ -252,17 +228,15 @@ class ContactLaw:
         return float(np.abs(at.predicted_t[self.penalty.inertial, 1:]).max(initial=0.0))
 
     def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:
-        """Friction on masses in other harmonics (n_contact, 3, 2k+1), N, which fall slowly; 0 for elastic pairs."""
+        """Friction on masses in other harmonics (n_contact, 3, 2k+1), N; 0 for elastic pairs."""
         inertial = self.penalty.inertial
         force_h = np.zeros((inertial.size, 3, basis.analysis.shape[1]))
         force_h[inertial, 1:] = at.force_t[inertial, 1:] @ basis.analysis / basis.step_mean
         return force_h
 
     def beyond_series(self, at: Marched, pairs: list[int], series_t: FloatArray) -> FloatArray:
-        """Tangential motion (n, 2, N), m, that the march adds to the series of some pairs, half a step before samples.
-
-        A mass moves with all harmonics, of which the series (n, 2, N), m, has the lowest and the mean; 0 for elastic
-        pairs.
+        """Tangential motion of masses (n, 2, N), m, in harmonics that their series (n, 2, N), m, lacks, half a step
+        before the samples.
         """
         added = np.where(self.penalty.inertial[pairs, None, None], at.state_t[pairs, :, :-1] - series_t, 0.0)
         return np.asarray(added - added.mean(axis=2, keepdims=True))

@@ -5,8 +5,8 @@ B the derivative with respect to x at the sample before (`sample_tangents`). The
 
     (1 - A) eps du - A dlambda = B eps du'.
 
-A mass on a slider has its own steps (`sliding_masses`). Their derivatives T include the instants at which the mass
-turns or stops: `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with `dp = dlambda + gain dv - loss dv'`.
+For a mass on a slider (`sliding_masses`) `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with the derivatives T of its
+steps, and `dp = dlambda + gain dv - loss dv'`.
 """
 
 from __future__ import annotations
@@ -22,11 +22,9 @@ from solver.model import FloatArray, IntArray
 
 
 def sample_tangents(law: ContactLaw, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the state (normal, tangents) of each elastic pair at every `stride`-th sample, n samples in all.
+    """A (n, n_contact, 3, 3) and B (n, n_contact, 2, 2) of all pairs as elastic ones, at every `stride`-th sample.
 
-    The normal state is predicted less contact force; the normal force is taken at the sample, without the mean around
-    it. Returns the derivatives by the predicted force at the sample (n, n_contact, 3, 3), A, and by the tangential
-    state at the sample before (n, n_contact, 2, 2), B; dimensionless.
+    The normal state is predicted less contact force; the normal force is that at the sample, without the mean around.
     """
     predicted, status = at.predicted_t[:, :, ::stride], at.status_t[:, ::stride]
     limit = friction_limit(law.friction_coefficient[:, None], np.maximum(predicted[:, 0], 0.0))
@@ -50,8 +48,7 @@ class SampledLaw:
 
         by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv'.
 
-    A prime marks the sample before. Velocities are in m per sample. Displacements that a pair does not have take no
-    force.
+    A prime marks the sample before. Velocities are in m per sample.
     """
 
     by_force: FloatArray
@@ -79,7 +76,7 @@ def sampled_law(law: ContactLaw, at: Marched, pairs: IntArray) -> SampledLaw:
 
 
 def _take_mass_law(found: SampledLaw, place: int, law: ContactLaw, at: Marched, pair: int) -> None:
-    """Tangential rows of the law of a mass on a slider, in place; `place`: index among the switching pairs."""
+    """Tangential rows of the law of a mass, in place; place: index among the switching pairs."""
     step, line = law.sample_step, int(law.contact.line[pair])
     gain, loss = step_gains(law.penalty.mass[pair], law.penalty.drag[pair], step)
     there = np.array([0, 1]) if line < 0 else np.array([line])

@@ -1,19 +1,17 @@
 """Friction of a mass that sits directly on a slider, through one period, and derivatives. Floats and arrays only.
 
-A rigid Coulomb force jumps where the mass turns, so that its harmonics fall as 1/n only and a balance of a few
-harmonics is wrong by some per cent. Above the highest harmonic H, however, the structure acts by its mass alone. So
-the motion of such a pair is marched through the period,
+A rigid Coulomb force jumps where the mass turns: its harmonics fall as 1/n only, and a balance of a few harmonics is
+wrong by some per cent. Above the highest harmonic H the structure acts by its mass alone. So the pair is marched,
 
     m v' + c v = p - lambda,                       lambda = projection on the friction disc, against the motion,   (*)
 
-where p is the predicted force of the pair, whose harmonics up to H are the unknowns of the balance. Equation (*) gives
-their motion, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`: p is the paper's `F_r - Z_r u + eps u` with
-`eps -> (i n w)^2 m + i n w c`. The harmonics of lambda above H act on the mass m in the march, as in the structure, up
+and (*) gives the motion `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`: the predicted force p is the paper's
+`F_r - Z_r u + eps u` with `eps -> (i n w)^2 m + i n w c`. Harmonics of lambda above H act on m, as in the structure up
 to a relative error of `k / (n w)^2 m`. The drag c, in p and in the march alike, removes the influence of the start.
 
-In a step of length dt the force p (mean over the step) and the friction limit are constant. The instant in the step at
-which the mass turns or comes to rest is resolved, so that the residual is smooth and the error of second order in dt.
-With two tangents there is no such instant, and the step is divided instead.
+In a step of length dt the force p (mean over the step) and the friction limit are constant. The instant at which the
+mass turns or comes to rest is resolved, so that the residual is smooth and the error of second order in dt. With two
+tangents there is no such instant, and the step is divided instead.
 
 Results of a step are (friction (2), velocity after the step (2), mean velocity (2), mean speed), and its derivatives
 (5, 5) those of (friction, velocity after, mean speed) by (force (2), velocity before (2), friction limit).
@@ -53,10 +51,10 @@ def step_gains(mass: float, drag: float, step: float) -> tuple[float, float]:
 def step_line(
     force: float, velocity: float, limit: float, gain: float, loss: float, tangent: FloatArray
 ) -> tuple[float, float, float, float]:
-    """One step along one line: mean friction force, velocity after the step, mean velocity and mean speed in the step.
+    """One step along one line: mean friction force, velocity after the step, mean velocity and mean speed.
 
-    - force, velocity, limit: mean force, N, velocity before the step, m/s, and friction limit, N.
-    - tangent (3, 3): receives the derivatives of (friction, velocity after, mean speed) by (force, velocity, limit).
+    force, N, velocity before the step, m/s, limit, N. tangent (3, 3): receives the derivatives of (friction, velocity
+    after, mean speed) by (force, velocity, limit).
     """
     tangent[:, :] = 0.0
     if velocity == 0.0 and abs(force) <= limit:
@@ -191,8 +189,8 @@ def step_mass(
 def march_masses(pairs: IntArray, period: Period, masses: Masses) -> None:
     """March masses (n,) through the period until their velocity repeats.
 
-    The tangential predicted forces are means over the steps, and so are the contact forces. The state is the
-    displacement since the start of the period, m, the start receives the velocity there, m/s.
+    Tangential forces are means over the steps. The state is the displacement since the start of the period, m; `start`
+    receives the velocity there, m/s.
     """
     out, tangent = np.empty(7), np.empty((5, 5))
     step, n_samples = masses.step, period.status_t.shape[1]
@@ -254,9 +252,8 @@ def mass_tangent(
     analysis: FloatArray,
     out: Tangents,
 ) -> None:
-    """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity, into `out`.
-
-    synthesis (m, N), step_mean (m,), analysis (N, m): as in `FourierBasis`.
+    """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity, into `out`; the matrices
+    as in `FourierBasis`.
     """
     point_t = np.ascontiguousarray(synthesis.T)
     mean_t, analysis_t = point_t * step_mean, np.ascontiguousarray((analysis / step_mean).T)

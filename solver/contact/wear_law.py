@@ -44,8 +44,8 @@ class WearLaw:
     - name: one of `LAWS`.
     - threshold: q of the law "threshold", J/m2 per cycle.
     - table: of the law "table".
-    - surfaces: factor of the wear coefficient for each label of a surface. A pair whose label names both sides, as
-      "flat/cylinder", has the sum of both factors. Empty: factor 1 for each pair.
+    - surfaces: factor of the wear coefficient for each label of a surface; a pair "flat/cylinder" has the sum of both.
+      Empty: factor 1 for each pair.
     - worn: depth of each pair at the start of a history, m, from which the depths of the law "table" count; empty: 0.
     """
 
@@ -81,8 +81,8 @@ def surface_factors(labels: tuple[str, ...], surfaces: tuple[tuple[str, float], 
 class PairFactors:
     """The factors f of the law "table" for the pairs of a joint, with bilinear interpolation.
 
-    - pressure (n_p,), Pa, depth (n_d,), m, factor (n_p, n_d): the table.
-    - area (n_contact,): alpha, m2. worn (n_contact,): depth at the depth 0 of the history, m; 0 for an unworn joint.
+    pressure (n_p,), Pa, depth (n_d,), m, factor (n_p, n_d): the table. area (n_contact,): alpha, m2.
+    worn (n_contact,): depth at the depth 0 of the history, m.
     """
 
     pressure: FloatArray

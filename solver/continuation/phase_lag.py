@@ -83,7 +83,7 @@ class AtLag:
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         """As in BorderedProblem: of the equation times |F^H x|, whose derivative is linear in the motion."""
-        return self._errors(_product_change(here.balance.joint, tangent.transmit(step)[0]), here.extra)
+        return self._errors(_product_change(here.balance.joint, tangent.motion(step)), here.extra)
 
     def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
         """The frequency changes by a small fraction of itself at most."""
@@ -149,7 +149,7 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     fixed = Balance(joint, at.history, at.wear_depth)
     by_frequency = frequency_derivative(fixed, at)
     step = run.step(fixed, at, -by_frequency.force, min(FORCING, 0.1 * accuracy))
-    moved = fixed.linearise(at).transmit(step)[0]
+    moved = fixed.linearise(at).motion(step)
     response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
     rise = (by_frequency.response[0] + _response_changes(joint, moved)[0]) / response
     product = by_frequency.product + _product_change(joint, moved)

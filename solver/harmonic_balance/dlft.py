@@ -1,16 +1,14 @@
 """The harmonic balance of a joint: residual, exact Jacobian, and wear depth that depends on the motion.
 
-The unknown is the predicted force p (n_rel, 2H+1), N: `lambda_u` of Eqs. (9), (10). The predicted force of a pair
-determines the contact force `lambda(p)` and the motion `u = (p - lambda) / eps + g + W` of the pair (Eqs. (10)-(12),
-with the corrected motion `X`), so that
+The unknown is the predicted force p (n_rel, 2H+1), N: `lambda_u` of Eqs. (9), (10). It determines the contact force
+`lambda(p)` and the motion `u = (p - lambda) / eps + g + W` of a pair, Eqs. (10)-(12), so that
 
     R(p) = Z_r u(p) + lambda(p) - F_r                                                                      (8)
 
-is the only coupled equation; a linear change of variable gives the residual in u of the paper, with equal Newton
-iterations. With the implicit scheme `W = W_k + h g(p)`, Eqs. (24), (26) (the print of (26b) lacks h). The wear rate of
-a pair depends on p of this pair alone, so that W is eliminated by a block of rank one for each pair:
+is the only coupled equation. With the implicit scheme `W = W_k + h g(p)`, Eqs. (24), (26) (the print of (26b) lacks h).
+The wear rate of a pair depends on p of this pair alone, so that W is eliminated pair by pair:
 
-    dR/dp = Z_r [(I - dlambda/dp) / eps + d W/dp] + dlambda/dp
+    dR/dp = Z_r [(I - dlambda/dp) / eps + d W/dp] + dlambda/dp                                          (16)-(18)
 """
 
 from __future__ import annotations
@@ -33,10 +31,9 @@ from solver.structure.joint import Joint
 class Balance:
     """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
-    - history (n_contact, 2): corrected slip X_T at the start of the period, m.
+    - history (n_contact, 2): tangential history, m (`ContactLaw`).
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6).
-    - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given.
-    - wearing: wearing work of the wear law.
+    - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given. wearing: this work.
     """
 
     joint: Joint
@@ -53,9 +50,7 @@ class Balance:
         return self.joint.to_relative(force_h + self.joint.law.force(motion))
 
     def evaluate(self, predicted_h: FloatArray) -> Evaluation:
-        """Residual, Eq. (8), contact force, Eqs. (11)-(15), motion, Eq. (12), and wear depth, Eq. (24), for a predicted
-        force (n_rel, 2H+1), N.
-        """
+        """Residual, Eq. (8), contact force, motion, Eq. (12), and wear depth, Eq. (24), for a predicted force, N."""
         joint = self.joint
         pairs = joint.to_pairs(predicted_h)
         given = ~joint.contact.has_normal
@@ -94,11 +89,8 @@ class Balance:
 class Evaluation(Marched):
     """Residual for a predicted force, with the contact forces and states of the pairs.
 
-    - predicted_h (n_rel, 2H+1): predicted force, N.
-    - residual (n_rel, 2H+1): N.
-    - scale: scales of the residual in the static harmonic and in the other harmonics, N.
-    - history (n_contact, 2): as in `Balance`, m.
-    - displacement_h (n_contact, 3, 2H+1): motion, m.
+    - predicted_h, residual (n_rel, 2H+1): N. scale: of the residual in the static and in the other harmonics, N.
+    - history (n_contact, 2): as in `Balance`, m. displacement_h (n_contact, 3, 2H+1): motion, m.
     - wear_depth (n_contact,): m; at the end of the step in an implicit step.
     """
 
@@ -134,14 +126,12 @@ def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tup
 
 @dataclass(frozen=True)
 class Linearisation:
-    """`dR/dp = Z_r motion_tangent + force_tangent`, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
+    """`dR/dp = Z_r motion_tangent + force_tangent` at a point, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
 
-    - at: contact forces and states of the pairs at the point of linearisation.
-    - force_tangent (n_contact, 3m, 3m): derivative of the contact force, dimensionless.
-    - growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, which is a part of the static normal motion.
+    growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, which is a part of the static normal motion.
 
     The motion of a pair that sticks during the whole period does not depend on p: the columns of its unknowns are those
-    of the identity. They are left out of the coupled system of the `active` pairs and computed from its solution.
+    of the identity. They are left out of the coupled system of the `active` pairs.
     """
 
     joint: Joint
@@ -151,7 +141,7 @@ class Linearisation:
 
     @property
     def motion_tangent(self) -> FloatArray:
-        """`du/dp` (n_contact, 3m, 3m), m/N, by Eq. (12), including the wear."""
+        """`du/dp` (n_contact, 3m, 3m), m/N, Eq. (12), with the wear."""
         size = self.force_tangent.shape[1]
         correction = (np.eye(size) - self.force_tangent).reshape(-1, 3, size // 3, size)
         tangent = self.joint.law.motion(correction).reshape(-1, size, size)
@@ -170,23 +160,17 @@ class Linearisation:
 
     @cached_property
     def passive_rows(self) -> IntArray:
-        """All other relative displacements: the columns of their unknowns are those of the identity."""
+        """All other relative displacements."""
         return np.setdiff1d(np.arange(self.joint.component_index.size), self.active_rows, assume_unique=True)
 
-    def transmit(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Changes of motion, m, and contact force, N, both (n_contact, 3, m), for a step (n_rel, m), N."""
-        rest, motion = self._untransmitted(step)
-        return self.joint.to_pairs(motion), self.joint.to_pairs(step - rest)
+    def motion(self, step: FloatArray) -> FloatArray:
+        """Change of the motion (n_contact, 3, m), m, with a step (n_rel, m), N."""
+        return self.joint.to_pairs(self._untransmitted(step)[1])
 
-    def apply(self, step: FloatArray) -> FloatArray:
-        """Jacobian times a step (n_rel, m), N."""
+    def apply(self, step: FloatArray, *, roughly: bool = False) -> FloatArray:
+        """Jacobian times a step (n_rel, m), N; roughly: to at least three digits."""
         rest, motion = self._untransmitted(step)
-        return self.joint.structure.apply(motion) + step - rest
-
-    def apply_roughly(self, step: FloatArray) -> FloatArray:
-        """Jacobian times a step to at least three digits in less time, for directions of Newton's method."""
-        rest, motion = self._untransmitted(step)
-        return self.joint.structure.apply_roughly(motion) + step - rest
+        return self.joint.structure.apply(motion, roughly=roughly) + step - rest
 
     def _untransmitted(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""
@@ -195,8 +179,8 @@ class Linearisation:
         return untransmitted(np.ascontiguousarray(step), joint.pair_rows, self.active, *blocks)
 
     def dense(self, pairs: IntArray, width: int | None = None) -> FloatArray:
-        """Rows and columns of the Jacobian for some pairs and their first `width` = 2H'+1 Fourier coefficients, by
-        default all; in the order (relative displacement, coefficient).
+        """Rows and columns (displacement, coefficient) of the Jacobian for some pairs and their first `width`
+        coefficients, by default all.
         """
         motion, matrix = self.matrices(pairs, width)
         rows, k, structure = self.joint.rows_of(pairs), motion.shape[1], self.joint.structure

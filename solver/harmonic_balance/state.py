@@ -26,9 +26,7 @@ BalanceAt = Callable[[float, FloatArray], Balance]
 class State:
     """A converged periodic state; the next one depends on it alone.
 
-    evaluation: of the balance, with the worn depth.
-    history (n_contact, 2): tangential history for the next state, m.
-    parameter: of the path on which the state lies; NaN where there is none.
+    history (n_contact, 2): tangential history for the next state, m. parameter: of the path; NaN where there is none.
     """
 
     evaluation: Evaluation
@@ -46,18 +44,15 @@ class Failure:
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for the next state: the slip X_T at the end of the period, or the mean
-    position of an inertial pair.
-    """
+    """Tangential history (n_contact, 2), m, that a state of a balance leaves."""
     return balance.joint.law.final_history(evaluation, evaluation.displacement_h)
 
 
 def history_at_rest(joint: Joint, state: State) -> FloatArray:
     """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick.
 
-    A pair whose range of slip shrinks to zero comes to stick in the middle of the range: the middle of its slip in the
-    closed samples. Behind the resonance of the dovetail the motion after a sweep is 0.5 % wrong with the middle, and
-    2.3 % with `final_history`, for an equal number of states.
+    A pair whose range of slip shrinks to zero comes to stick in the middle of the range. Behind the resonance of the
+    dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 % with `final_history`.
     """
     return joint.law.middle_history(state.evaluation, state.history)
 
@@ -78,8 +73,7 @@ def vibration_size(evaluation: Evaluation) -> float:
 def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
     """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old`.
 
-    with_tail: new harmonics of the force are those of its samples, and those of the motion follow from the structure.
-    Zeros would remove the impacts that the samples contain.
+    with_tail: new harmonics of the force are those of its samples, which contain impacts, instead of zeros.
     """
     balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
     orders, known = joint.basis.orders, old.resolution.orders
@@ -93,7 +87,7 @@ def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool
             both = slice(2 * place + 1, 2 * place + 3)
             force_h[:, both] = force[:, both]
             amplitude = to_complex(force)[:, place]
-            moved = -np.linalg.solve(joint.structure.moving.matrix(int(place)), amplitude)
+            moved = -np.linalg.solve(joint.structure.dynamic_stiffness[place], amplitude)
             motion_h[:, both] = np.stack([moved.real, -moved.imag], axis=1)
     return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
 
@@ -112,8 +106,8 @@ def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArr
 def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
     """Largest magnitudes over a period of the responses (n_response,), m, the static ones included.
 
-    With the tail of friction on rigid ground: at the turn of the mass the harmonics above the highest one of the
-    balance have one sign, and without them the error of the peak falls only with the square of the highest harmonic.
+    With the tail of friction on rigid ground: without it the error of the peak falls only with the square of the
+    highest harmonic.
     """
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     response_t = response_h @ build_basis(joint.basis.orders, FINE_SAMPLES).synthesis

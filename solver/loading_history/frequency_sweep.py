@@ -8,7 +8,6 @@ sweep begins at a resonance. It depends on the scene and on the cell, not on the
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -16,16 +15,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver.accuracy.certificate import certify
-from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
-from solver.accuracy.refinement import Refined, refine, state_difference
+from solver.accuracy.refinement import Refined, refine
+from solver.accuracy.resolved_state import NOTHING, UNKNOWN, Estimate, ResolvedState
 from solver.continuation.first_state import solve_first_state
-from solver.harmonic_balance.state import State
-from solver.loading_history.path import FREE_STEP, LoadingPath, Step
+from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State, carried_history, history_at_rest
+from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, stable_state
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep, SweepState
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
-from solver.packing import packable
+from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
 from solver.settings import Direction, Resolution, SolverSettings, allowed
@@ -50,17 +50,13 @@ CELLS_PER_OCTAVE = 4
 START_CANDIDATES = 8
 """Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen."""
 
-_REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
-"""Outcomes that give the reason for the end of a sweep, not only its end."""
-
 
 @packable
 @dataclass(frozen=True)
 class FrequencySweepState:
-    """Saved state of a `FrequencySweep`: cell, frequency of the penalty, rad/s, that of a ramp or None, and nodes."""
+    """Saved state of a `FrequencySweep`: cell, frequency of a ramp, rad/s, or None, and nodes."""
 
     cell: int
-    penalty_omega: float
     omega: float | None
     nodes: SweepState
 
@@ -69,11 +65,12 @@ class FrequencySweepState:
 class FrequencySweep:
     """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
-    nodes, cell: the present sweep, and its cell. save: called where it was saved.
-    run: of the state at the current frequency, without the sweep to this frequency.
     every: for which states stability is tested, as in `find_instability`.
     known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
         is not estimated, and there is no reference sweep.
+    keep: called with the saved state, and with the position in words.
+    nodes, cell, omega: the present sweep, its cell, and the frequency of a ramp, rad/s, else None.
+    run: of the state at the current frequency, without the sweep to this frequency.
     """
 
     model: ReducedModel
@@ -83,35 +80,34 @@ class FrequencySweep:
     settings: SolverSettings
     every: bool = True
     known: tuple[tuple[float, Resolution], ...] = ()
-    save: Callable[[], None] = lambda: None
+    keep: Callable[[Packed | str], None] = lambda _: None
     nodes: Sweep[State] | None = None
     cell: int = 0
+    omega: float | None = None
     run: Run = field(init=False)
 
     def __post_init__(self) -> None:
-        self.run = Run(self.settings.tolerance)
+        self.run = Run(self.settings.tolerance, Budget(report=self.keep))
 
     @property
     def n_iterations(self) -> int:
         """Newton iterations to the current frequency: of the sweep from its start, and of the state."""
-        return self.run.budget.iterations + (0 if self.nodes is None else self.nodes.n_iterations)
+        return self.run.budget.iterations + (0 if self.nodes is None else self.nodes.budget.iterations)
 
     def set_deadline(self, deadline: float) -> None:
         """Set the CPU time of the thread, s, after which the search for the present state ends."""
         self.run.budget.deadline = deadline
         if self.nodes is not None:
-            self.nodes.set_deadline(deadline)
+            self.nodes.budget.deadline = deadline
 
-    def state(self) -> FrequencySweepState | None:
-        """What another sweep needs to go on; None where nothing is saved yet."""
-        if self.nodes is None or self.nodes.saved is None:
-            return None
-        path = path_of(self.nodes)
-        return FrequencySweepState(self.cell, path.case.penalty_omega, path.omega, self.nodes.saved)
+    def save(self) -> None:
+        """Give `keep` what another sweep needs to go on."""
+        if self.nodes is not None and self.nodes.saved is not None:
+            self.keep(pack(FrequencySweepState(self.cell, self.omega, self.nodes.saved)))
 
     def load(self, state: FrequencySweepState) -> None:
         """Go on from the saved state of another sweep."""
-        self._new_sweep(state.cell, state.penalty_omega, state.omega).load(state.nodes)
+        self._new_sweep(state.cell, state.omega).load(state.nodes)
 
     def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
         """Begin at a known state; False where the state is rejected.
@@ -119,36 +115,33 @@ class FrequencySweep:
         case: harmonics, samples and penalty of the state. state: its parameter is the frequency, rad/s, or for a ramp
         its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
         """
-        ramp, target = self.sweep == "ramp", 2.0 * np.pi * frequency
-        nodes = self._new_sweep(cell_of(frequency), case.penalty_omega, target if ramp else None)
-        nodes.direction = 1.0 if (1.0 if ramp else target) >= state.parameter else -1.0
-        return nodes.begin(replace(path_of(nodes), case=case), state)
+        omega = 2.0 * np.pi * frequency
+        nodes = self._new_sweep(cell_of(frequency), omega if self.sweep == "ramp" else None)
+        nodes.direction = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
+        return nodes.begin(replace(nodes.path, case=case), state)
 
     def advance(self, frequency: float) -> StartState:
         """State at the next frequency, Hz, with the harmonics that it needs. Raises OutOfTimeError."""
-        omega, ramp = 2.0 * np.pi * frequency, self.sweep == "ramp"
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
         run.budget.iterations, run.budget.limit = 0, NODE_ITERATIONS
-        nodes, target = self.sweep_to(frequency), 1.0 if ramp else omega
+        nodes = self.sweep_to(frequency)
+        target = 2.0 * np.pi * frequency if self.omega is None else 1.0
         nodes.advance_to(target)
-        try:
-            path, reached = path_of(nodes), nodes.state_at(target, run.fresh())
-            if isinstance(reached, Outcome):
-                run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
-                first = self._first(path, target, run)
-                if isinstance(first, Outcome):
-                    lost = "" if nodes.last is None else f"stable states end {path.describe(nodes.last)}"
-                    return self.without_state(why_lost(nodes, first), lost)
-                path, reached = first[0], Step(first[1])
-            at = path.case, omega, self.excitation_amplitude, reached.state, run
-            refined = self._at_known(*at) or refine(*at)
-        except np.linalg.LinAlgError:
-            return self.without_state(Outcome.SINGULAR)
+        path, reached = nodes.path, nodes.state_at(target, run.fresh())
+        if isinstance(reached, Outcome):
+            run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
+            first = self._first(path, target, run)
+            if isinstance(first, Outcome):
+                lost = "" if nodes.last is None else f"stable states end {path.describe(nodes.last)}"
+                return self.without_state(why_lost(nodes, first), lost)
+            path, reached = first[0], Step(first[1])
+        refined = self._at_known(path, reached.state) if self.known else None
+        refined = refined or refine(path.case, path.joint_of(reached.state), reached.state, run)
         # folds of a ramp are load factors
-        fold = np.nan if ramp else (nodes.state.fold, *reached.folds)[-1] / (2.0 * np.pi)
-        found = self._judged(refined, nodes)
-        return replace(found, branch=nodes.state.branch + len(reached.folds), fold_frequency=float(fold))
+        fold = (nodes.state.fold, *reached.folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
+        found, branch = self._judged(refined, nodes), nodes.state.branch + len(reached.folds)
+        return replace(found, branch=branch, fold_frequency=float(fold))
 
     def without_state(
         self, outcome: Outcome, message: str = "", resolution: Resolution | None = None, estimate: Estimate = UNKNOWN
@@ -158,7 +151,7 @@ class FrequencySweep:
         return StartState(
             outcome=outcome,
             state=None,
-            penalty_omega=math.nan if self.nodes is None else path_of(self.nodes).case.penalty_omega,
+            penalty_omega=math.nan if self.nodes is None else self.nodes.path.case.penalty_omega,
             resolution=resolution or used,
             response_error=estimate.response,
             wear_rate_error=estimate.wear_rate,
@@ -174,38 +167,37 @@ class FrequencySweep:
         """
         omega, cell, nodes = 2.0 * np.pi * frequency, cell_of(frequency), self.nodes
         ramp = omega if self.sweep == "ramp" else None
-        there = nodes is not None and self.cell == cell and path_of(nodes).omega == ramp
-        if nodes is not None and there and (ramp or beyond or not nodes.has_passed(omega)):
-            return nodes
-        # the penalty belongs to the upper end of the cell
-        nodes = self._new_sweep(cell, 2.0 * np.pi * edge_of(cell + 1), ramp)
-        nodes.run.budget.limit = FIRST_ITERATIONS
+        if nodes is not None and (self.cell, self.omega) == (cell, ramp):
+            passed = nodes.last is not None and (omega - nodes.last.parameter) * nodes.direction < 0.0
+            if ramp or beyond or not passed:
+                return nodes
+        nodes = self._new_sweep(cell, ramp)
+        nodes.budget.limit = FIRST_ITERATIONS
         place = 2.0 * np.pi * first_frequency(self.model, cell, self.sweep) if ramp is None else FREE_STEP
-        nodes.run.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
-        with contextlib.suppress(np.linalg.LinAlgError):
-            first = self._first(path_of(nodes), place, nodes.run)
-            if isinstance(first, Outcome):
-                nodes.state = replace(nodes.state, failure=first)
-            else:
-                nodes.begin(*first)
+        nodes.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
+        first = self._first(nodes.path, place, nodes.run)
+        if isinstance(first, Outcome):
+            nodes.state = replace(nodes.state, failure=first)
+        else:
+            nodes.begin(*first)
         return nodes
 
-    def _new_sweep(self, cell: int, penalty_omega: float, omega: float | None) -> Sweep[State]:
+    def _new_sweep(self, cell: int, omega: float | None) -> Sweep[State]:
         """A sweep before its first node. omega: of a ramp, rad/s, else None."""
-        case = build_case(self.model, self.friction_coefficient, penalty_omega, self.settings)
+        # the penalty belongs to the upper end of the cell
+        case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * edge_of(cell + 1), self.settings)
         path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
-        budget = Budget(deadline=of.deadline, report=of.report)
-        self.cell = cell
-        self.nodes = Sweep(path, -1.0 if self.sweep == "down" else 1.0, budget, with_reference=not self.known)
-        self.nodes.save = lambda: self.save()
+        budget, direction = Budget(deadline=of.deadline, report=of.report), -1.0 if self.sweep == "down" else 1.0
+        self.cell, self.omega = cell, omega
+        self.nodes = Sweep(path, direction, budget, with_reference=not self.known, save=self.save)
         return self.nodes
 
-    def _first(self, path: LoadingPath, place: float, run: Run) -> tuple[LoadingPath, State] | Outcome:
+    def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Outcome:
         """A state from the static one at a value of the parameter, and its path, with the harmonics of a path, or else
         with one; or the reason of the first attempt.
         """
         others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
-        omega, load = (place, 1.0) if path.omega is None else (path.omega, place)
+        omega, load = (place, 1.0) if self.omega is None else (self.omega, place)
         unworn, why = np.zeros(self.model.contact.n_contact), list[Outcome]()
         for resolution in (path.case.resolution, *others):
             at = path.at(resolution)
@@ -215,54 +207,46 @@ class FrequencySweep:
             why.append(found)
             if found.static or run.budget.exhausted:
                 break
-        return why[-1] if why[-1].static else why[0]
+        return why[0]
 
-    def _at_known(self, case: Case, omega: float, load: float, state: State, run: Run) -> Refined | None:
-        """The state with the known resolution; None where none is known, or where the state is not found with it."""
-        if not self.known:
-            return None
+    def _at_known(self, path: Path[State], state: State) -> Refined | None:
+        """The state with the known resolution; None where it is not found with it."""
+        omega = path.joint_of(state).omega
         _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - omega))
-        wanted = case.at(resolution)
-        moved = state if wanted is case else run.move(case, wanted.joint(omega, load), state)
-        return None if moved is None else Refined(wanted, moved, NOTHING, accurate=True)
+        wanted = path.at(resolution)
+        moved = state if wanted.case is path.case else path.move(state, wanted, self.run)
+        return None if moved is None else Refined(wanted.case, wanted.joint_of(moved), moved, NOTHING, accurate=True)
 
-    def _judged(self, refined: Refined, nodes: Sweep[State]) -> StartState:
+    def _judged(self, found: Refined, nodes: Sweep[State]) -> StartState:
         """The outcome of a refined state, with its error and the state of the reference sweep."""
-        case, point, estimate = refined.case, refined.point, refined.estimate
-        joint = replace(path_of(nodes), case=case).joint_at(point.parameter)
-        if not certify(joint, point.evaluation).holds(self.settings.tolerance):
-            return self.without_state(Outcome.CERTIFICATE_FAILED, "", case.resolution, estimate)
-        if unstable := find_instability(case, joint, point.evaluation, self.run, self.every):
-            return self.without_state(unstable.outcome, unstable.message, case.resolution, estimate)
-        reference = self._reference(nodes, case, point)
+        resolution, joint, at, estimate = found.case.resolution, found.joint, found.point.evaluation, found.estimate
+        if not certify(joint, at).holds(self.settings.tolerance):
+            return self.without_state(Outcome.CERTIFICATE_FAILED, "", resolution, estimate)
+        if unstable := find_instability(found.case, joint, at, self.run, self.every):
+            return self.without_state(unstable.outcome, unstable.message, resolution, estimate)
+        reference = self._reference(nodes, found)
         if reference is not None:
-            estimate = estimate + state_difference(case, joint, point, reference)
-        outcome = Outcome.CONVERGED if refined.accurate else Outcome.INACCURATE
+            estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
         return replace(
-            self.without_state(outcome, "", case.resolution, estimate),
-            state=periodic_state(joint, point),
+            self.without_state(Outcome.CONVERGED if found.accurate else Outcome.INACCURATE, "", resolution, estimate),
+            state=periodic_state(joint, found.point),
             reference=None if reference is None else periodic_state(joint, reference),
         )
 
-    def _reference(self, nodes: Sweep[State], case: Case, state: State) -> State | None:
-        """A state with the history that the reference sweep leaves; None where there is none."""
-        with contextlib.suppress(np.linalg.LinAlgError):
-            if nodes.here is not None and (reference := nodes.reference) is not None:
-                path, states = reference
-                assert isinstance(path, LoadingPath)
-                return path.like(states[-1], replace(path, case=case), state, self.run)
-        return None
-
-
-def path_of(sweep: Sweep[State]) -> LoadingPath:
-    """The path of a sweep."""
-    assert isinstance(sweep.path, LoadingPath)
-    return sweep.path
+    def _reference(self, nodes: Sweep[State], found: Refined) -> State | None:
+        """The state with the tangential history that the reference sweep leaves; None where there is none."""
+        if nodes.here is None or nodes.reference is None:
+            return None
+        (path, states), point = nodes.reference, found.point
+        node = states[-1]
+        at = replace(node.evaluation, history=history_at_rest(path.joint_of(node), node))
+        balance = Balance(found.joint, carried_history(path.case, found.joint, at), point.evaluation.wear_depth)
+        return stable_state(balance, point.evaluation.predicted_h, point.parameter, self.run.fresh())
 
 
 def why_lost(nodes: Sweep[State], failure: Outcome) -> Outcome:
     """The reason why a sweep has no state; failure: of the last search."""
-    return failure if nodes.last is None or failure in _REASONS else Outcome.BRANCH_LOST
+    return Outcome.BRANCH_LOST if failure is Outcome.START_FAILED and nodes.last is not None else failure
 
 
 def cell_of(frequency: float) -> int:
@@ -282,13 +266,8 @@ def first_frequency(model: ReducedModel, cell: int, sweep: Direction) -> float:
     if sweep == "down":
         near, away = (1.0 + BEGIN_AWAY) * edge_of(cell + 1), width
     frequencies = [float(at) for at in np.geomspace(near * away, near, START_CANDIDATES + 1)]
-    loads = []
-    for frequency in frequencies:
-        try:
-            structure = build_structure(model, 2.0 * np.pi * frequency, 1.0, (1,))
-            loads.append(float(np.linalg.norm(structure.harmonic_force)))
-        except np.linalg.LinAlgError:
-            loads.append(math.inf)
+    structures = (build_structure(model, 2.0 * np.pi * at, 1.0, (1,)) for at in frequencies)
+    loads = [float(np.linalg.norm(each.harmonic_force)) for each in structures]
     # of equally good frequencies the farthest: round-off must not decide
     least = min(loads) * (1.0 + 1e-6)
     return next(at for at, load in zip(frequencies, loads, strict=True) if load <= least)

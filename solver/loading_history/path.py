@@ -1,25 +1,21 @@
-"""What a sweep goes along, and the unworn joint along its frequency or its excitation.
-
-`LoadingPath.solve` solves one balance, which starts on the parabola through the last three states. Where Newton's
-method fails or the state is unstable, `LoadingPath.rescue` goes on by smaller natural steps to the end of the branch.
-The structure then settles in time a little beyond this end, as in a slow sweep of the machine.
-"""
+"""What a sweep goes along (`Path`), and the unworn joint along its frequency or its excitation (`LoadingPath`)."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Protocol, TypeVar
+from typing import ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import left_out, nothing_happens
-from solver.accuracy.refinement import KEPT_FRACTION, NODE_UNKNOWNS, Refined, refine
+from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
+from solver.accuracy.resolved_state import Estimate
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State, carried_history, history_at_rest, vibration_change, vibration_size
+from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
 from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -28,10 +24,10 @@ from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
-"""Fraction of the parameter: length of the steps with smaller natural steps, or settling in time, where a branch
-ends. Also the load factor at which a ramp begins, and for a nonlinear mode its first amplitude, as vibrating contact
-forces over the friction limits, and its smallest growth from node to node (with ten times the value and with a tenth
-the damping of the dovetail changes by 7e-5 and 1e-3)."""
+"""Fraction of the parameter: length at which a step that finds no state is left to `Path.rescue`, which goes on in
+steps of this length. Also the load factor at which a ramp begins, and for a nonlinear mode its first amplitude, as
+vibrating contact forces over the friction limits (with ten times the value and with a tenth the damping of the dovetail
+changes by 7e-5 and 1e-3)."""
 
 LONGEST_STEP = 0.1
 """Longest step, as a fraction of the parameter."""
@@ -45,8 +41,7 @@ CHANGE_PER_RTOL = 20.0
 
 CHANGE_LIMITS = (0.05, 0.2)
 """Limits of this change. Dovetail of 48 pairs, 211 to 212.5 Hz, compared with steps twenty times as short: errors of
-the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05. Blade root of the deck `blade_root`: the
-wear rates with 0.2 and 0.03 differ by 0.04 %, for 620 and 1680 iterations."""
+the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05."""
 
 SMALL_VIBRATION = 0.3
 """Fraction of the friction limits to which changes of a smaller vibration are relative. With 1 the error of the motion
@@ -54,7 +49,6 @@ of the dovetail at 211 Hz is three times as large, with 0 there are a few nodes 
 
 LEAST_SLIP = 1e-3
 """Slip of a pair over its motion above which it forgets its history."""
-
 
 SAMPLES_OF_SIGN = 4
 """Samples over those of a node that is unstable with fewer. Underplatform damper of nodal diameter 2, 30 stable states
@@ -71,70 +65,83 @@ class Step(Generic[S]):
     folds: tuple[float, ...] = ()
 
 
-class Path(Protocol[S]):
-    """The joint along a parameter, with the harmonics and samples of its case."""
+@dataclass(frozen=True)
+class Path(ABC, Generic[S]):
+    """The joint along a parameter, with the harmonics and samples of its case.
 
-    @property
-    def case(self) -> Case:
-        """Model and settings."""
+    shortest, longest: limits of the length of a step.
+    """
 
-    @property
-    def steps(self) -> tuple[float, float, float]:
-        """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
+    case: Case
+    shortest: ClassVar[float] = SHORTEST_STEP
+    longest: ClassVar[float] = LONGEST_STEP
 
+    @abstractmethod
+    def joint_of(self, state: S) -> Joint:
+        """The joint of a state."""
+
+    @abstractmethod
     def ahead(self, parameter: float, length: float) -> float:
         """The parameter a step farther, or back where the length is below 0."""
 
+    @abstractmethod
     def solve(self, states: tuple[S, ...], target: float, run: Run) -> S | None:
         """Stable state at a target near the last of some states, which leaves its history to it; None if not found."""
 
-    def rescue(self, start: S, target: float, run: Run) -> Step[S] | Outcome:
-        """State at a target that `solve` does not find, or why there is none."""
+    def rescue(self, _: S, __: float, ___: Run) -> Step[S] | Outcome:
+        """State at a target that `solve` does not find, or why there is none: by default no path that turns back."""
+        return Outcome.BRANCH_LOST
 
-    def change(self, before: S, after: S, wider: float) -> float:
-        """Change over a step, over the largest change allowed times `wider`."""
+    @abstractmethod
+    def change(self, before: S, after: S) -> float:
+        """Change over a step, over the largest one allowed."""
 
-    def rests(self, state: S) -> bool:
-        """Whether no pair slips or opens within the period."""
-
-    def forgets(self, state: S) -> bool:
-        """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
-
+    @abstractmethod
     def differs(self, before: S, after: S) -> float:
         """Relative change of the vibration between two states."""
 
-    def at(self, resolution: Resolution) -> Path[S]:
-        """The path with other harmonics and samples."""
+    def largest_change(self, *, sticks: bool) -> float:
+        """Largest relative change of the vibration in a step. sticks: whether no pair slips or opens at both ends; a
+        longer step might go over a whole resonance.
+        """
+        return LINEAR_CHANGE if sticks else float(np.clip(CHANGE_PER_RTOL * self.case.settings.rtol, *CHANGE_LIMITS))
 
-    def move(self, state: S, other: Any, run: Run) -> S | None:
+    def rests(self, _: S) -> bool:
+        """Whether no pair slips or opens within the period, so that no history is left behind."""
+        return False
+
+    def forgets(self, _: S) -> bool:
+        """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
+        return False
+
+    def suits(self, checked: S, _: float, state: S) -> bool:
+        """Whether the harmonics chosen for an earlier state, with an estimated error, are about those of a state."""
+        return self.differs(checked, state) <= VIBRATION_RECHECK
+
+    def at(self, resolution: Resolution) -> Self:
+        """The path with other harmonics and samples."""
+        return replace(self, case=self.case.at(resolution))
+
+    @abstractmethod
+    def move(self, state: S, other: Self, run: Run) -> S | None:
         """The state with the harmonics and samples of another path; None where not found."""
 
-    def choose(self, state: S, run: Run) -> tuple[Path[S], S, Estimate]:
+    @abstractmethod
+    def choose(self, state: S, run: Run) -> tuple[Self, S, Estimate]:
         """Path and state with the harmonics that the state needs, or the most allowed, and its estimated error."""
 
-    def suffices(self, checked: S, error: float, state: S) -> bool:
-        """Whether the harmonics chosen for an earlier state, with an estimated error, are about those of a state."""
-
+    @abstractmethod
     def describe(self, state: S) -> str:
         """Where the path is, in words."""
 
 
-def largest_change(rtol: float, wider: float, *, sticks: bool) -> float:
-    """Largest relative change of the vibration in a step; wider: factor where pairs slip or open.
-
-    sticks: whether no pair slips or opens at both ends. A longer step might go over a whole resonance.
-    """
-    return LINEAR_CHANGE if sticks else wider * float(np.clip(CHANGE_PER_RTOL * rtol, *CHANGE_LIMITS))
-
-
 @dataclass(frozen=True)
-class LoadingPath:
+class LoadingPath(Path[State]):
     """The unworn joint along its frequency, rad/s, or along the load factor on its excitation.
 
     excitation_amplitude: N. omega: of a path along the load, rad/s; None along the frequency.
     """
 
-    case: Case
     excitation_amplitude: float
     omega: float | None = None
 
@@ -144,14 +151,13 @@ class LoadingPath:
             return self.case.joint(parameter, self.excitation_amplitude)
         return self.case.joint(self.omega, parameter * self.excitation_amplitude)
 
+    def joint_of(self, state: State) -> Joint:
+        """As in Path."""
+        return self.joint_at(state.parameter)
+
     def balance_at(self, parameter: float, history: FloatArray) -> Balance:
         """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
         return Balance(self.joint_at(parameter), history, np.zeros(self.case.model.contact.n_contact))
-
-    @property
-    def steps(self) -> tuple[float, float, float]:
-        """As in Path, over the frequency or the whole load."""
-        return SHORTEST_STEP, LONGEST_STEP, FREE_STEP
 
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""
@@ -161,18 +167,19 @@ class LoadingPath:
 
     def solve(self, states: tuple[State, ...], target: float, run: Run) -> State | None:
         """As in Path, by Newton's method alone, from the polynomial through the states."""
-        start = states[-1]
-        joint, at = self.joint_at(target), np.array([state.parameter for state in states])
-        balance = Balance(joint, history_at_rest(joint, start), start.evaluation.wear_depth)
+        start, at = states[-1], np.array([state.parameter for state in states])
+        balance = self.balance_at(target, history_at_rest(self.joint_at(target), start))
         begin = np.zeros_like(start.evaluation.predicted_h)
         for place, state in enumerate(states):
             others = np.delete(at, place)
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
-        return _stable(balance, begin, target, run)
+        return stable_state(balance, begin, target, run)
 
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Outcome:
-        """As in Path: by natural steps and settling in time, in turns until the target."""
-        state = replace(start, history=history_at_rest(self.joint_at(start.parameter), start))
+        """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the
+        machine; both in turns until the target.
+        """
+        state = replace(start, history=history_at_rest(self.joint_of(start), start))
         fine, folds = FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
@@ -182,8 +189,8 @@ class LoadingPath:
             # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
-            joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
-            settled = relax_to_periodic(self.case, joint, balance.wear_depth, end, before, run)
+            joints = self.joint_at(beyond), self.joint_of(end)
+            settled = relax_to_periodic(self.case, joints[0], balance.wear_depth, end, joints[1], run)
             if isinstance(settled, Outcome):
                 return settled
             # a fold with a smaller change is a corner of the branch
@@ -194,16 +201,21 @@ class LoadingPath:
                 return Step(state, tuple(folds))
         return Outcome.BRANCH_LOST
 
-    def change(self, before: State, after: State, wider: float) -> float:
+    def change(self, before: State, after: State) -> float:
         """As in Path."""
-        one, other, rtol = before.evaluation, after.evaluation, self.case.settings.rtol
+        one, other = before.evaluation, after.evaluation
         if self.rests(before) and self.rests(after):
             # over a whole resonance, where the phase reverses, the change is larger than 1
-            return vibration_change(one, other) / largest_change(rtol, wider, sticks=True)
+            return vibration_change(one, other) / self.largest_change(sticks=True)
         limit = np.linalg.norm(friction_limit(self.case.friction_coefficient, one.force_h[:, 0, 0]))
         size = max(vibration_size(one), SMALL_VIBRATION * float(limit))
-        most = largest_change(rtol, wider, sticks=False)
-        return float(np.linalg.norm((other.predicted_h - one.predicted_h)[:, 1:])) / (size * most)
+        moved = float(np.linalg.norm((other.predicted_h - one.predicted_h)[:, 1:]))
+        return moved / (size * self.largest_change(sticks=False))
+
+    def differs(self, before: State, after: State) -> float:
+        """As in Path: the larger one of both directions."""
+        one, other = before.evaluation, after.evaluation
+        return max(vibration_change(one, other), vibration_change(other, one))
 
     def rests(self, state: State) -> bool:
         """As in Path."""
@@ -213,52 +225,37 @@ class LoadingPath:
         """As in Path; slip over a small fraction of the motion of its pair does not count."""
         at = state.evaluation
         opens = (at.status_t == SEPARATED).any(axis=1)
-        slip = np.ptp(at.state_t, axis=2).max(axis=1) / self.joint_at(state.parameter).law.state_stiffness
+        slip = np.ptp(at.state_t, axis=2).max(axis=1) / self.joint_of(state).law.state_stiffness
         moved = np.abs(at.displacement_h[:, 1:, 1:]).sum(axis=(1, 2))
         return bool((opens | (slip > LEAST_SLIP * moved)).all())
 
-    def differs(self, before: State, after: State) -> float:
-        """As in Path: the larger one of both directions."""
-        one, other = before.evaluation, after.evaluation
-        return max(vibration_change(one, other), vibration_change(other, one))
-
-    def at(self, resolution: Resolution) -> LoadingPath:
-        """As in Path."""
-        return replace(self, case=self.case.at(resolution))
-
-    def move(self, state: State, other: LoadingPath, run: Run) -> State | None:
-        """As in Path."""
-        return run.move(self.case, other.joint_at(state.parameter), state)
-
-    def like(self, node: State, fine: LoadingPath, state: State, run: Run) -> State | None:
-        """The state of another path with the tangential history that a node of this path leaves; None if not found."""
-        joint, before = fine.joint_at(state.parameter), self.joint_at(node.parameter)
-        at = replace(node.evaluation, history=history_at_rest(before, node))
-        balance = Balance(joint, carried_history(self.case, joint, at), state.evaluation.wear_depth)
-        return _stable(balance, state.evaluation.predicted_h, state.parameter, run.fresh())
-
-    def choose(self, state: State, run: Run) -> tuple[LoadingPath, State, Estimate]:
-        """As in Path."""
-        found = choose_resolution(self.case, self.joint_at(state.parameter), state, run)
-        return replace(self, case=found.case), found.point, found.estimate
-
-    def suffices(self, checked: State, error: float, state: State) -> bool:
+    def suits(self, checked: State, error: float, state: State) -> bool:
         """As in Path: the error grows and falls with the part of the contact force in harmonics that are left out.
 
         Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice.
         """
         settings, resolution = self.case.settings, self.case.resolution
-        slides = self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any()
         fewest = resolution == first_resolution(settings)
-        if slides or self.rests(state):
-            return slides or fewest
+        if super().suits(checked, error, state) or (fewest and self.rests(state)):
+            return True
+        if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
+            return True
         before, now = (left_out(resolution.orders, at.evaluation) for at in (checked, state))
-        if not (0.0 < error < np.inf and before > 0.0):
+        if self.rests(state) or not (0.0 < error < np.inf and before > 0.0):
             return False
         foreseen = error * now / before
         enough = fewest or foreseen >= KEPT_FRACTION**2 * settings.rtol
         # where the error is above rtol already, there are no more harmonics
         return enough and (foreseen <= settings.rtol or error > settings.rtol)
+
+    def move(self, state: State, other: Self, run: Run) -> State | None:
+        """As in Path."""
+        return run.move(self.case, other.joint_of(state), state)
+
+    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:
+        """As in Path."""
+        found = refine(self.case, self.joint_of(state), state, run, node=True)
+        return replace(self, case=found.case), found.point, found.estimate
 
     def describe(self, state: State) -> str:
         """As in Path, with the number of pairs that slip or open."""
@@ -267,22 +264,7 @@ class LoadingPath:
         return f"at {at}, {moving} of {len(state.evaluation.status_t)} pairs slip or open"
 
 
-def choose_resolution(case: Case, joint: Joint, point: State, run: Run) -> Refined:
-    """A node with the harmonics and samples that it needs, at least the first ones of automatic settings."""
-    # `NODE_UNKNOWNS` limits the harmonics: their error shows in the difference to the reference sweep
-    refined = refine(case, joint.omega, joint.excitation_amplitude, point, run, NODE_UNKNOWNS)
-    fewest = first_resolution(case.settings)
-    if refined.case.resolution.highest >= fewest.highest:
-        return refined
-    # a joint that sticks needs one harmonic only, but may slip at the next node
-    if case.resolution == fewest:
-        return replace(refined, case=case, point=point)
-    moved = case.at(fewest)
-    level = run.move(refined.case, moved.joint(joint.omega, joint.excitation_amplitude), refined.point)
-    return refined if level is None else replace(refined, case=moved, point=level)
-
-
-def _stable(balance: Balance, begin: FloatArray, target: float, run: Run) -> State | None:
+def stable_state(balance: Balance, begin: FloatArray, target: float, run: Run) -> State | None:
     """Stable state of a balance near a predicted force (n_rel, m), N; None where none is found.
 
     Too few samples may turn the sign of the determinant where many pairs slip and open: a node is unstable where it is

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -28,9 +29,9 @@ from solver.loading_history.frequency_sweep import FrequencySweep, cell_of, edge
 from solver.loading_history.path import FREE_STEP, Step
 from solver.loading_history.sweep import Sweep
 from solver.model import FloatArray, ReducedModel
-from solver.newton.run import Budget, OutOfTimeError, Run
-from solver.outcome import Outcome, describe_error
-from solver.packing import Packed, pack, unpack
+from solver.newton.run import Budget, Run, guarded
+from solver.outcome import Outcome
+from solver.packing import Packed, unpack
 from solver.results.history import StartState
 from solver.settings import Direction, FollowedFrequency, SolverSettings
 
@@ -57,58 +58,36 @@ def follow_branch(
     resume: progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there
         to frequencies not yet passed. The states are equal to the last bit, except `run_time`.
     """
-    line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
-    return follow_line(line, frequencies, keep, resume)
-
-
-def follow_line(
-    line: FrequencySweep,
-    frequencies: FloatArray | FollowedFrequency,
-    keep: Callable[[Packed | str], None] | None = None,
-    resume: Packed | None = None,
-) -> Iterator[tuple[int, StartState]]:
-    """The states of `follow_branch` from a sweep before its first state."""
-    n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
-    line.run.budget.report = keep or line.run.budget.report
+    asked = model, friction_coefficient, excitation_amplitude, sweep, settings
+    line = FrequencySweep(*asked) if keep is None else FrequencySweep(*asked, keep=keep)
     if resume is not None:
         line.load(unpack(resume))
+    return follow_line(line, frequencies)
 
-    def save() -> None:
-        if keep is not None and (state := line.state()) is not None:
-            keep(pack(state))
 
-    line.save = save
+def follow_line(line: FrequencySweep, frequencies: FloatArray | FollowedFrequency) -> Iterator[tuple[int, StartState]]:
+    """The states of `follow_branch` from a sweep before its first state."""
+    n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
     started = computing_time()
     for index in np.arange(n_states)[:: -1 if line.sweep == "down" else 1].tolist():
         line.set_deadline(started + line.settings.time_limit)
-        try:
-            if isinstance(frequencies, FollowedFrequency):
-                found = line.advance(find_resonance(line, frequencies))
-            else:
-                found = line.advance(float(frequencies[index]))
-        except _NoResonanceError as error:
-            found = line.without_state(error.failure.outcome, error.failure.message)
-        except OutOfTimeError:
-            found = line.without_state(Outcome.TIME_LIMIT)
-        except Exception as error:
-            # an error spoils one point only: the sweep goes on from the state before
-            found = line.without_state(Outcome.EXCEPTION, describe_error(error))
+        ended = guarded(partial(_next_state, line, frequencies, index))
+        found = line.without_state(ended.outcome, ended.message) if isinstance(ended, Failure) else ended
         now = computing_time()
         yield index, replace(found, newton_iterations=line.n_iterations, run_time=now - started)
         started = now
-        save()
+        line.save()
 
 
-class _NoResonanceError(Exception):
-    """The sweep meets no resonance."""
+def _next_state(line: FrequencySweep, frequencies: FloatArray | FollowedFrequency, index: int) -> StartState | Failure:
+    if not isinstance(frequencies, FollowedFrequency):
+        return line.advance(float(frequencies[index]))
+    resonance = find_resonance(line, frequencies)
+    return resonance if isinstance(resonance, Failure) else line.advance(resonance)
 
-    def __init__(self, message: str, outcome: Outcome = Outcome.RESONANCE_LOST) -> None:
-        super().__init__(message)
-        self.failure = Failure(outcome, message)
 
-
-def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
-    """Frequency of the first resonance that a sweep meets in a range, Hz. Raises _NoResonanceError.
+def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float | Failure:
+    """Frequency of the first resonance that a sweep meets in a range, Hz, or why it meets none.
 
     line: sweep "up" or "down", at its beginning or as saved on its way.
     """
@@ -127,10 +106,9 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
         else:
             at = near if nodes.last is None else nodes.last.parameter / (2.0 * math.pi)
             said = f"the sweep {line.sweep} ends at {at:.6g} Hz and has met no resonance until there"
-            raise _NoResonanceError(said, why_lost(nodes, nodes.state.failure or Outcome.BRANCH_LOST))
-    raise _NoResonanceError(
-        f"the sweep {line.sweep} meets no {follow.of} between {follow.low:g} and {follow.high:g} Hz: give another range"
-    )
+            return Failure(why_lost(nodes, nodes.state.failure or Outcome.BRANCH_LOST), said)
+    within = f"between {follow.low:g} and {follow.high:g} Hz: give another range"
+    return Failure(Outcome.RESONANCE_LOST, f"the sweep {line.sweep} meets no {follow.of} {within}")
 
 
 def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, float]]:
@@ -142,13 +120,11 @@ def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, fl
 
 def _resonance_between(
     line: FrequencySweep, nodes: Sweep[State], here: State, step: Step[State], follow: FollowedFrequency
-) -> float | None:
+) -> float | Failure | None:
     """Frequency, Hz, of a resonance between two nodes, with the history of the first one; None where there is none."""
     case, load, ahead = nodes.path.case, line.excitation_amplitude, step.state
     # positive before a resonance on the way of the sweep, negative behind
-    one, other = (
-        nodes.direction * math.cos(phase_lag(case.joint(at.parameter, load), at.evaluation)) for at in (here, ahead)
-    )
+    one, other = (nodes.direction * math.cos(phase_lag(nodes.path.joint_of(at), at.evaluation)) for at in (here, ahead))
     if not one > 0.0 >= other:
         return None
     part = 0.0 if step.folds else one / (one - other)
@@ -165,14 +141,14 @@ def _resonance_between(
     for fold in step.folds:
         before_fold = (fold - omega) * nodes.direction > FREE_STEP * fold
         if found is None or not before_fold or not run.is_stable(found.balance, found.at):
-            back = "down" if line.sweep == "up" else "up"
-            over = f"resonance at {fold / (2.0 * math.pi):.6g} Hz"
-            raise _NoResonanceError(f'the sweep {line.sweep} jumps over the {over}: give sweep = "{back}"')
+            way = f'give sweep = "{"down" if line.sweep == "up" else "up"}"'
+            over = f"the sweep {line.sweep} jumps over the resonance at {fold / (2.0 * math.pi):.6g} Hz"
+            return Failure(Outcome.RESONANCE_LOST, f"{over}: {way}")
     if found is not None and not follow.low <= omega / (2.0 * math.pi) <= follow.high:
         return None
     if found is not None and follow.of == "peak":
         peak = solve_at_peak(case, found.balance, found.at.predicted_h, 0.5 * math.pi, run)
         found = None if peak is None else peak[0]
     if found is None:
-        raise _NoResonanceError(f"no {follow.of} is found near {joint.omega / (2.0 * math.pi):.6g} Hz")
+        return Failure(Outcome.RESONANCE_LOST, f"no {follow.of} is found near {joint.omega / (2.0 * math.pi):.6g} Hz")
     return float(found.values[0]) / (2.0 * math.pi)

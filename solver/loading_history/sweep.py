@@ -19,14 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Generic
 
-import numpy as np
-
-from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.harmonic_levels import fewer
-from solver.accuracy.refinement import VIBRATION_RECHECK
+from solver.accuracy.resolved_state import NOTHING
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.path import Path, S, Step
+from solver.loading_history.path import FREE_STEP, Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
@@ -93,37 +90,37 @@ class SweepState:
 
 
 class Sweep(Generic[S]):
-    """A sweep, node by node, up (direction 1) or down (-1) along the parameter of its path.
+    """A sweep, node by node, up (direction 1) or down (-1) along the parameter of its path; the line of `take_step`.
 
+    budget: of the nodes, those of the reference sweep included. save: called where the sweep was saved.
     state, saved: at the current node, and at the last saved one. ahead: the next node, where it is known.
-    passed: parameters of the nodes so far. save: called where the sweep was saved.
+    passed: parameters of the nodes so far.
     """
 
-    def __init__(self, path: Path[S], direction: float, budget: Budget, *, with_reference: bool = False) -> None:
-        self.path, self.direction, self.with_reference = path, direction, with_reference
+    def __init__(
+        self,
+        path: Path[S],
+        direction: float,
+        budget: Budget,
+        *,
+        with_reference: bool = True,
+        save: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.path, self.direction, self.budget, self.save = path, direction, budget, save
+        self.with_reference = with_reference
         self.run = self._reference_run = Run(path.case.settings.tolerance, budget)
         self.state = SweepState(Nodes(path.case.resolution))
         self.saved: SweepState | None = None
         self.ahead: Step[S] | None = None
         self.passed: list[float] = []
         self._rate = 0.0
-        self.save: Callable[[], None] = lambda: None
 
     def load(self, state: SweepState) -> None:
         """Go on from the `saved` state of another sweep."""
         self.saved = self.state = state
         self.path = self.path.at(state.nodes.resolution)
-        self.run.budget.iterations = state.iterations
+        self.budget.iterations = state.iterations
         self._forget()
-
-    @property
-    def n_iterations(self) -> int:
-        """Newton iterations so far, those of the reference sweep included."""
-        return self.run.budget.iterations
-
-    def set_deadline(self, deadline: float) -> None:
-        """Set the CPU time of the thread, s, after which the sweep ends."""
-        self.run.budget.deadline = deadline
 
     @property
     def last(self) -> S | None:
@@ -147,92 +144,70 @@ class Sweep(Generic[S]):
         One harmonic can give a joint that slips and opens everywhere a state that does not exist: more harmonics change
         it by more than half.
         """
-        self._forget()
-        self.path, self.passed = path, [state.parameter]
-        nodes = Nodes(path.case.resolution, (state,))
-        self.state = replace(self.state, nodes=nodes, length=path.steps[1], failure=None)
+        self.path, self.passed, nodes = path, [state.parameter], Nodes(path.case.resolution, (state,))
+        self.state = replace(self.state, nodes=nodes, length=path.longest, failure=None)
         if self._choose_resolution() > SENSITIVE_ERROR:
             self.state = replace(self.state, nodes=replace(nodes, states=()), failure=Outcome.UNSETTLED)
             return False
         self._save()
         return True
 
-    def has_passed(self, parameter: float) -> bool:
-        """Whether a value of the parameter lies before the last node."""
-        return self.last is not None and (parameter - self.last.parameter) * self.direction < 0.0
-
     def advance_to(self, parameter: float) -> None:
         """Go on until the next node lies at or beyond a value of the parameter, or the sweep is lost."""
-        try:
-            while (here := self.here) is not None:
-                if self.ahead is None:
-                    self._look_ahead(here)
-                elif (self.ahead.state.parameter - parameter) * self.direction >= 0.0:
-                    return
-                else:
-                    self._advance(here, self.ahead)
-        except np.linalg.LinAlgError:
-            self._lose(Outcome.START_FAILED)
+        while (here := self.here) is not None:
+            if self.ahead is None:
+                self._look_ahead(here)
+            elif (self.ahead.state.parameter - parameter) * self.direction >= 0.0:
+                return
+            else:
+                self._advance(here, self.ahead)
 
     def state_at(self, parameter: float, run: Run) -> Step[S] | Outcome:
         """State at a parameter between the current and the next node, or why there is none.
 
-        Beyond a fold it is solved backwards from the next node. run: of its own; the sweep must not depend on it.
+        run: of its own; the sweep must not depend on it.
         """
         if self.here is None or self.ahead is None:
             return self.state.failure or Outcome.BRANCH_LOST
-        ahead, before = self.ahead, self.state.nodes.states[:-1]
-        beyond = tuple(at for at in ahead.folds if (parameter - at) * self.direction > 0.0)
-        if beyond and parameter != ahead.state.parameter:
-            found = _reach(self.path, (ahead.state,), parameter, run)
-            if isinstance(found, Step) and not found.folds:
-                return replace(found, folds=beyond)
-        near = before if ahead.folds else (*before[-1:], ahead.state)
-        return _reach(self.path, (*near, self.here), parameter, run)
-
-    # the line of `take_step`
+        before, path = self.state.nodes.states[:-1], self.path
+        near = before if self.ahead.folds else (*before[-1:], self.ahead.state)
+        found = path.solve((*near, self.here), parameter, run)
+        return path.rescue(self.here, parameter, run) if found is None else Step(found)
 
     def attempt(self, here: S, length: float) -> Step[S] | None:
         """As in Line."""
         run = self.run.with_tolerance(self.path.case.settings.rough_tolerance)
-        found = self.path.solve(self.state.nodes.states, self._target(here, length), run)
+        target = self.path.ahead(here.parameter, self.direction * length)
+        found = self.path.solve(self.state.nodes.states, target, run)
         return None if found is None else Step(found)
 
     def ratio(self, here: S, end: Step[S], length: float) -> float:
         """As in Line: the shortest step is accepted, whatever the change of the vibration is."""
-        ratio = self.path.change(here, end.state, 1.0)
+        ratio = self.path.change(here, end.state)
         self._rate = ratio / length
-        return min(ratio, 1.0) if length <= self.path.steps[0] else ratio
+        return min(ratio, 1.0) if length <= self.path.shortest else ratio
 
     def rescue(self, here: S, length: float) -> Step[S] | Failure:
         """As in Line."""
-        found = self.path.rescue(here, self._target(here, length), self.run)
+        found = self.path.rescue(here, self.path.ahead(here.parameter, self.direction * length), self.run)
         return Failure(found) if isinstance(found, Outcome) else found
-
-    def _target(self, here: S, length: float) -> float:
-        return self.path.ahead(here.parameter, self.direction * length)
 
     def _look_ahead(self, here: S) -> None:
         """Find the next node, or lose the sweep."""
-        budget, (shortest, longest, rescue) = self.run.budget, self.path.steps
-        budget.report(self.path.describe(here))
+        budget, path, self._rate = self.budget, self.path, 0.0
+        budget.report(path.describe(here))
         budget.limit = budget.iterations + NODE_ITERATIONS
-        if budget.iterations > SWEEP_ITERATIONS:
-            self._lose(Outcome.BRANCH_LOST)
-            return
-        self._rate = 0.0
-        taken = take_step(self, here, self.state.length, Lengths(1, AIMED_CHANGE, shortest, rescue))
+        taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST)
+        if budget.iterations <= SWEEP_ITERATIONS:
+            taken = take_step(self, here, self.state.length, Lengths(1, AIMED_CHANGE, path.shortest, FREE_STEP))
         if isinstance(taken, Failure):
-            self._lose(taken.outcome)
+            self.state = replace(self.state, failure=taken.outcome)
             return
         self.ahead, length = taken
         # the change will grow as in the last step: towards a resonance every third step would be refused
         growth = self._rate / self.state.rate if self.state.rate > 0.0 else 1.0
-        length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), longest)
+        length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), path.longest)
         self.state = replace(self.state, length=length, rate=self._rate)
-
-    def _lose(self, failure: Outcome) -> None:
-        self.state, self.ahead = replace(self.state, failure=failure), None
 
     def _advance(self, before: S, step: Step[S]) -> None:
         """Make the next node the current one."""
@@ -246,49 +221,41 @@ class Sweep(Generic[S]):
         )
         if self.with_reference:
             self._lead_reference(before, step)
-        checked, error = self.state.checked, self.state.error
-        changed = self.path.differs(checked, step.state) > VIBRATION_RECHECK
-        if changed and not self.path.suffices(checked, error, step.state):
+        if not self.path.suits(self.state.checked, self.state.error, step.state):
             self._choose_resolution()
         saved = 0 if self.saved is None else self.saved.iterations
-        if self.run.budget.iterations >= saved + ITERATIONS_PER_SAVE:
+        if self.budget.iterations >= saved + ITERATIONS_PER_SAVE:
             self._save()
 
     def _lead_reference(self, before: S, step: Step[S]) -> None:
         """Lead the reference sweep over a step from the node `before`: to its middle, if it is a third step."""
+        reference, skipped = self.state.reference, self.state.skipped
         if step.folds or self.path.forgets(step.state):
-            self.state = replace(self.state, reference=None, skipped=())
-            return
-        if self.state.reference is None:
-            if self.path.rests(step.state):
-                return
-            begun = self._reference_at(self.path, before) or Nodes(self.path.case.resolution, (before,))
-            self.state = replace(self.state, reference=begun)
-        skipped = self.state.skipped
-        if len(skipped) < STEPS_OF_REFERENCE - 1:
-            self.state = replace(self.state, skipped=(*skipped, step.state.parameter))
-            return
-        middle = 0.5 * (before.parameter + step.state.parameter)
-        led = self._led((middle,)) or self._led((*skipped, middle))
-        self.state = replace(self.state, reference=led, skipped=())
+            reference, skipped = None, ()
+        elif reference is not None or not self.path.rests(step.state):
+            reference = reference or Nodes(self.path.case.resolution, (before,))
+            skipped = (*skipped, step.state.parameter)
+            if len(skipped) == STEPS_OF_REFERENCE:
+                middle = 0.5 * (before.parameter + step.state.parameter)
+                reference = self._led(reference, middle) or self._led(reference, *skipped[:-1], middle)
+                skipped = ()
+        self.state = replace(self.state, reference=reference, skipped=skipped)
 
-    def _led(self, targets: tuple[float, ...]) -> Nodes | None:
-        """Nodes of the reference sweep at the last of some targets, one after the other; None where none is found."""
-        nodes = self.state.reference
+    def _led(self, nodes: Nodes, *targets: float) -> Nodes | None:
+        """Nodes of the reference sweep at the last of some targets, with one level of harmonics fewer than the sweep;
+        None where none is found.
+        """
+        path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
+        states: tuple[S, ...] = nodes.states
+        if nodes.resolution != path.case.resolution:
+            self._reference_run = self.run.fresh()
+            moved = self.path.at(nodes.resolution).move(states[-1], path, self.run)
+            states = () if moved is None else (moved,)
+        run = self._reference_run.with_tolerance(path.case.settings.rough_tolerance)
         for target in targets:
-            if nodes is not None:
-                path, rough = self.path.at(nodes.resolution), self.path.case.settings.rough_tolerance
-                found = path.solve(nodes.states, target, self._reference_run.with_tolerance(rough))
-                nodes = None if found is None else nodes.then(found)
-        return nodes
-
-    def _reference_at(self, path: Path[S], node: S) -> Nodes | None:
-        """The reference sweep at a state of a path, with one level of harmonics fewer; None where it is not found."""
-        wanted = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
-        same = wanted.case.resolution == path.case.resolution
-        moved = node if same else path.move(node, wanted, self.run)
-        self._reference_run = self.run.fresh()
-        return None if moved is None else Nodes(wanted.case.resolution, (moved,))
+            found = path.solve(states, target, run) if states else None
+            states = () if found is None else (*states, found)[-KEPT_NODES:]
+        return Nodes(path.case.resolution, states) if states else None
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
@@ -297,36 +264,18 @@ class Sweep(Generic[S]):
         if self.path.case.settings.automatic:
             path, here, error = self.path.choose(here, self.run)
             if path.case.resolution == nodes.resolution:
-                self.state = replace(self.state, nodes=replace(nodes, states=(*nodes.states[:-1], here)))
+                nodes = replace(nodes, states=(*nodes.states[:-1], here))
             else:
-                self._take(path, here)
-        self.state = replace(self.state, checked=here, error=error.largest)
+                nodes, self.path, self.run = Nodes(path.case.resolution, (here,)), path, self.run.fresh()
+        self.state = replace(self.state, nodes=nodes, checked=here, error=error.largest)
         return error.response
-
-    def _take(self, path: Path[S], state: S) -> None:
-        """Take the current node with other harmonics and samples; those of the reference sweep follow."""
-        before, self.path, self.run = self.reference, path, self.run.fresh()
-        self.state = replace(self.state, nodes=Nodes(path.case.resolution, (state,)))
-        if before is None:
-            return
-        reference = self._reference_at(before[0], before[1][-1])
-        if reference is None:
-            reference = self._reference_at(path, state) or self.state.nodes
-            self.state = replace(self.state, skipped=())
-        self.state = replace(self.state, reference=reference)
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""
-        self.saved = self.state = in_rows(replace(self.state, iterations=self.run.budget.iterations))
+        self.saved = self.state = in_rows(replace(self.state, iterations=self.budget.iterations))
         self._forget()
         self.save()
 
     def _forget(self) -> None:
         """Drop the factorisations that are kept from node to node, and the next node."""
         self.run, self._reference_run, self.ahead = self.run.fresh(), self.run.fresh(), None
-
-
-def _reach(path: Path[S], states: tuple[S, ...], target: float, run: Run) -> Step[S] | Outcome:
-    """State at a target from the last of some states, or why there is none."""
-    found = path.solve(states, target, run)
-    return path.rescue(states[-1], target, run) if found is None else Step(found)

@@ -10,33 +10,28 @@ import scipy.linalg
 
 from solver.accuracy.history_error import HISTORY_SAFETY
 from solver.clock import computing_time
+from solver.contact.wear_law import WearLaw
 from solver.continuation.first_state import solve_first_state
-from solver.continuation.natural import SMOOTH_CHANGE
+from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import follow_line
-from solver.loading_history.sweep import KEPT_NODES
-from solver.missions.mission import Block, Mission
+from solver.loading_history.sweep import KEPT_NODES, STEPS_OF_REFERENCE
+from solver.missions.mission import Block, MissionRequest, Passage
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
-from solver.packing import in_rows, packable
-from solver.results.history import StartState
+from solver.packing import packable
+from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import periodic_state
-from solver.results.verdict import first_cut_off
-from solver.settings import Direction, Resolution, SolverSettings
+from solver.settings import Direction, Resolution
 from solver.stability.floquet import find_instability
-from solver.structure.joint import build_case
-from solver.wear.integrate import Integrations, WearRequest
-from solver.wear.rate_slope import rate_slope
-from solver.wear.slow_time import Guide
-from solver.wear.step import Adaptive
+from solver.structure.joint import Case, build_case
+from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of
+from solver.wear.slow_time import Guide, Integrator
+from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearState
-
-NODES_OF_A_REFERENCE_STEP = 3
-"""Nodes of the sweep of a block in one step of its reference solution: the difference of both is twice the error by the
-steps of the sweep, as in a wear history."""
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
@@ -45,9 +40,6 @@ NEW_SWEEP_CHANGE = 0.5
 """Largest change of the vibration at the end of such a sweep since the sweep that has chosen its nodes. Above, a new
 sweep chooses them and estimates its error. Without a sweep, which alone says on which branch a state lies, the limit is
 `SMOOTH_CHANGE`."""
-
-MOST_HALVINGS = 12
-"""Most halvings of the distance of two such nodes in one sweep, to come past a corner at the resonance."""
 
 
 @packable
@@ -109,7 +101,7 @@ class BlockCase:
     every: whether stability is tested at start and end, also where nothing speaks for a loss of stability.
     """
 
-    mission: Mission
+    mission: MissionRequest
     place: int
     depth: FloatArray
     deadline: float = math.inf
@@ -125,6 +117,12 @@ class BlockCase:
         return self.mission.blocks[self.place]
 
     @property
+    def passage(self) -> Passage:
+        """The passage of a block that is one."""
+        assert isinstance(self.block.frequency, Passage)
+        return self.block.frequency
+
+    @property
     def is_continued(self) -> bool:
         """Whether the next block begins from the last state of this one."""
         blocks = self.mission.blocks
@@ -137,9 +135,14 @@ class BlockCase:
         return replace(self.block.model, contact=replace(contact, gap=contact.gap + self.depth))
 
     @property
-    def settings(self) -> SolverSettings:
-        """The settings, with the time that is left."""
-        return replace(self.mission.settings, time_limit=self.deadline - computing_time())
+    def law(self) -> WearLaw:
+        """The wear law from the depth on."""
+        return self.mission.law.begun_at(self.depth)
+
+    @property
+    def time_left(self) -> float:
+        """CPU seconds until the deadline."""
+        return self.deadline - computing_time()
 
     def run(self) -> Run:
         """A computation until the deadline."""
@@ -148,16 +151,20 @@ class BlockCase:
     def line(self, sweep: Direction, amplitude: float | None = None) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N; that of the block if not given."""
         load = self.block.excitation_amplitude if amplitude is None else amplitude
-        line = FrequencySweep(self.model, self.block.friction_coefficient, load, sweep, self.settings)
+        settings = replace(self.mission.settings, time_limit=self.time_left)
+        line = FrequencySweep(self.model, self.block.friction_coefficient, load, sweep, settings)
         line.every = self.every
         line.set_deadline(self.deadline)
         return line
 
+    def at(self, start: StartState) -> Case:
+        """The case at the depth before the block, with harmonics, samples and penalty of a state."""
+        friction = self.block.friction_coefficient
+        return build_case(self.model, friction, start.penalty_omega, self.mission.settings, start.resolution)
+
     def begin(self, start: StartState) -> tuple[WearingJoint, WearState]:
-        """The joint at the depth before the block, with harmonics, samples and penalty of a state, and this state."""
-        friction, mission = self.block.friction_coefficient, self.mission
-        case = build_case(self.model, friction, start.penalty_omega, self.settings, start.resolution)
-        setup = WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
+        """The joint at the depth before the block, and a state of it."""
+        setup = WearingJoint(self.at(start), start, self.mission.wear_coefficient, self.law)
         return setup, setup.begin()
 
 
@@ -166,43 +173,40 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     start, begun = find_start(case)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    (setup, _), cycles = case.begin(start), case.block.steady[1]
-    counts = np.array([0.0, cycles])
-    steps, solve = Adaptive(case.mission.settings.rtol), Integrations(setup.case, start)
-    asked = WearRequest(setup.wear_coefficient, steps, counts, law=setup.law, ends_at_last=True)
+    counts, steps = np.array([0.0, case.block.cycles]), Adaptive(case.mission.settings.rtol)
+    asked = WearRequest(case.mission.wear_coefficient, steps, counts, law=case.law, ends_at_last=True)
     if case.guide is None:
-        ended = solve.history(asked, stable_end=case.every)
+        problem = WearProblem(case.at(start), start, asked, stable_end=case.every)
     else:
-        ended = solve.reference(asked, case.guide, counts)
+        problem = reference_of(case.at(start), start, asked, case.guide, counts)
+    ended = Integrator(case.time_left).integrate(problem)
     state = ended.state
     if state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return ended.failure
     values, slope = ended.course.read(counts), None
     depth = values["wear_depth"]
-    volume = float(depth[-1] @ setup.area)
+    volume = float(depth[-1] @ case.mission.area)
     if case.with_slope:
         # the flow of the linearised wear rate
-        rates = rate_slope(setup, state, case.depth + depth[-1] > 0.0)
-        slope = np.asarray(scipy.linalg.expm(cycles * rates) - np.eye(len(rates)))
+        rates = rate_slope(problem.setup, state, case.depth + depth[-1] > 0.0)
+        slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
-    found = BlockRun(
+    return BlockRun(
         growth=depth[-1],
         response=values["response"],
         response_peak=values["response_peak"],
         slope=slope,
         response_error=float(np.fmax.reduce(values["response_error"])),
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
-        inaccurate=state.worst.largest if state.inaccurate_from <= cycles else 0.0,
-        held=state.held_from <= cycles,
+        inaccurate=state.worst.largest if state.inaccurate_from <= counts[-1] else 0.0,
+        held=state.held_from <= counts[-1],
         cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
         guide=Guide(state.resolutions, state.first_length),
         last=_last(state, start) if case.is_continued else None,
         begun=begun,
         iterations=start.newton_iterations + ended.iterations,
     )
-    # as read from a file: an interrupted mission goes on with equal bits
-    return in_rows(found)
 
 
 def _last(state: WearState, start: StartState) -> StartState:
@@ -230,7 +234,7 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
         return again, case.begun
     way = case.block.way
     line = case.line(case.mission.first if way == "continue" else way)
-    _, start = next(follow_line(line, np.array([case.block.steady[0]])))
+    _, start = next(follow_line(line, np.array([case.block.ends[0]])))
     nodes = line.nodes
     if start.state is None or nodes is None or way == "continue":
         return start, None
@@ -255,7 +259,7 @@ def _by_earlier_sweep(case: BlockCase, begun: Begun) -> StartState | None:
     try:
         found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if found is None or not path.forgets(found):
-            stride = 1 if case.guide is None else NODES_OF_A_REFERENCE_STEP
+            stride = 1 if case.guide is None else STEPS_OF_REFERENCE
             found, most = _through_nodes(path, begun, target, stride, run), NEW_SWEEP_CHANGE
         if found is None or vibration_change(earlier.at, found.evaluation) > most:
             return None
@@ -274,21 +278,20 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
         return None
     coarse, (first, *nodes) = path.at(begun.resolution), begun.nodes[::stride]
     joint, unworn = coarse.joint_at(first), np.zeros(path.case.model.contact.n_contact)
-    found: State | Outcome | None = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
+    found = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
     if not isinstance(found, State):
         return None
     states: tuple[State, ...] = (replace(found, parameter=first),)
     ahead, halvings, rough = [*nodes, target], 0, run.with_tolerance(coarse.case.settings.rough_tolerance)
     while ahead:
-        here, parameter = states[-1], ahead[0]
-        after = coarse.solve(states, parameter, run if parameter == target else rough)
-        if after is not None and coarse.change(here, after, float(stride)) <= LARGEST_CHANGE:
+        after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
+        if after is not None and coarse.change(states[-1], after) <= LARGEST_CHANGE * stride:
             states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)
-        elif (halvings := halvings + 1) > MOST_HALVINGS:
+        elif (halvings := halvings + 1) > ATTEMPTS:
             return None
         else:
-            ahead.insert(0, 0.5 * (here.parameter + parameter))
+            ahead.insert(0, 0.5 * (states[-1].parameter + ahead[0]))
     return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
 
 
@@ -298,7 +301,7 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
     carried: state at the end of the block before, solved first at the depth before the block. Then amplitude and
     frequency change, one after the other, the frequency at the smaller amplitude. Raises OutOfTimeError, LinAlgError.
     """
-    before, run, frequency = carried.state, case.run(), case.block.steady[0]
+    before, run, frequency = carried.state, case.run(), case.block.ends[0]
     assert before is not None
     setup, last = case.begin(carried)
     balance = setup.balance_of(last)

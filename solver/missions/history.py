@@ -14,17 +14,26 @@ from solver.accuracy.history_error import HistoryError, error_of_target
 from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import Begun, BlockCase, BlockRun, run_block
-from solver.missions.mission import Mission, MissionHistory, Passage
+from solver.missions.mission import MissionHistory, MissionRequest, Passage
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
-from solver.missions.step import Nodes, Step, attempt_step, values_of
+from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
-from solver.newton.run import Budget
+from solver.newton.run import Budget, guarded
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, packable
-from solver.results.verdict import describe_cut_off, describe_uncertain
-from solver.wear.course import Course, Node
+from solver.results.history import describe_cut_off, describe_uncertain
 from solver.wear.history import compare
-from solver.wear.slow_time import AS_ASKED, ENDS_ALL, RTOL_RATIO, Guide, Integrator, Solution, Solutions, guarded
+from solver.wear.slow_time import (
+    AS_ASKED,
+    ENDS_ALL,
+    RTOL_RATIO,
+    Course,
+    Guide,
+    Integrator,
+    Node,
+    Solution,
+    Solutions,
+)
 
 STEP_ERROR_FRACTION = 0.5
 """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
@@ -35,25 +44,28 @@ Missions of a slider: estimated over true error at least 1.7. With 0.25 two case
 @packable
 @dataclass(frozen=True)
 class MissionState:
-    """A joint after some missions; the next step depends on it alone.
+    """A joint after some missions; the next step depends on it and the last nodes of the course.
 
-    nodes: ends of the last three steps. inaccurate, sweep_rate (n_block,): largest values of the blocks so far.
-    length: missions of the next step. runs, first: blocks of the last and of the first mission.
+    runs, first: blocks of the last and of the first mission, none before. length: missions of the next step.
+    inaccurate, sweep_rate (n_block,): largest values of the blocks so far.
     held_from, cut_off_from: missions before the first step with such a block, inf if never.
     """
 
-    nodes: Nodes
-    inaccurate: FloatArray
-    sweep_rate: FloatArray
-    length: float = 1.0
     runs: tuple[BlockRun, ...] = ()
     first: tuple[BlockRun, ...] = ()
+    length: float = 1.0
+    inaccurate: FloatArray | float = 0.0
+    sweep_rate: FloatArray | float = 0.0
     held_from: float = math.inf
     cut_off_from: float = math.inf
 
 
+Here = tuple[MissionState, Course]
+"""Where a step begins."""
+
+
 class MissionProblem:
-    """A mission history, or its reference solution, as a problem over the slow time; the line of `take_step`.
+    """A mission history, or its reference solution, as `SlowProblem`; its missions are the line of `take_step`.
 
     fine: the history of which it is the reference solution; None for a history.
     """
@@ -61,22 +73,20 @@ class MissionProblem:
     # each step computes at least one mission
     iterations_per_save = 0
 
-    def __init__(self, mission: Mission, fine: Solution | None = None) -> None:
+    def __init__(self, mission: MissionRequest, fine: Solution | None = None) -> None:
         self.mission, self.fine, self.budget = mission, fine, Budget()
+        self.name, self.course = "history" if fine is None else "reference", unworn_course(mission)
         self.last = mission.missions[-1] if fine is None else int(fine.course.ends[-1])
         # how each block began last, and why a step was not found
         self._begun: list[Begun | None] = []
         self._failure = Failure(Outcome.MARCH_FAILED)
 
-    def saved(self, state: MissionState) -> MissionState:
-        """As in SlowProblem: blocks are as read from a file."""
-        return state
+    def fresh(self) -> None:
+        """As in SlowProblem: nothing."""
 
-    def advance(self, state: MissionState | None, course: Course) -> tuple[MissionState, Course] | Failure:
+    def advance(self, state: MissionState | None, course: Course) -> Here | Failure:
         """As in SlowProblem."""
-        if state is None:
-            nothing = np.zeros(len(self.mission.blocks))
-            state = MissionState(course.nodes, nothing, nothing)
+        state = state or MissionState()
         done = int(course.ends[-1])
         if done >= self.last or (self.fine is None and not math.isnan(course.reached)):
             return AS_ASKED
@@ -84,42 +94,40 @@ class MissionProblem:
         longest = min(longest, self.last if len(course.ends) > 2 else 1)
         earlier = state.runs if done or self.fine is None else self.fine.state.first
         self._begun = [run.begun for run in earlier] or [None] * len(self.mission.blocks)
-        taken = take_step(self, state, min(state.length, longest), Lengths(2, shortest=1, rescue=1))
+        taken = take_step(self, (state, course), min(state.length, longest), Lengths(2, shortest=1, rescue=1))
         if isinstance(taken, Failure):
             return taken
         step, length = taken
         runs = tuple(replace(run, slope=None) for run in step.runs)
-        after = replace(
-            state,
-            nodes=(*state.nodes, step.node)[-3:],
-            length=length,
-            runs=runs,
-            first=state.first or tuple(replace(run, last=None) for run in runs),
-            inaccurate=np.maximum([run.inaccurate for run in runs], state.inaccurate),
-            sweep_rate=np.maximum([run.sweep_rate for run in runs], state.sweep_rate),
-            held_from=min(state.held_from, done if any(run.held for run in runs) else math.inf),
-            cut_off_from=min(state.cut_off_from, done if any(run.cut_off for run in runs) else math.inf),
+        after = MissionState(
+            runs,
+            state.first or tuple(replace(run, last=None) for run in runs),
+            length,
+            np.maximum([run.inaccurate for run in runs], state.inaccurate),
+            np.maximum([run.sweep_rate for run in runs], state.sweep_rate),
+            min(state.held_from, done if any(run.held for run in runs) else math.inf),
+            min(state.cut_off_from, done if any(run.cut_off for run in runs) else math.inf),
         )
         if not done:
             # the rate and the values of the unworn joint are those of the first mission
             course = replace(course, nodes=(replace(step.node, count=0.0, depth=course.nodes[0].depth),))
         return after, course.after(step.node)
 
-    def attempt(self, state: MissionState, length: float) -> Step | None:
+    def attempt(self, here: Here, length: float) -> MissionStep | None:
         """As in Line. The last mission of the step is computed."""
-        rtol = self.mission.settings.rtol * (1.0 if self.fine is None else RTOL_RATIO)
-        run = partial(self._mission, state, int(state.nodes[-1].count + length))
-        found = attempt_step(state.nodes, int(length), self.mission.area, run, STEP_ERROR_FRACTION * rtol)
-        if isinstance(found, Step):
+        nodes, rtol = here[1].nodes, self.mission.settings.rtol * (1.0 if self.fine is None else RTOL_RATIO)
+        run = partial(self._mission, here[0], int(nodes[-1].count + length))
+        found = attempt_step(nodes, int(length), self.mission.area, run, STEP_ERROR_FRACTION * rtol)
+        if isinstance(found, MissionStep):
             return found
         self._failure = found
         return None
 
-    def ratio(self, _: MissionState, end: Step, __: float) -> float:
+    def ratio(self, _: Here, end: MissionStep, __: float) -> float:
         """As in Line."""
         return end.ratio
 
-    def rescue(self, _: MissionState, __: float) -> Failure:
+    def rescue(self, _: Here, __: float) -> Failure:
         """As in Line: a mission that fails by itself ends the history."""
         return self._failure
 
@@ -136,8 +144,7 @@ class MissionProblem:
         runs: list[BlockRun] = []
         for place, (block, guide, begun) in enumerate(zip(mission.blocks, guides, self._begun, strict=True)):
             case = BlockCase(mission, place, depth, self.budget.deadline, carried, begun, guide, with_slopes, every)
-            through = run_passage if isinstance(block.frequency, Passage) else run_block
-            found = guarded(partial(through, case))
+            found = guarded(partial(run_passage if isinstance(block.frequency, Passage) else run_block, case))
             if isinstance(found, Failure):
                 said = f"in mission {number}, {mission.called(place)}"
                 return Failure(found.outcome, ": ".join(filter(None, (said, found.message))))
@@ -148,7 +155,7 @@ class MissionProblem:
         return tuple(runs)
 
 
-def unworn_course(mission: Mission) -> Course:
+def unworn_course(mission: MissionRequest) -> Course:
     """The course before the first mission, whose blocks have no values yet."""
     nothing = np.zeros(mission.area.size)
     unknown = np.full((2, len(mission.blocks[0].model.response_names)), np.nan)
@@ -159,26 +166,26 @@ def unworn_course(mission: Mission) -> Course:
 
 
 def integrate_missions(
-    mission: Mission, keep: Callable[[Packed], None] | None = None, resume: Packed | None = None
+    mission: MissionRequest, keep: Callable[[Packed], None] | None = None, resume: Packed | None = None
 ) -> MissionHistory:
     """Mission history of one point of a study, as far as computed, with its outcome.
 
     keep: called after each step with the progress. resume: as for `wear.history.integrate_together`.
     """
-    unworn, integrator = unworn_course(mission), Integrator(mission.settings.time_limit, keep, resume)
-    fine = integrator.integrate("history", MissionProblem(mission), unworn)
+    integrator = Integrator(mission.settings.time_limit, keep, resume)
+    fine = integrator.integrate(MissionProblem(mission))
     solutions = Solutions(fine, fine)
     if fine.state is not None and fine.failure.outcome not in ENDS_ALL:
-        reference = integrator.integrate("reference", MissionProblem(mission, fine), unworn, fine.seconds)
-        solutions = Solutions(fine, fine, reference)
-    history = _assembled(mission, solutions, unworn if solutions.reference is None else solutions.reference.course)
+        solutions = Solutions(fine, fine, integrator.integrate(MissionProblem(mission, fine), fine.seconds))
+    other = unworn_course(mission) if solutions.reference is None else solutions.reference.course
+    history = _assembled(mission, solutions, other)
     if history.outcome is not Outcome.CONVERGED:
         return history
     failure = _judged(mission, solutions, history)
     return replace(history, outcome=failure.outcome, message=failure.message)
 
 
-def _assembled(mission: Mission, solutions: Solutions, reference: Course) -> MissionHistory:
+def _assembled(mission: MissionRequest, solutions: Solutions, reference: Course) -> MissionHistory:
     """The result, from both solutions."""
     course, state, failure = solutions.own.course, solutions.own.state, solutions.failure
     counts, area, n_block = np.array(mission.missions, np.float64), mission.area, len(mission.blocks)
@@ -216,7 +223,7 @@ def _assembled(mission: Mission, solutions: Solutions, reference: Course) -> Mis
     )
 
 
-def _errors(mission: Mission, counts: FloatArray, fine: Course, reference: Course) -> list[HistoryError]:
+def _errors(mission: MissionRequest, counts: FloatArray, fine: Course, reference: Course) -> list[HistoryError]:
     """Errors of the whole wear, and of wear and responses of each block, at the counts (n_output,), the first 0."""
     n_block, area = len(mission.blocks), mission.area
     parts = (slice(None), *(slice(place, place + 1) for place in range(n_block)))
@@ -253,7 +260,7 @@ def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[
     }
 
 
-def _target_error(mission: Mission, at: float, fine: Course, reference: Course) -> float:
+def _target_error(mission: MissionRequest, at: float, fine: Course, reference: Course) -> float:
     """Estimated error of the number of missions to the target, NaN where it was never reached."""
     if mission.until is None or math.isnan(at):
         return math.nan
@@ -264,11 +271,11 @@ def _target_error(mission: Mission, at: float, fine: Course, reference: Course) 
     return error_of_target(mission.until, at, of_other, values, last_rate, whole, mission.area)
 
 
-def _judged(mission: Mission, solutions: Solutions, history: MissionHistory) -> Failure:
+def _judged(mission: MissionRequest, solutions: Solutions, history: MissionHistory) -> Failure:
     """The outcome of a complete history, and its sentence."""
     rtol, state = mission.settings.rtol, solutions.own.state
     if state.cut_off_from < math.inf:
-        return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(state.cut_off_from).replace("cycle", "mission"))
+        return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(state.cut_off_from, "mission"))
     outcome, said, worst = Outcome.CONVERGED, [], int(np.argmax(state.inaccurate))
     if history.error_estimate > SENSITIVE_ERROR:
         outcome, last = Outcome.SENSITIVE, np.flatnonzero(np.isfinite(history.worn_volume))[-1]

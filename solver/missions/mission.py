@@ -70,22 +70,9 @@ class Block:
         of = self.frequency
         return (of.start, of.stop) if isinstance(of, Passage) else (of, of)
 
-    @property
-    def steady(self) -> tuple[float, float]:
-        """Frequency, Hz, and cycles of a block that is no passage."""
-        assert isinstance(self.frequency, float)
-        assert self.cycles is not None
-        return self.frequency, self.cycles
-
-    @property
-    def passage(self) -> Passage:
-        """The passage of a block that is one."""
-        assert isinstance(self.frequency, Passage)
-        return self.frequency
-
 
 @dataclass(frozen=True)
-class Mission:
+class MissionRequest:
     """Blocks in order, at least one, repeated a number of times. Arguments as of `solver.integrate_mission`.
 
     - missions (n_output,): ascending whole numbers of missions at which the history is reported, the first 0.

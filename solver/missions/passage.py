@@ -38,13 +38,12 @@ from solver.missions.block_run import Begun, BlockCase, BlockRun
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
 from solver.outcome import Outcome
-from solver.packing import in_rows
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
 from solver.structure.joint import friction_of_pairs
-from solver.wear.rate_slope import rate_slope
 from solver.wear.slow_time import RTOL_RATIO, Guide
+from solver.wear.step import rate_slope
 
 FIRST_FREQUENCIES = 17
 """Frequencies before those that are added."""
@@ -96,11 +95,11 @@ class Swept:
 
 def run_passage(case: BlockCase) -> BlockRun | Failure:
     """Compute a passage, as `block_run.run_block`."""
-    passage, swept = case.block.passage, find_states(case)
+    swept = find_states(case)
     if isinstance(swept, Failure):
         return swept
     ascending, area = swept.states, case.mission.area
-    states = ascending[:: 1 if passage.sweep == "up" else -1]
+    states = ascending[:: 1 if case.passage.sweep == "up" else -1]
     starts, parts = [state.start for state in ascending], parts_of(ascending)
     volume = float(parts.sum(axis=0) @ area)
     growth, slope = wear_in_order(states, (_slope_of(case, state) for state in states))
@@ -109,7 +108,7 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
     error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
     error += min(lag * max(float(state.density @ area) for state in states), volume)
     ends, inaccurate = (states[0], states[-1]), [each for each in starts if each.outcome is Outcome.INACCURATE]
-    found = BlockRun(
+    return BlockRun(
         growth=growth,
         response=np.array([state.response for state in ends]),
         response_peak=np.array([state.peak for state in ends]),
@@ -123,7 +122,6 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
-    return in_rows(found)
 
 
 def _slope_of(case: BlockCase, state: SweptState) -> FloatArray:
@@ -131,7 +129,7 @@ def _slope_of(case: BlockCase, state: SweptState) -> FloatArray:
     if not state.density.any():
         return np.zeros((state.density.size, state.density.size))
     slope = rate_slope(*case.begin(state.start), (state.density > 0.0) | (case.depth > 0.0))
-    return np.asarray(slope * state.frequency / case.block.passage.rate)
+    return np.asarray(slope * state.frequency / case.passage.rate)
 
 
 def wear_in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -141,14 +139,11 @@ def wear_in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) ->
     unit = np.eye(states[0].density.size)
     # columns: the wear, and the change of the depth after the passage
     grown: FloatArray = np.zeros((len(unit), len(unit) + 1))
-    last: tuple[SweptState, FloatArray, FloatArray] | None = None
+    before, rise = states[0].frequency, np.zeros_like(grown)
     for state, slope in zip(states, slopes, strict=True):
-        source = np.column_stack([state.density, slope])
-        if last is not None:
-            half = 0.5 * abs(state.frequency - last[0].frequency)
-            known = grown + half * (last[2] + last[1] @ grown + source)
-            grown = np.asarray(np.linalg.solve(unit - half * slope, known))
-        last = state, slope, source
+        half, source = 0.5 * abs(state.frequency - before), np.column_stack([state.density, slope])
+        grown = np.asarray(np.linalg.solve(unit - half * slope, grown + half * (rise + source)))
+        before, rise = state.frequency, source + slope @ grown
     return np.maximum(grown[:, 0], 0.0), grown[:, 1:]
 
 
@@ -161,7 +156,7 @@ def parts_of(states: Sequence[SweptState]) -> FloatArray:
 
 def find_states(case: BlockCase) -> Swept | Failure:
     """The states of one passage at the depth before it, as many as its wear needs."""
-    passage, area = case.block.passage, case.mission.area
+    passage, area = case.passage, case.mission.area
     aim = FREQUENCY_ERROR * (1.0 if case.guide is None else RTOL_RATIO) * case.mission.settings.rtol
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
@@ -201,11 +196,8 @@ def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least:
 
 def _between(one: SweptState, other: SweptState, finest: float) -> list[float]:
     """Further frequencies between two, Hz: both sides of a jump, or the middle of an interval above `finest`, Hz."""
-    low, high = one.frequency, other.frequency
-    near = NEGLIGIBLE * low
-    folds = [
-        fold for fold in sorted({each.start.fold_frequency for each in (one, other)}) if low + near < fold < high - near
-    ]
+    low, high, near = one.frequency, other.frequency, NEGLIGIBLE * one.frequency
+    folds = {each.start.fold_frequency for each in (one, other) if low + near < each.start.fold_frequency < high - near}
     if one.start.branch != other.start.branch and folds:
         return [side for fold in folds for side in (fold - near, fold + near)]
     return [0.5 * (low + high)] if high - low > max(2.0 * near, finest) else []
@@ -231,8 +223,7 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    passage, found = case.block.passage, []
-    line = case.line(passage.sweep)
+    found, line = [], case.line(case.passage.sweep)
     if case.guide is not None:
         # errors of a reference solution are not used
         line.known = case.guide.resolutions
@@ -243,7 +234,7 @@ def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Fa
             return Failure(Outcome.TIME_LIMIT)
         setup, begun = case.begin(start)
         joint, frequency = setup.joint_of(begun), float(frequencies[index])
-        density = setup.rate(begun.at) * frequency / passage.rate
+        density = setup.rate(begun.at) * frequency / case.passage.rate
         response = to_complex(joint.structure.response_h(joint.to_relative(begun.at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, begun.at)))
     return found
@@ -264,5 +255,5 @@ def delay_of(case: BlockCase, states: Sequence[SweptState]) -> tuple[float, floa
     mode = next((found for found in modes if found is not None), None)
     if mode is None:
         return 0.0, 0.0
-    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), case.block.passage.rate
+    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), case.passage.rate
     return (rate / width**2, rate / (2.0 * math.pi * width)) if width > 0.0 else (math.inf, math.inf)

@@ -22,7 +22,7 @@ last node is a part of the error of the step.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,19 +31,15 @@ import numpy as np
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
 from solver.model import FloatArray
-from solver.wear.course import Node
+from solver.wear.slow_time import Node
 from solver.wear.step import allowed_error
 
 RunMission = Callable[[FloatArray, bool], tuple[BlockRun, ...] | Failure]
 """Computes the blocks of a mission: depth before (n_contact,), m, and whether slopes are asked for."""
 
-Nodes = tuple[Node, ...]
-"""Ends of steps, of which the last missions were computed, with the depths and rates of all blocks in one row. Values
-(n_block, ...) by their names in `BlockRun`, and `local` (n_contact,): sum of the errors of steps and blocks, m."""
-
 
 @dataclass(frozen=True)
-class Step:
+class MissionStep:
     """A computed step: its end, the blocks of its last mission, and its estimated local error over the allowed one."""
 
     node: Node
@@ -51,96 +47,56 @@ class Step:
     ratio: float
 
 
-@dataclass(frozen=True)
-class Formula:
-    """The step from at least three nodes before: `Z = base + factor R(Z)`.
-
-    base (n_block, n_contact): m, by blocks.
-    first, ahead (n_contact,): Z, and the depth at the end, of the parabola through three nodes before, m.
-    error_factor: error over the difference of the end to `ahead`.
-    """
-
-    base: FloatArray
-    factor: float
-    first: FloatArray
-    ahead: FloatArray
-    error_factor: float
-
-    @classmethod
-    def of(cls, nodes: Nodes, length: int, area: FloatArray) -> Formula:
-        """The formula of a step of some missions."""
-        past, before, now = (node.depth.reshape(-1, area.size) for node in nodes[-3:])
-        h, (b, a) = float(length), np.diff([node.count for node in nodes[-3:]])
-        last = (now - before) / a
-        turn = (last - (before - past) / b) / (a + b)
-        first, ahead = ((now + at * last + at * (at + a) * turn).sum(axis=0) for at in (h - 1.0, h))
-        whole = 2.0 * h - 1.0 + a
-        base = now + (h - 1.0) * h / whole * last
-        factor = float((h - 1.0) * (h - 1.0 + a) / whole)
-        return cls(base, factor, np.maximum(first, base.sum(axis=0)), ahead, float(factor / (h + a + b)))
-
-
-def attempt_step(nodes: Nodes, length: int, area: FloatArray, run: RunMission, share: float) -> Step | Failure:
+def attempt_step(
+    nodes: Sequence[Node], length: int, area: FloatArray, run: RunMission, share: float
+) -> MissionStep | Failure:
     """A step over missions; over more than one from the third mission on.
 
-    nodes: ends of the last three steps, or of all. area (n_contact,): m2. share: as in `allowed_error`.
+    nodes: ends of steps so far, of which the last missions were computed, with the depths and rates of all blocks in
+        one row, and with values (n_block, ...) by their names in `BlockRun`, and `local` (n_contact,): sum of the
+        errors of steps and blocks, m. area (n_contact,): m2. share: as in `allowed_error`.
     """
-    now = nodes[-1]
-    depth_now, rate_before = (row.reshape(-1, area.size).sum(axis=0) for row in (now.depth, now.rate))
-    if length == 1:
-        runs = run(depth_now, False)
-        return runs if isinstance(runs, Failure) else _one_mission(nodes, area, runs, share)
-    formula, unit = Formula.of(nodes, length, area), np.eye(area.size)
-    base, factor, first = formula.base.sum(axis=0), formula.factor, formula.first
-    runs = run(first, True)
+    now, unit = nodes[-1], np.eye(area.size)
+    base, rate_before = now.depth.reshape(-1, area.size), now.rate.reshape(-1, area.size).sum(axis=0)
+    depth_now = first = ahead = base.sum(axis=0)
+    factor = error_factor = 0.0
+    if length > 1:
+        past, before, _ = (node.depth.reshape(-1, area.size) for node in nodes[-3:])
+        h, (b, a) = float(length), np.diff([node.count for node in nodes[-3:]])
+        last = (base - before) / a
+        turn = (last - (before - past) / b) / (a + b)
+        first, ahead = ((base + at * last + at * (at + a) * turn).sum(axis=0) for at in (h - 1.0, h))
+        base = base + (h - 1.0) * h / (2.0 * h - 1.0 + a) * last
+        factor = float((h - 1.0) * (h - 1.0 + a) / (2.0 * h - 1.0 + a))
+        first, error_factor = np.maximum(first, base.sum(axis=0)), float(factor / (h + a + b))
+    runs = run(first, length > 1)
     if isinstance(runs, Failure):
         return runs
-    whole, rates = unit, np.array([each.growth for each in runs])
-    for each in runs:
-        assert each.slope is not None
-        whole = (unit + each.slope) @ whole
-    slope, rate = whole - unit, rates.sum(axis=0)
-    depth = np.maximum(first + np.linalg.solve(unit - factor * slope, base + factor * rate - first), base)
-    # the correction of the depth is shared by the blocks in proportion to their wear
-    rates = rates * np.divide((depth - base) / factor, rate, out=np.ones_like(rate), where=rate > 0.0)
-    end, moved = depth + rates.sum(axis=0), first - (depth_now - rate_before)
-    missed = np.abs(rate - rate_before - slope @ moved)
-    part = np.abs(depth - first) @ area / max(float(np.abs(moved) @ area), 1e-300)
-    error = np.abs(formula.error_factor * (end - formula.ahead)) + factor * part * missed
-    most = allowed_error(share, float(depth_now @ area), float(end @ area), now.count, length)
-    after = _end_of(now, length, formula.base + (factor + 1.0) * rates, rates, runs, error)
-    return Step(after, runs, float(np.nan_to_num(error @ area / most, nan=np.inf)))
-
-
-def _one_mission(nodes: Nodes, area: FloatArray, runs: tuple[BlockRun, ...], share: float) -> Step:
-    """A step of one mission, whose error is 0; its ratio is that of two missions, for the length of the next step."""
-    now, rates = nodes[-1], np.array([each.growth for each in runs])
-    grown = now.depth.reshape(rates.shape)
-    end = _end_of(now, 1, grown + rates, rates, runs, np.zeros(area.size))
-    if len(nodes) < 3:
-        return Step(end, runs, 0.0)
-    two, (b, a) = Formula.of(nodes, 2, area), np.diff([node.count for node in nodes[-3:]])
-    # the error grows with the third divided difference
-    growth = 2.0 * (2.0 + a) * (2.0 + a + b) / ((1.0 + a) * (1.0 + a + b))
-    before, after = grown.sum(axis=0), (grown + rates).sum(axis=0)
-    error = two.error_factor * growth * float(np.abs(after - two.first) @ area)
-    most = 2.0 * allowed_error(share, float(before @ area), float(after @ area), now.count, 1)
-    return Step(end, runs, float(min(0.25 * error / most, 1.0)))
+    rates, error = np.array([each.growth for each in runs]), np.zeros(area.size)
+    if length > 1:
+        whole, rate, least = unit, rates.sum(axis=0), base.sum(axis=0)
+        for each in runs:
+            assert each.slope is not None
+            whole = (unit + each.slope) @ whole
+        slope = whole - unit
+        depth = np.maximum(first + np.linalg.solve(unit - factor * slope, least + factor * rate - first), least)
+        # the correction of the depth is shared by the blocks in proportion to their wear
+        rates = rates * np.divide((depth - least) / factor, rate, out=np.ones_like(rate), where=rate > 0.0)
+        moved = first - (depth_now - rate_before)
+        part = np.abs(depth - first) @ area / max(float(np.abs(moved) @ area), 1e-300)
+        missed = np.abs(rate - rate_before - slope @ moved)
+        error = np.abs(error_factor * (depth + rates.sum(axis=0) - ahead)) + factor * part * missed
+    growth = base + (factor + 1.0) * rates
+    most = allowed_error(share, float(depth_now @ area), float(growth.sum(axis=0) @ area), now.count, length)
+    values = values_of(runs)
+    # the error of a block that wears nothing may be unknown
+    of_blocks = np.where(rates > 0.0, values["growth_error"][:, None] * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
+    values["local"] = now.values["local"] + error + length * of_blocks
+    end = Node(now.count + length, growth.ravel(), rates.ravel(), values, tuple(each.guide for each in runs))
+    return MissionStep(end, runs, float(np.nan_to_num(error @ area / most, nan=np.inf)))
 
 
 def values_of(runs: tuple[BlockRun, ...]) -> dict[str, Any]:
     """Values (n_block, ...) of the blocks, by their names."""
     names = ("response", "response_peak", "response_error", "growth_error")
     return {name: np.array([getattr(run, name) for run in runs]) for name in names}
-
-
-def _end_of(
-    now: Node, length: int, growth: FloatArray, rates: FloatArray, runs: tuple[BlockRun, ...], error: FloatArray
-) -> Node:
-    """The end of a step from its growth, its last mission, (n_block, n_contact), m, and its error (n_contact,), m."""
-    values = values_of(runs)
-    # the error of a block that wears nothing may be unknown
-    of_blocks = np.where(rates > 0.0, values["growth_error"][:, None] * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
-    local = now.values["local"] + error + length * of_blocks
-    guides = tuple(run.guide for run in runs)
-    return Node(now.count + length, growth.ravel(), rates.ravel(), values | {"local": local}, guides)

@@ -72,7 +72,7 @@ def linear_mode(
     return LinearMode(omega, shape, float(np.real(np.vdot(shape, linear.damping @ shape))) / (2.0 * omega))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ModalModel(ReducedModel):
     """A model in which harmonic 1, `first`, has a spring on its modal coordinate. The excitation amplitude is Q."""
 

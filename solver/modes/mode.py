@@ -12,22 +12,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.accuracy.refinement import refine
+from solver.accuracy.resolved_state import NOTHING, Estimate
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, predicted_at_rest, relieved_history, solve_static_state
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest, transfer
-from solver.loading_history.path import FREE_STEP, Step, choose_resolution, largest_change
+from solver.loading_history.path import FREE_STEP, Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
 from solver.newton.run import Bordered, Run
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.settings import DIFFERENCE, Resolution, SolverSettings
+from solver.settings import DIFFERENCE, SolverSettings
 from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
@@ -71,26 +73,32 @@ class ModeState(State):
 
 
 @dataclass(frozen=True)
-class NonlinearMode:
+class NonlinearMode(Path[ModeState]):
     """A mode of a joint as a path along its amplitude; lengths of steps are logarithms of the ratio of two amplitudes.
 
+    - case: case of the modal model, with harmonics and samples; its damping is replaced.
     - model: the model, without the spring on the modal coordinate.
     - linear: the linear mode from which the nonlinear one begins.
-    - case: case of the modal model, with harmonics and samples; its damping is replaced.
     """
 
     model: ReducedModel
     linear: LinearMode
-    case: Case
+    # where a smaller ratio is needed the mode is lost; with a tenth of it modes are equal
+    shortest: ClassVar[float] = FREE_STEP
+    longest: ClassVar[float] = math.log(LARGEST_STEP_RATIO)
 
     def case_of(self, values: FloatArray) -> Case:
         """Case of the modal model at a frequency, rad/s, and a damping ratio, the first two values."""
         model = modal_model(self.model, self.linear, 2.0 * float(values[1]) * float(values[0]))
-        return replace(self.case, model=model, _structures={})
+        return replace(self.case, model=model)
 
-    def joint_of(self, values: FloatArray) -> Joint:
+    def joint_with(self, values: FloatArray) -> Joint:
         """Joint of the modal model at some values (3,)."""
         return self.case_of(values).joint(float(values[0]), float(values[2]))
+
+    def joint_of(self, state: ModeState) -> Joint:
+        """As in Path."""
+        return self.joint_with(state.values)
 
     def find(
         self,
@@ -113,12 +121,6 @@ class NonlinearMode:
         after = final_history(found.balance, found.at)
         return ModeState(found.at, after, amplitude, values=found.values, shape=found.extra)
 
-    @property
-    def steps(self) -> tuple[float, float, float]:
-        """As in Path: where a smaller ratio is needed the mode is lost; with a tenth of the step modes are equal."""
-        shortest = math.log1p(FREE_STEP)
-        return shortest, math.log(LARGEST_STEP_RATIO), shortest
-
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path."""
         return parameter * math.exp(length)
@@ -130,7 +132,7 @@ class NonlinearMode:
         comes to another branch, on which no state is found at smaller amplitudes.
         """
         here, run = states[-1], run.with_tolerance(self.case.settings.tolerance)
-        history, last = history_at_rest(self.joint_of(here.values), here), here.evaluation.predicted_h
+        history, last = history_at_rest(self.joint_of(here), here), here.evaluation.predicted_h
         growth = target / here.parameter
         grown = np.concatenate([last[:, :1], growth * last[:, 1:]], axis=1)
         starts = [(grown, here.values * np.array([1.0, 1.0, growth]))]
@@ -141,48 +143,28 @@ class NonlinearMode:
         found = (self.find(target, start, history, run, NEAR_ITERATIONS) for start in starts)
         return next((state for state in found if state is not None), None)
 
-    def rescue(self, _: ModeState, __: float, ___: Run) -> Step[ModeState] | Outcome:
-        """As in Path: a mode that turns back is not followed."""
-        return Outcome.BRANCH_LOST
-
-    def change(self, before: ModeState, after: ModeState, wider: float) -> float:
+    def change(self, before: ModeState, after: ModeState) -> float:
         """As in Path."""
         sticks = all((state.evaluation.status_t == STICK).all() for state in (before, after))
-        return self.differs(before, after) / largest_change(self.case.settings.rtol, wider, sticks=sticks)
-
-    def rests(self, _: ModeState) -> bool:
-        """As in Path: a mode has a reference sweep from its first amplitude on."""
-        return False
-
-    def forgets(self, _: ModeState) -> bool:
-        """As in Path."""
-        return False
+        return self.differs(before, after) / self.largest_change(sticks=sticks)
 
     def differs(self, before: ModeState, after: ModeState) -> float:
         """As in Path: of the vibrating predicted force per amplitude."""
         one, other = (state.evaluation.predicted_h[:, 1:] / state.parameter for state in (before, after))
         return float(np.linalg.norm(other - one)) / max(float(np.linalg.norm(one)), 1e-300)
 
-    def at(self, resolution: Resolution) -> NonlinearMode:
+    def move(self, state: ModeState, other: Self, run: Run) -> ModeState | None:
         """As in Path."""
-        return replace(self, case=self.case.at(resolution))
-
-    def move(self, state: ModeState, other: NonlinearMode, run: Run) -> ModeState | None:
-        """As in Path."""
-        balance, start = transfer(self.case, other.joint_of(state.values), state.evaluation)
+        balance, start = transfer(self.case, other.joint_of(state), state.evaluation)
         return other.find(state.parameter, (start, state.values), balance.history, run.fresh())
 
-    def choose(self, state: ModeState, run: Run) -> tuple[NonlinearMode, ModeState, Estimate]:
+    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:
         """As in Path."""
-        chosen = choose_resolution(self.case_of(state.values), self.joint_of(state.values), state, run)
-        other = self.at(chosen.case.resolution)
-        moved = state if chosen.case.resolution == self.case.resolution else self.move(state, other, run)
+        found = refine(self.case_of(state.values), self.joint_of(state), state, run, node=True)
+        other = self.at(found.case.resolution)
+        moved = state if other.case is self.case else self.move(state, other, run)
         # the error of the first response is judged in a sweep of the frequency only
         return (self, state, NOTHING) if moved is None else (other, moved, NOTHING)
-
-    def suffices(self, _: ModeState, __: float, ___: ModeState) -> bool:
-        """As in Path: harmonics are chosen anew."""
-        return False
 
     def describe(self, state: ModeState) -> str:
         """As in Path."""
@@ -199,7 +181,7 @@ class _AtAmplitude:
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
         """As in BorderedProblem; values: frequency, damping ratio and drive. extra: x_1 (n,), m."""
-        balance = Balance(self.mode.joint_of(values), self.history, np.zeros(len(self.history)))
+        balance = Balance(self.mode.joint_with(values), self.history, np.zeros(len(self.history)))
         at = balance.evaluate(predicted_h)
         shape = _shape(balance.joint, at.displacement_h, float(values[2]))
         coordinate, square = self._coordinate(shape), self._product(shape, shape)
@@ -228,7 +210,7 @@ class _AtAmplitude:
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         """As in BorderedProblem."""
-        turned = _shape(here.balance.joint, tangent.transmit(step)[0], 0.0)
+        turned = _shape(here.balance.joint, tangent.motion(step), 0.0)
         coordinate = self._coordinate(turned)
         return np.array([coordinate.real, coordinate.imag, self._product(here.extra, turned)])
 
@@ -288,7 +270,7 @@ class Rest:
         for attempt in range(SLIDING_STARTS):
             size = amplitude * TOP_BASE**attempt
             joint = self.mode.case.joint(linear.omega, size)
-            amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
+            amplitudes = np.zeros((dofs.size, len(joint.basis.orders)), complex)
             amplitudes[:, 0] = np.where(dofs.ravel() >= 0, size * linear.shape[dofs.ravel()], 0.0)
             motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
             start = self.state.evaluation.predicted_h + joint.to_relative(joint.law.force(motion))
@@ -330,4 +312,4 @@ def find_rest(
     state = run.fresh().state(Balance(quiet, static.history, unworn), start, 0.0)
     if state is None:
         return Failure(Outcome.STATIC_FAILED)
-    return Rest(NonlinearMode(model, linear, case), glued is not None, state)
+    return Rest(NonlinearMode(case, model, linear), glued is not None, state)

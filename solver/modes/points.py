@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -16,19 +17,18 @@ import numpy as np
 from solver.accuracy.certificate import certify
 from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.refinement import refine
+from solver.accuracy.resolved_state import first_response
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
-from solver.continuation.natural import LARGEST_STEP_RATIO
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import Path, Step
 from solver.loading_history.sweep import Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_rest
-from solver.newton.run import Budget, OutOfTimeError, Run
-from solver.outcome import Outcome, describe_error, known_to
+from solver.newton.run import Budget, Run, guarded
+from solver.outcome import Outcome, known_to
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
-from solver.structure.fourier import to_complex
 
 Direction = Literal["up", "down"]
 
@@ -82,16 +82,7 @@ def follow_mode(
     for index in sorted(range(len(amplitudes)), key=lambda index: way.place(float(amplitudes[index]))):
         began = computing_time()
         run = Run(settings.tolerance, Budget(deadline=began + settings.time_limit))
-        point: ModePoint | Failure
-        try:
-            point = way.point(float(amplitudes[index]), run)
-        except OutOfTimeError:
-            point = Failure(Outcome.TIME_LIMIT)
-        except np.linalg.LinAlgError:
-            point = Failure(Outcome.SINGULAR)
-        except Exception as error:
-            # an error spoils one point only
-            point = Failure(Outcome.EXCEPTION, describe_error(error))
+        point = guarded(partial(way.point, float(amplitudes[index]), run))
         if isinstance(point, Failure):
             linear, pairs = model.linear[0], np.full(model.contact.n_contact, math.nan)
             response, shape = (np.full(len(part), math.nan, complex) for part in (linear.response, linear.mass))
@@ -138,33 +129,26 @@ class _Way:
         self.spent, rest = self.to_rest, self.rest
         if isinstance(rest, Failure):
             return rest
-        if self.direction == "down":
-            sweep = self._lowered_from(rest, _top_of(amplitude), deadline)
-        elif not rest.glued:
+        if self.direction == "up" and not rest.glued:
             said = 'the joint has no such mode while its pairs stick: give sweep = "down", from large amplitudes'
             return Failure(Outcome.START_FAILED, said)
-        elif amplitude < rest.first_amplitude:
+        if self.direction == "up" and amplitude < rest.first_amplitude:
             node = rest.raised(amplitude, run)
             return _NO_FIRST if node is None else _judged(rest.mode, node, None, run)
-        else:
-            sweep = self._raised_to(rest, amplitude, deadline)
+        lowered, top = self.direction == "down", _top_of(amplitude)
+        sweep = self._lowered_from(rest, top, deadline) if lowered else self._raised_to(rest, amplitude, deadline)
         if sweep is None:
             return _NO_FIRST
-        self.spent = sweep.n_iterations
-        if self.up is not None and sweep is self.down and sweep.here is not None and sweep.here.parameter < amplitude:
+        self.spent = sweep.budget.iterations
+        if self.up is not None and lowered and sweep.here is not None and sweep.here.parameter < amplitude:
             # the mode could not be raised to the amplitude from which it is lowered
-            return Failure(Outcome.BRANCH_LOST, _describe_loss(self.up))
-        sweep.set_deadline(deadline)
+            return _lost(self.up)
+        sweep.budget.deadline = deadline
         sweep.advance_to(amplitude)
-        self.spent = sweep.n_iterations
-        if sweep.here is None:
-            return Failure(Outcome.BRANCH_LOST, _describe_loss(sweep))
+        self.spent = sweep.budget.iterations
         found = sweep.state_at(amplitude, run.fresh())
         if not isinstance(found, Step):
-            ahead = sweep.here if sweep.ahead is None else sweep.ahead.state
-            ends = f"{sweep.here.parameter:.4g} and {ahead.parameter:.4g}"
-            said = f"no state was found between the amplitudes {ends} m sqrt(kg), where the mode has states"
-            return Failure(Outcome.BRANCH_LOST, said)
+            return _lost(sweep)
         return _judged(_mode_of(sweep.path), found.state, _reference_at(sweep, amplitude, run), run)
 
     def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState] | None:
@@ -174,7 +158,7 @@ class _Way:
             first = rest.raised(rest.first_amplitude, Run(rest.mode.case.settings.tolerance, budget))
             self.up = _begun(rest.mode, first, 1.0, budget)
         if self.up is not None:
-            self.up.set_deadline(deadline)
+            self.up.budget.deadline = deadline
             self.up.advance_to(amplitude)
         return self.up
 
@@ -188,7 +172,7 @@ class _Way:
                 first = rest.sliding(top, Run(mode.case.settings.tolerance, budget))
             elif (raised := self._raised_to(rest, top, deadline)) is not None:
                 first = raised.last if raised.ahead is None else raised.ahead.state
-                mode, budget.iterations = _mode_of(raised.path), raised.n_iterations
+                mode, budget.iterations = _mode_of(raised.path), raised.budget.iterations
             self.down, self.top = _begun(mode, first, -1.0, budget), top
         return self.down
 
@@ -196,7 +180,7 @@ class _Way:
 def _begun(mode: NonlinearMode, first: ModeState | None, direction: float, budget: Budget) -> Sweep[ModeState] | None:
     if first is None:
         return None
-    sweep: Sweep[ModeState] = Sweep(mode, direction, budget, with_reference=True)
+    sweep: Sweep[ModeState] = Sweep(mode, direction, budget)
     sweep.begin(mode, first)
     return sweep
 
@@ -213,7 +197,7 @@ def _reference_at(sweep: Sweep[ModeState], amplitude: float, run: Run) -> tuple[
     path, states = sweep.reference
     # its last node may be farther away than the longest step, and a leap may end at another mode
     last = states[-1].parameter
-    n_steps = max(1, math.ceil(abs(math.log(amplitude / last)) / math.log(LARGEST_STEP_RATIO)))
+    n_steps = max(1, math.ceil(abs(math.log(amplitude / last)) / path.longest))
     for target in np.geomspace(last, amplitude, n_steps + 1)[1:]:
         found = path.solve(states, float(target), run.fresh())
         if found is None:
@@ -232,14 +216,14 @@ def _judged(
     settings = mode.case.settings
     # half of rtol is left for the error by the steps of the sweep
     case = replace(mode.case_of(found.values), settings=replace(settings, rtol=0.5 * settings.rtol))
-    refined = refine(case, found.omega, float(found.values[2]), found, run)
+    refined = refine(case, mode.joint_of(found), found, run)
     accurate = refined.accurate
     if refined.case.resolution != mode.case.resolution:
         other = mode.at(refined.case.resolution)
         moved = mode.move(found, other, run)
         accurate &= moved is not None
         mode, found = (mode, found) if moved is None else (other, moved)
-    joint, at, resolution = mode.joint_of(found.values), found.evaluation, mode.case.resolution
+    joint, at, resolution = mode.joint_of(found), found.evaluation, mode.case.resolution
     certificate = certify(joint, at)
     if not certificate.holds(settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
@@ -259,7 +243,7 @@ def _judged(
         damping_ratio=found.damping_ratio,
         frequency_error=float(errors[0]) / (2.0 * np.pi),
         damping_error=float(errors[1]),
-        response=to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0],
+        response=first_response(joint, at),
         shape=found.shape,
         slip_fraction=_slips(at).mean(axis=1),
         open_fraction=(at.status_t == SEPARATED).mean(axis=1),
@@ -281,13 +265,14 @@ def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> Fl
     return np.full(3, math.inf)
 
 
-def _describe_loss(sweep: Sweep[ModeState]) -> str:
-    """Sentence about the end of a mode: the last amplitude, and what may end the mode there."""
+def _lost(sweep: Sweep[ModeState]) -> Failure:
+    """The end of a mode: its last amplitude, and what may end the mode there."""
     here, (way, beyond) = sweep.last, ("up", "larger") if sweep.direction > 0.0 else ("down", "smaller")
     assert here is not None
     at = f"{here.parameter:.4g} m sqrt(kg), at {here.omega / (2.0 * np.pi):.6g} Hz"
     ends = "the mode turns back there (a fold), meets another mode at a multiple of its frequency, or ends"
-    return f"the mode is followed {way} to the amplitude {at}; no state is found at a {beyond} amplitude: {ends}"
+    said = f"the mode is followed {way} to the amplitude {at}; no state is found at a {beyond} amplitude: {ends}"
+    return Failure(Outcome.BRANCH_LOST, said)
 
 
 def _slips(at: Evaluation) -> BoolArray:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -21,7 +20,7 @@ SIGN_PRODUCTS = 16
 """Products of Arnoldi's method between two computations of the eigenvalues. With four, 23 cases are equal."""
 
 STAGNATION_PRODUCTS = 20
-"""A GMRES cycle ends unless its residual is halved over so many products: saves time where a joint slides."""
+"""GMRES ends unless its residual is halved over so many products: saves time where a joint slides."""
 
 NO_DIRECTION = 1e-11
 """Fraction of a vector: less is no new direction. Double precision has 2e-16."""
@@ -31,77 +30,49 @@ Product = Callable[[FloatArray], FloatArray]
 
 
 def solve_gmres(
-    product: Product, exact: Product, right: FloatArray, rtol: float, restart: int, cycles: float
+    product: Product, right: FloatArray, rtol: float, most: int
 ) -> tuple[FloatArray, bool, FloatArray, FloatArray]:
-    """Solve `exact(x) = right` (n,) by restarted GMRES from zero.
+    """Solve `A x = right` (n,) by GMRES from zero, with at most `most` products, to the relative residual `rtol`.
 
-    Returns x, whether it has converged, and basis and Hessenberg matrix of the last cycle (`_arnoldi`).
-
-    product: the operator with small errors allowed; `exact` is applied once in a cycle of at most `restart` products.
-    rtol: relative residual. cycles: most cycles, but for those that converge with inexact products only.
+    Returns x, whether it has converged, and basis and Hessenberg matrix (`_arnoldi`).
     """
-    solution, residual = np.zeros_like(right), right
-    basis, hessenberg = right[None], np.zeros((1, 0))
-    norms = [float(np.linalg.norm(right))]
+    norms, null = [float(np.linalg.norm(right))], np.ones(min(most, right.size) + 1)
     wanted = rtol * norms[0]
+    if not 0.0 < norms[0] < math.inf:
+        return np.zeros_like(right), norms[0] == 0.0, right[None], np.zeros((1, 0))
 
-    def stagnates() -> bool:
-        return len(norms) > STAGNATION_PRODUCTS and norms[-1] > 0.5 * norms[-1 - STAGNATION_PRODUCTS]
+    def enough(hessenberg: FloatArray) -> bool:
+        # the residual is the part of the right-hand side along the left null vector of the Hessenberg matrix
+        k = hessenberg.shape[1]
+        along, below = float(null[:k] @ hessenberg[:k, -1]), float(hessenberg[k, -1])
+        null[k] = -along / below if below else along * math.inf
+        norms.append(norms[0] / math.sqrt(null[: k + 1] @ null[: k + 1]))
+        stagnates = k >= STAGNATION_PRODUCTS and norms[-1] > 0.5 * norms[-1 - STAGNATION_PRODUCTS]
+        return norms[-1] <= wanted or stagnates
 
-    while cycles > 0 and np.isfinite(norms[-1]) and norms[-1] > wanted:
-        first, null = norms[-1], np.ones(min(restart, right.size) + 1)
-
-        def enough(hessenberg: FloatArray, first: float = first, null: FloatArray = null) -> bool:
-            # the residual is the part of `first` along the left null vector of the Hessenberg matrix
-            k = hessenberg.shape[1]
-            along, below = float(null[:k] @ hessenberg[:k, -1]), float(hessenberg[k, -1])
-            null[k] = -along / below if below else along * math.inf
-            norms.append(first / math.sqrt(null[: k + 1] @ null[: k + 1]))
-            return norms[-1] <= wanted or stagnates()
-
-        basis, hessenberg = _arnoldi(product, residual, restart, enough)
-        if not hessenberg.size:
-            break
-        found = norms[-1] <= wanted
-        # without convergence, directions of the null space would only make the solution large
-        least = 0.0 if found else NEGLIGIBLE
-        along = first * np.eye(len(hessenberg))[0]
-        solution = solution + np.linalg.lstsq(hessenberg, along, rcond=least)[0] @ basis[: hessenberg.shape[1]]
-        cycles -= not found
-        residual = right - exact(solution)
-        norms[-1] = float(np.linalg.norm(residual))
-        if stagnates():
-            break
-    return solution, norms[-1] <= wanted, basis, hessenberg
+    basis, hessenberg = _arnoldi(product, right, most, enough)
+    if not hessenberg.size:
+        return np.zeros_like(right), False, basis, hessenberg
+    found = norms[-1] <= wanted
+    # without convergence, directions of the null space would only make the solution large
+    least, along = 0.0 if found else NEGLIGIBLE, norms[0] * np.eye(len(hessenberg))[0]
+    return np.linalg.lstsq(hessenberg, along, rcond=least)[0] @ basis[:-1], found, basis, hessenberg
 
 
-@dataclass(frozen=True)
-class Correction:
-    """Exact inverse of an operator A on the space where GMRES has been, the identity at right angles to this space.
+def build_correction(basis: FloatArray, hessenberg: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """A correction `1 + (U - Y) Y^T` of vectors; returns the rows of Y and of U - Y (k, n).
 
-    Arnoldi's method gives `A V = W H`. With H = Q R, the orthonormal columns of Y = W Q are the images of `U = V R^-1`.
-    So `1 + (U - Y) Y^T` leaves Y to Y itself. Directions near resonances of the structure, which GMRES has to find, are
-    thus found once, and not in each solve (Parks et al., Recycling Krylov Subspaces, SIAM J. Sci. Comput. 28, 2006).
-
-    images, changes (k, n): rows of Y and of U - Y.
+    Of the operator it is the exact inverse on the space where GMRES has been, and the identity at right angles to this
+    space. Arnoldi's method gives `A V = W H`, with W (k + 1, n) and H (k + 1, k). With H = Q R, the orthonormal columns
+    of Y = W Q are the images of `U = V R^-1` (Parks et al., Recycling Krylov Subspaces, SIAM J. Sci. Comput. 28, 2006).
+    None where the operator is nearly singular.
     """
-
-    images: FloatArray
-    changes: FloatArray
-
-    def apply(self, vector: FloatArray) -> FloatArray:
-        """Corrected vector (n,)."""
-        return np.asarray(vector + (self.images @ vector) @ self.changes)
-
-
-def build_correction(basis: FloatArray, hessenberg: FloatArray) -> Correction | None:
-    """Correction from W (k + 1, n) and H (k + 1, k) of Arnoldi's method; None where the operator is nearly singular."""
     left, right = np.linalg.qr(hessenberg)
     sizes = np.abs(np.diag(right))
     if not sizes.min() > NEGLIGIBLE * sizes.max():
         return None
     images = left.T @ basis
-    return Correction(images, scipy.linalg.solve_triangular(right, basis[:-1], trans="T") - images)
+    return images, scipy.linalg.solve_triangular(right, basis[:-1], trans="T") - images
 
 
 def ritz_values(

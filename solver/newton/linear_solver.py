@@ -14,11 +14,11 @@ import scipy.linalg
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.newton.krylov import Correction, Product, build_correction, ritz_values, solve_gmres
+from solver.newton.krylov import build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
 
 FORCING = 1e-3
-"""Relative residual of a Newton direction (dovetail with half and twice this value: equal to 1e-6)."""
+"""Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
 
 KEPT_PRODUCTS = 25
 """Most products of a solve with a kept factorisation, before a new one is built, which takes as long as 20 products
@@ -26,13 +26,13 @@ with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 
 
 MOST_CORRECTED = 60
 """Most directions in which a factorisation is corrected. With 0, 60, 120: 17.4, 12.0, 11.4 products of a solve and 52,
-42, 42 CPU s with 160 pairs, 13.0, 9.5, 9.1 products and 6.3, 6.0, 6.0 s with 48. With 336 pairs 44 and 38 s."""
+42, 42 CPU s with 160 pairs; 6.3, 6.0, 6.0 s with 48."""
 
 FEWEST_CORRECTED = 3
 """Fewest products of a solve that a correction is made of."""
 
 MOST_PRODUCTS = 80
-"""Most products of a GMRES cycle, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32."""
+"""Most products of a solve, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32."""
 
 SETTLED = 0.1
 """Residual over modulus of an eigenvalue below which its sign is known, and real part above which an eigenvalue is
@@ -83,7 +83,6 @@ class DenseFactor:
 
 
 Factor = DenseFactor | PeriodFactor
-"""A factorisation of a Jacobian or of a matrix near the Jacobian, with the sign of its determinant."""
 
 
 def build_dense_factor(tangent: Linearisation) -> DenseFactor:
@@ -109,90 +108,76 @@ class JacobianSolver:
     """Solver of systems with a `Linearisation` that keeps one factorisation, corrected, between its calls."""
 
     _factor: Factor | None = None
-    _corrections: tuple[Correction, ...] = ()
+    _corrections: tuple[tuple[FloatArray, FloatArray], ...] = ()
 
     def solve(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
     ) -> FloatArray:
-        """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`.
-
-        A small system is factorised once for all k right-hand sides.
-        """
+        """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
         rows, rest = tangent.active_rows, tangent.passive_rows
         steps = np.zeros((len(rights), *rights[0].shape))
-        if 0 < rows.size * steps.shape[2] <= DENSE_UNKNOWNS:
-            matrix, wanted = tangent.dense(tangent.active), np.stack([right[rows].ravel() for right in rights], axis=1)
-            try:
-                found = np.linalg.solve(matrix, wanted)
-            except np.linalg.LinAlgError:
-                found = np.linalg.lstsq(matrix, wanted)[0]
-            steps[:, rows] = found.T.reshape(len(rights), rows.size, -1)
-        elif rows.size:
-            for step, right in zip(steps, rights, strict=True):
-                step[rows] = self._solve_kept(tangent, right, rtol)[rows]
-        for step, right in zip(steps, rights, strict=True) if rest.size else ():
-            # the columns of all other unknowns are those of the identity
-            step[rest] = (right - tangent.apply_roughly(step))[rest]
+        direct = build_dense_factor(tangent) if rows.size * steps.shape[2] <= DENSE_UNKNOWNS else None
+        for step, right in zip(steps, rights, strict=True):
+            if rows.size:
+                step[rows] = (direct.solve(right) if direct else self._solve_kept(tangent, right, rtol))[rows]
+            if rest.size:
+                # the columns of all other unknowns are those of the identity
+                step[rest] = (right - tangent.apply(step, roughly=True))[rest]
         return steps
 
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
         """Solution in the rows of the active pairs, with the kept factorisation while products are few."""
-
-        def cleared(values: FloatArray) -> FloatArray:
-            # the steps of these rows do not act on the rows of the active pairs
-            values[tangent.passive_rows] = 0.0
-            return values
-
-        def iterate(factor: Factor, products: int, cycles: float) -> tuple[FloatArray, bool]:
-            # preconditioned from the right: the residual of GMRES is the true one
-            corrections = self._corrections
-
-            def solved(vector: FloatArray) -> FloatArray:
-                for correction in reversed(corrections):
-                    vector = correction.apply(vector)
-                return factor.solve(vector.reshape(right.shape))
-
-            def product(apply: Product) -> Product:
-                return lambda vector: cleared(apply(solved(vector))).ravel()
-
-            operators = product(tangent.apply_roughly), product(tangent.apply)
-            solution, found, *space = solve_gmres(*operators, cleared(right.copy()).ravel(), rtol, products, cycles)
-            self._correct(*space)
-            return solved(solution), found
-
         if self._factor is not None:
-            solution, found = iterate(self._factor, KEPT_PRODUCTS, 1)
+            solution, found = self._iterate(self._factor, tangent, right, rtol, KEPT_PRODUCTS)
             if found:
                 return solution
         self._factor, self._corrections = build_factor(tangent), ()
         # convergence is not required: Newton's method judges by the true residual
-        return iterate(self._factor, MOST_PRODUCTS, np.inf)[0]
+        return self._iterate(self._factor, tangent, right, rtol, MOST_PRODUCTS)[0]
 
-    def _correct(self, basis: FloatArray, hessenberg: FloatArray) -> None:
-        """Correct the factorisation by the space of a solve; all corrections are dropped where they become too many."""
-        known, k = sum(len(each.images) for each in self._corrections), hessenberg.shape[1]
-        if k < FEWEST_CORRECTED:
-            return
-        correction = build_correction(basis, hessenberg) if known + k <= MOST_CORRECTED else None
-        self._corrections = () if correction is None else (*self._corrections, correction)
+    def _iterate(
+        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, most: int
+    ) -> tuple[FloatArray, bool]:
+        """Solution by GMRES, and whether it has converged; corrects the factorisation by the space of the solve."""
+        corrections, passive = self._corrections, tangent.passive_rows
+
+        def solved(vector: FloatArray) -> FloatArray:
+            for images, changes in reversed(corrections):
+                vector = vector + (images @ vector) @ changes
+            return factor.solve(vector.reshape(right.shape))
+
+        def active(values: FloatArray) -> FloatArray:
+            # the steps of passive rows do not act on the rows of the active pairs
+            values[passive] = 0.0
+            return values.ravel()
+
+        def product(vector: FloatArray) -> FloatArray:
+            # preconditioned from the right: the residual of GMRES is the true one
+            return active(tangent.apply(solved(vector), roughly=True))
+
+        solution, found, basis, hessenberg = solve_gmres(product, active(right.copy()), rtol, most)
+        n_new = hessenberg.shape[1]
+        if n_new >= FEWEST_CORRECTED:
+            n_corrected = n_new + sum(len(images) for images, _ in corrections)
+            own = build_correction(basis, hessenberg) if n_corrected <= MOST_CORRECTED else None
+            # where the directions become too many all are dropped
+            self._corrections = () if own is None else (*corrections, own)
+        return solved(solution), found
 
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
         For a large joint, that of the kept factorisation P times (-1)^k, with k real negative eigenvalues of J P^-1.
-        Where these outliers do not converge, this Jacobian is factorised instead of the kept one, and then densely.
+        Where these outliers do not converge, this Jacobian is factorised instead.
         """
         if self._factor is not None and not self._factor.exact:
             sign, settled = _sign_by_eigenvalues(self._factor, tangent)
             if settled:
                 return sign
-        factor = build_factor(tangent)
-        self._factor, self._corrections = factor, ()
-        sign, settled = (factor.sign, True) if factor.exact else _sign_by_eigenvalues(factor, tangent)
-        if settled:
-            return sign
-        whole = build_dense_factor(tangent)
-        return whole.sign if whole.exact else sign
+        self._factor, self._corrections = build_factor(tangent), ()
+        if self._factor.exact:
+            return self._factor.sign
+        return _sign_by_eigenvalues(self._factor, tangent)[0]
 
 
 def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
@@ -200,7 +185,7 @@ def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float,
     shape = tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]
 
     def product(vector: FloatArray) -> FloatArray:
-        return tangent.apply_roughly(factor.solve(vector.reshape(shape))).ravel()
+        return tangent.apply(factor.solve(vector.reshape(shape)), roughly=True).ravel()
 
     def settled(values: ComplexArray, residuals: FloatArray) -> bool:
         doubtful = ~(values.real >= SETTLED)

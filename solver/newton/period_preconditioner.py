@@ -11,9 +11,9 @@ with the derivatives A and B of the contact law at a sample (`sampled_law`), in 
     dx(t) = B(t) dx(t - 1) + [1 + A(t) (Z / eps - 1)]^-1 A(t) [r(t) - (Z / eps - 1) B(t) dx(t - 1)]
 
 is a march with one small system at each sample, in the rows of pairs that slip or are open (A is zero where a pair
-sticks), and `dp = r - (Z / eps - 1) dx` follows in all harmonics at once. Resonances of the structure and the
-truncation of the series are left to GMRES. CPU s of a history of the dovetail with the march, and with a factorisation
-of the most important directions in its place: 48 pairs 4.8 and 10.5, 336 pairs 35 and 59.
+sticks), and `dp = r - (Z / eps - 1) dx` follows. Resonances of the structure and the truncation of the series are left
+to GMRES. CPU s of a history of the dovetail, and with a factorisation of the most important directions instead: 48
+pairs 4.8 and 10.5, 336 pairs 35 and 59.
 """
 
 from __future__ import annotations
@@ -42,16 +42,14 @@ class PeriodMatrices(NamedTuple):
     """Matrices of the march through N samples, for the n pairs that slip or are open at one of them.
 
     - own (N, n, 3, 3), carried (N, n, 2, 2): A and B.
-    - row (k,): nonzero rows of A, sample by sample, as `3 place + component` with the place among the n pairs.
-    - first (N + 1,): index in `row` of the first row of each sample.
-    - swept (2 n k,): `A (Z / eps - 1)` in these rows and the tangential columns.
-    - inverse: inverses of `1 + A (Z / eps - 1)` in these rows and columns, sample by sample.
+    - row (N, k): rows of each sample with all nonzero ones of A, as `3 place + component` of the n pairs.
+    - swept (N, k, 2n): `A (Z / eps - 1)` in these rows and the tangential columns.
+    - inverse (N, k, k): of `1 + A (Z / eps - 1)` in these rows and columns.
     """
 
     own: FloatArray
     carried: FloatArray
     row: IntArray
-    first: IntArray
     swept: SingleArray
     inverse: SingleArray
 
@@ -71,10 +69,7 @@ class PeriodFactor:
     @property
     def sign(self) -> float:
         """Sign of the determinant of the march; the truncation of the harmonics may change that of the Jacobian."""
-        n_rows = np.diff(self.matrices.first)
-        inverses = np.split(self.matrices.inverse, np.cumsum(n_rows**2)[:-1])
-        systems = (part.reshape(n, n) for part, n in zip(inverses, n_rows, strict=True) if n)
-        return float(np.prod([np.linalg.slogdet(system)[0] for system in systems]))
+        return float(np.prod(np.linalg.slogdet(self.matrices.inverse)[0]))
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Approximate solution (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
@@ -107,72 +102,55 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     ) / joint.relative_penalty - np.eye(joint.component_index.size)
     blocks = square[np.ix_(components, components)].reshape(pairs.size, 3, components.size)
     tangential = np.flatnonzero(np.arange(components.size) % 3)
-    rows, swept, inverse = [], [], []
-    for sample in own:
-        row = np.flatnonzero(sample.any(axis=2))
-        product = np.matmul(sample.reshape(-1, 1, 3)[row], blocks[row // 3])[:, 0]
-        matrix = product[:, row]
-        matrix[np.diag_indices(row.size)] += 1.0
-        # single precision suffices for a preconditioner and halves the memory read in a solve
-        try:
-            inverse.append(np.linalg.inv(matrix.astype(np.float32)).ravel())
-        except np.linalg.LinAlgError:
-            return None
-        swept.append(product[:, tangential].astype(np.float32).ravel())
-        rows.append(row)
-    first = np.cumsum([0, *(row.size for row in rows)])
+    nonzero = own.any(axis=3).reshape(n_samples, -1)
+    row = np.argsort(~nonzero, axis=1, kind="stable")[:, : nonzero.sum(axis=1).max()]
+    # single precision suffices for a preconditioner and halves the memory read in a solve
+    swept = np.empty((*row.shape, tangential.size), np.float32)
+    systems = np.empty((*row.shape, row.shape[1]), np.float32)
+    for place, (sample, rows) in enumerate(zip(own, row, strict=True)):
+        product = np.matmul(sample.reshape(-1, 1, 3)[rows], blocks[rows // 3])[:, 0]
+        swept[place], systems[place] = product[:, tangential], product[:, rows] + np.eye(rows.size)
+    try:
+        inverse = np.asarray(np.linalg.inv(systems), np.float32)
+    except np.linalg.LinAlgError:
+        return None
     coupling = np.ascontiguousarray(square[np.ix_(joint.component_index, components)])
-    all_rows, all_swept, all_inverse = np.concatenate(rows), np.concatenate(swept), np.concatenate(inverse)
-    matrices = PeriodMatrices(own, carried, all_rows, first, all_swept, all_inverse)
+    matrices = PeriodMatrices(own, carried, row, swept, inverse)
     return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), pairs, coupling, matrices)
 
 
 @lru_cache(maxsize=KEPT_STRUCTURES)
 def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
     """Real stiffness (n_rel, n_rel), N/m: median of all harmonics, which ignores those near a resonance."""
-    moving = (structure.moving.matrix(place).real for place in range(len(structure.dynamic_response)))
-    stacked = np.stack([structure.static_stiffness, *moving])
-    return np.asarray(np.median(stacked, axis=0, overwrite_input=True))
+    every = np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real])
+    return np.asarray(np.median(every, axis=0, overwrite_input=True))
 
 
 @njit(cache=True)
 def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> FloatArray:
     """Changes of the state (N, 3n) in the last of some periods, for right-hand sides (N, 3n) at the pairs."""
-    own, carried, row, first, swept, inverse = of
-    n_samples, size = right_t.shape
-    n_pairs = size // 3
-    state_t = np.zeros((n_samples, size))
-    before = np.zeros(2 * n_pairs, inverse.dtype)
-    after = np.zeros((n_pairs, 2))
-    pushed = np.zeros(size, inverse.dtype)
+    own, carried, row, swept, inverse = of
+    (n_samples, n_rows), n_pairs = row.shape, own.shape[1]
+    state_t, after = np.zeros(right_t.shape), np.zeros((n_pairs, 2))
+    before, pushed = np.zeros(2 * n_pairs, inverse.dtype), np.zeros(n_rows, inverse.dtype)
     for _ in range(periods):
-        system = 0
         for n in range(n_samples):
-            begin, end = first[n], first[n + 1]
-            n_rows = end - begin
             for pair in range(n_pairs):
+                state_t[n, 3 * pair] = 0.0
                 for i in range(2):
                     left = carried[n, pair, i, 0] * after[pair, 0] + carried[n, pair, i, 1] * after[pair, 1]
                     before[2 * pair + i] = left
                     state_t[n, 3 * pair + 1 + i] = left
-            if n_rows > 0:
-                matrix = swept[2 * n_pairs * begin : 2 * n_pairs * end].reshape(n_rows, 2 * n_pairs)
-                by_history = np.dot(matrix, before)
-                for place in range(n_rows):
-                    pair, i = row[begin + place] // 3, row[begin + place] % 3
-                    total = 0.0
-                    for k in range(3):
-                        total += own[n, pair, i, k] * right_t[n, 3 * pair + k]
-                    pushed[place] = total - by_history[place]
-                small = inverse[system : system + n_rows**2].reshape(n_rows, n_rows)
-                system += n_rows**2
-                change = np.dot(small, pushed[:n_rows])
-                for place in range(n_rows):
-                    where = row[begin + place]
-                    if where % 3 == 0:
-                        state_t[n, where] = change[place]
-                    else:
-                        state_t[n, where] += change[place]
+            by_history = np.dot(swept[n], before)
+            for place in range(n_rows):
+                pair, i = row[n, place] // 3, row[n, place] % 3
+                total = 0.0
+                for k in range(3):
+                    total += own[n, pair, i, k] * right_t[n, 3 * pair + k]
+                pushed[place] = total - by_history[place]
+            change = np.dot(inverse[n], pushed)
+            for place in range(n_rows):
+                state_t[n, row[n, place]] += change[place]
             for pair in range(n_pairs):
                 for i in range(2):
                     after[pair, i] = state_t[n, 3 * pair + 1 + i]

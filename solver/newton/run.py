@@ -14,36 +14,57 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
-from solver.harmonic_balance.state import State, final_history, transfer
+from solver.harmonic_balance.state import Failure, State, final_history, transfer
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING, JacobianSolver
+from solver.outcome import Outcome, describe_error
 from solver.structure.joint import Case, Joint
 
 MOST_ITERATIONS = 30
-"""Most iterations of one solve. Prototypes took 2 to 5 from a warm start, up to 40 from a cold one near a resonance."""
+"""Most iterations of one solve: 2 to 5 are needed from a near state."""
 
 FULL_STEPS = 6
 """Full steps in a row without a new lowest residual before steps are halved. Half and twice as many: equal states."""
 
 SHORTEST_STEP = 1.0 / 128.0
 """Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate
-state. Also the shortest natural step over the range to the target (where a shorter one is needed, the branch is assumed
-to fold), the shortest Euler step on the slow time over the wanted one, and the shortest relaxation step in periods."""
+state. Also the shortest natural step over the range to the target, the shortest Euler step on the slow time over the
+wanted one, and the shortest relaxation step in periods."""
 
 
-class _HasResidual(Protocol):
+@dataclass(frozen=True)
+class Bordered:
+    """Evaluation of a balance with further equations.
+
+    balance, at: at the values of the further unknowns (k,). errors (k,): of the further equations, dimensionless.
+    reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
+    extra: what the problem needs again for its derivatives.
+    """
+
+    balance: Balance
+    at: Evaluation
+    values: FloatArray
+    errors: FloatArray
+    reduced: FloatArray | None = None
+    extra: Any = field(default=None, repr=False)
+
     @property
-    def scale(self) -> tuple[float, float]: ...
+    def scale(self) -> tuple[float, float]:
+        """As in Evaluation."""
+        return self.at.scale
 
-    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float: ...
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
+        """Norm of all residuals, dimensionless."""
+        return float(np.hypot(self.at.scaled_residual(scale), np.linalg.norm(self.errors)))
 
 
-EvaluationT = TypeVar("EvaluationT", bound=_HasResidual)
+EvaluationT = TypeVar("EvaluationT", Evaluation, Bordered)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class NewtonResult(Generic[EvaluationT]):
-    """End of an iteration: its last unknown and evaluation, or those of the lowest norm where it has not converged."""
+    """End of an iteration: its last point, or that of the lowest norm where it has not converged."""
 
     converged: bool
     unknown: FloatArray
@@ -60,9 +81,9 @@ def solve_newton(
 ) -> NewtonResult[EvaluationT]:
     """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
 
-    The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution, while a line
-    search takes very short steps at every kink. So full steps come first, as long as the lowest norm is improved once
-    in `FULL_STEPS` iterations. Then the iteration returns to the best point and halves its steps until the norm falls.
+    The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution. So full
+    steps come first, as long as the lowest norm is improved once in `FULL_STEPS` iterations. Then the iteration returns
+    to the best point and halves its steps until the norm falls.
     """
     unknown, current = start, evaluate(start)
     best, best_norm, since_best = (unknown, current), np.inf, 0
@@ -93,33 +114,6 @@ def solve_newton(
     return NewtonResult(False, *best, most)
 
 
-@dataclass(frozen=True)
-class Bordered:
-    """Evaluation of a balance with further equations.
-
-    balance, at: at the values of the further unknowns.
-    values, errors (k,): further unknowns, and residuals of the further equations, dimensionless.
-    reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
-    extra: what the problem needs again for its derivatives.
-    """
-
-    balance: Balance
-    at: Evaluation
-    values: FloatArray
-    errors: FloatArray
-    reduced: FloatArray | None = None
-    extra: Any = field(default=None, repr=False)
-
-    @property
-    def scale(self) -> tuple[float, float]:
-        """As in Evaluation."""
-        return self.at.scale
-
-    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
-        """Norm of all residuals, dimensionless."""
-        return float(np.hypot(self.at.scaled_residual(scale), np.linalg.norm(self.errors)))
-
-
 class BorderedProblem(Protocol):
     """A balance with further unknowns and equations."""
 
@@ -141,8 +135,7 @@ def bordered_step(
 ) -> tuple[FloatArray, FloatArray]:
     """Newton step of all unknowns (n_rel m + k,), and the derivative `reduced` (k, k) as in `Bordered`.
 
-    With the Jacobian J = dR/dp, the steps a and B of p for the residual and for each of the further unknowns, J a = -R
-    and J B = -dR/dq, leave k equations for the change of q (Govaerts, Numerical Methods for Bifurcations of Dynamical
+    With the Jacobian J = dR/dp, J a = -R and J B = -dR/dq (Govaerts, Numerical Methods for Bifurcations of Dynamical
     Equilibria, 2000, section 3.6):
 
         (de/dq + de/dp B) dq = -e - de/dp a,      dp = a + B dq.
@@ -167,7 +160,7 @@ def bordered_step(
 
 
 class OutOfTimeError(Exception):
-    """A computation has used up its CPU time; the caller turns this error into an outcome."""
+    """A computation has used up its CPU time."""
 
 
 @dataclass
@@ -189,18 +182,12 @@ class Budget:
         """Whether the limit is passed and no new step may begin."""
         return self.iterations > self.limit
 
-    def check_time(self) -> None:
-        """Raise OutOfTimeError after the deadline."""
-        if self.deadline < np.inf and computing_time() > self.deadline:
-            raise OutOfTimeError
-
 
 @dataclass
 class Run:
     """Solves of one computation, one after the other. Each raises OutOfTimeError after the deadline of the budget.
 
-    tolerance: of the scaled residual. budget: shared by all parts of the computation.
-    solver: keeps a factorisation from solve to solve, which saves time and changes the last bits only.
+    tolerance: of the scaled residual. budget: shared by all parts of the computation. solver: keeps a factorisation.
     """
 
     tolerance: float
@@ -222,7 +209,7 @@ class Run:
         """
 
         def direction(at: Evaluation, rtol: float) -> FloatArray:
-            return self.step(balance, at, -at.residual, rtol)
+            return np.asarray(self.solver.solve(balance.linearise(at), [-at.residual], rtol)[0])
 
         return self._iterate(balance.evaluate, direction, start, most)
 
@@ -260,7 +247,8 @@ class Run:
         """`solve_newton` within the budget; direction: of an evaluation, and the relative residual of its solve."""
 
         def within_time(at: EvaluationT) -> FloatArray:
-            self.budget.check_time()
+            if self.budget.deadline < np.inf and computing_time() > self.budget.deadline:
+                raise OutOfTimeError
             # no more accurate than the tolerance needs
             return direction(at, max(FORCING, 0.1 * self.tolerance / max(at.scaled_residual(), self.tolerance)))
 
@@ -289,3 +277,16 @@ class Run:
         """The state of a case with the harmonics and samples of another joint; None where it is not found."""
         balance, start = transfer(old, joint, state.evaluation)
         return self.fresh().state(balance, start, state.parameter)
+
+
+def guarded(compute: Callable[[], T]) -> T | Failure:
+    """Result of a computation, or its error as a failure."""
+    try:
+        return compute()
+    except np.linalg.LinAlgError:
+        return Failure(Outcome.SINGULAR)
+    except OutOfTimeError:
+        return Failure(Outcome.TIME_LIMIT)
+    except Exception as error:
+        # an error spoils one point only: the study goes on
+        return Failure(Outcome.EXCEPTION, describe_error(error))

@@ -1,7 +1,8 @@
-"""Reported values of a converged state: pressures, slip, responses, loops, certificate."""
+"""What is reported of a converged state: pressures, slip, responses, loops, certificate; or its whole motion."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,10 @@ from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, largest_responses
-from solver.model import FloatArray
+from solver.model import ComplexArray, FloatArray, IntArray
 from solver.results.history import PeriodicState
 from solver.structure.condensation import relative_indices, whole_motion
-from solver.structure.fourier import synthesis, to_complex
+from solver.structure.fourier import derivative, from_complex, synthesis, to_complex
 from solver.structure.joint import Joint
 
 LOOP_PHASES = 128
@@ -103,11 +104,6 @@ def largest_distance(state_t: FloatArray) -> FloatArray:
     return largest
 
 
-def loop_phases() -> FloatArray:
-    """Phases (LOOP_PHASES,), rad, from 0 without 2 pi."""
-    return 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES
-
-
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
     """Relative displacement, m, and contact force, N, of chosen pairs of a state, both (n_pairs, LOOP_PHASES, 3).
 
@@ -116,23 +112,96 @@ def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) 
     second tangent; closing and compression are positive. Along a direction that a pair does not have both are 0, but
     for a constant normal load.
     """
+    if not pairs:
+        return np.zeros((0, LOOP_PHASES, 3)), np.zeros((0, LOOP_PHASES, 3))
     chosen, n_samples, orders = list(pairs), joint.basis.n_samples, joint.basis.orders
-    motion_h = evaluation.displacement_h[chosen]
-    displacement = motion_h @ synthesis(orders, loop_phases())
-    ends = motion_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * (np.arange(n_samples) - 0.5) / n_samples)
-    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, chosen, ends), 0.5)
+    motion_h, phases = evaluation.displacement_h[chosen], np.arange(LOOP_PHASES) / LOOP_PHASES
+    # half a step before the samples
+    ends = (np.arange(n_samples) - 0.5) / n_samples
+
+    def at_phases(values_t: FloatArray, at: FloatArray) -> FloatArray:
+        rows = [np.interp(phases, at, row, period=1.0) for row in values_t.reshape(-1, n_samples)]
+        return np.array(rows).reshape(*values_t.shape[:-1], LOOP_PHASES)
+
+    displacement = motion_h @ synthesis(orders, 2.0 * np.pi * phases)
+    series = motion_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * ends)
+    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, chosen, series), ends)
     displacement *= (joint.contact.dofs[chosen] >= 0)[:, :, None]
-    force = at_phases(evaluation.force_t[chosen], 0.0)
+    force = at_phases(evaluation.force_t[chosen], np.arange(n_samples) / n_samples)
     return displacement.transpose(0, 2, 1), force.transpose(0, 2, 1)
 
 
-def at_phases(values_t: FloatArray, lead: float) -> FloatArray:
-    """Values (..., LOOP_PHASES) at the phases of a loop, by linear interpolation of periodic samples (..., N).
+@dataclass(frozen=True)
+class PeriodicMotion:
+    """A periodic motion of a joint: Fourier coefficients, complex, and signals at N times of a period.
 
-    lead: 0 where the first sample is at phase 0, 0.5 where the first sample is half a step before.
+    Harmonic k is Re(value exp(i k omega t)); the first coefficient is the mean, which is real.
+
+    - frequency, excitation_amplitude: Hz, N.
+    - orders (H+1,): harmonics, 0 first.
+    - displacement (n, H+1): all displacements of the model, m.
+    - response (n_response, H+1): reported responses, m.
+    - relative_displacement (n_contact, 3, H+1): of the pairs, m: closing, first and second tangent.
+    - contact_force (n_contact, 3, H+1): N, compression positive.
+    - time (N,): s, from 0 on: the samples at which the contact law is applied.
+    - displacement_t, velocity_t (n, N), response_t (n_response, N): m and m/s, sums of the Fourier series.
+    - contact_force_t (n_contact, 3, N): N, by the contact law; means over a time step for masses on rigid ground.
+    - status_t (n_contact, N): 0 open, 1 sticking, 2 slipping.
+    - residual: scaled residual of the balance, dimensionless: above the tolerance the motion is no solution.
     """
-    # positions of the phases in whole numbers: a phase of a sample gives this sample to the last bit
-    n_samples = values_t.shape[-1]
-    whole, rest = np.divmod(2 * n_samples * np.arange(LOOP_PHASES) + round(2 * lead) * LOOP_PHASES, 2 * LOOP_PHASES)
-    before, after = values_t[..., whole % n_samples], values_t[..., (whole + 1) % n_samples]
-    return np.asarray(before + rest / (2 * LOOP_PHASES) * (after - before))
+
+    frequency: float
+    excitation_amplitude: float
+    orders: IntArray
+    displacement: ComplexArray
+    response: ComplexArray
+    relative_displacement: ComplexArray
+    contact_force: ComplexArray
+    time: FloatArray
+    displacement_t: FloatArray
+    velocity_t: FloatArray
+    response_t: FloatArray
+    contact_force_t: FloatArray
+    status_t: IntArray
+    residual: float
+
+
+def periodic_motion(joint: Joint, at: Evaluation) -> PeriodicMotion:
+    """The motion of a state. A joint's displacements behind its pairs follow from the condensation of each harmonic."""
+    basis = joint.basis
+    moved = joint.to_relative(at.displacement_h)
+    displacement_h = _all_displacements(joint, moved)
+    response_h = joint.structure.response_h(moved)
+    rates = joint.omega * np.array(basis.orders, np.float64)
+    return PeriodicMotion(
+        frequency=joint.omega / (2.0 * np.pi),
+        excitation_amplitude=joint.excitation_amplitude,
+        orders=np.array((0, *basis.orders), np.int64),
+        displacement=_coefficients(displacement_h),
+        response=_coefficients(response_h),
+        relative_displacement=_coefficients(joint.to_pairs(moved)),
+        contact_force=_coefficients(at.force_h),
+        time=np.asarray(joint.law.sample_step * np.arange(basis.n_samples)),
+        displacement_t=displacement_h @ basis.synthesis,
+        velocity_t=derivative(displacement_h, rates) @ basis.synthesis,
+        response_t=response_h @ basis.synthesis,
+        contact_force_t=at.force_t.copy(),
+        status_t=at.status_t.copy(),
+        residual=at.scaled_residual(),
+    )
+
+
+def _coefficients(values_h: FloatArray) -> ComplexArray:
+    return np.concatenate([values_h[..., :1].astype(np.complex128), to_complex(values_h)], axis=-1)
+
+
+def _all_displacements(joint: Joint, moved: FloatArray) -> FloatArray:
+    """Displacements (n, 2H+1), m, of the whole model from the relative displacements (n_rel, 2H+1), m."""
+    relative, _ = relative_indices(joint.contact)
+    found = []
+    for order, amplitude in zip((0, *joint.basis.orders), _coefficients(moved).T, strict=True):
+        linear = joint.model.harmonic_structure(order)
+        none = np.zeros(len(linear.mass), np.complex128)
+        load = {0: linear.load_static + none, 1: joint.excitation_amplitude * linear.load_harmonic}.get(order, none)
+        found.append(whole_motion(linear, 1j * order * joint.omega, relative, load, amplitude))
+    return from_complex(np.real(found[0]), np.array(found[1:]).reshape(-1, len(found[0])).T)

@@ -1,14 +1,12 @@
 """How a small disturbance of a periodic state grows: exponents of the linear structure, Hill's equation, monodromy.
 
-The monodromy integrates a disturbance (dy, dlambda) of the displacements y, m, and of the contact force, N, over one
-period. It obeys
+The monodromy integrates a disturbance (dy, dlambda) of displacements and contact force over one period,
 
     M dy'' + C dy' + K dy + dlambda = 0,                                                                     (1)
 
-and at each sample the derivative of the contact law with the statuses of the periodic state (`contact.sampled_law`).
-The scheme is BDF2: the contact holds displacements suddenly, which needs damping at high rates. In a period of N
-samples it damps a vibration at r times the frequency of the state by the fraction `(2 pi r)^4 / (4 N^3)`. Pairs that
-stick or are open during the whole period need no law.
+with the derivative of the contact law at each sample (`contact.sampled_law`), by BDF2: the contact holds displacements
+suddenly, which needs damping at high rates. In N samples it damps a vibration at r times the frequency of the state by
+the fraction `(2 pi r)^4 / (4 N^3)`. Pairs that stick or are open during the whole period need no law.
 """
 
 from __future__ import annotations
@@ -31,7 +29,7 @@ from solver.structure.joint import Joint
 _SAMPLES_AT_ONCE = 64  # of the contact law: bounds the memory of large joints
 
 HILL_SAMPLES = 4096
-"""Samples of the contact law for Hill's equation: impacts change the multipliers by what lies between two samples."""
+"""Samples of the contact law for Hill's equation."""
 
 EXPENSIVE_UNKNOWNS = 1000
 """Unknowns of an expensive dense solve: above, no odd harmonics above 79, no 3 N + 2 samples to compare, and
@@ -146,15 +144,14 @@ def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:
 def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     """Floquet multipliers exp(2 pi sigma / omega) of a state of a small real joint without masses on rigid ground.
 
-    None where the eigenvalue problem is large, or the series too short to give an exponent. A disturbance
-    x(t) exp(sigma t) obeys the linearised balance of all displacements x and of the predicted forces p of the pairs,
-    with d = d/dt + sigma in place of d/dt, in harmonics an eigenvalue problem for sigma:
+    None where the eigenvalue problem is large, or the series too short. A disturbance x(t) exp(sigma t) obeys the
+    linearised balance of all displacements x and predicted forces p, with d = d/dt + sigma:
 
         M d^2 x + C d x + K x + S^T dlambda/dp p = 0,        S x = du/dp p.
 
-    Of the copies `sigma + i k omega` of an exponent, which the truncated series gives ever worse, those with the
-    smallest imaginary parts count (Moore, SIAM J. Numer. Anal. 42 (2005) 2553). The 196 states of the vibro-impact
-    curve, CPU s and largest error of multipliers of up to 3.19: 2.5 and 0.02, by time integration 11.7 and 0.56.
+    Of the copies `sigma + i k omega` of an exponent those with the smallest imaginary parts count (Moore, SIAM J.
+    Numer. Anal. 42 (2005) 2553). Largest error of the multipliers of the vibro-impact curve, up to 3.19, and CPU s:
+    0.02 and 2.5, by time integration 0.56 and 11.7.
     """
     linear, m, n_rel = joint.model.linear[0], len(joint.basis.synthesis), joint.component_index.size
     n = len(linear.mass)

@@ -1,16 +1,14 @@
 """Stability of a periodic state: the sign of Hill's determinant, and the Floquet multipliers.
 
-A small disturbance p' of a state with amplitudes that vary slowly as exp(sigma t) obeys Hill's equation
+A small disturbance p' of a state that varies as exp(sigma t) obeys Hill's equation
 
     [Z_r(i n w + sigma) du/dp + dlambda/dp] p' = 0.
 
 Its determinant is that of the Jacobian, Eq. (16), at sigma = 0, and positive for sigma towards infinity. So a negative
-determinant of the Jacobian means an odd number of real, positive growth rates: multipliers on the real axis beyond +1,
-as between two folds of a branch. The sign is tested at each state of a branch (`Run.is_stable`).
+determinant of the Jacobian means an odd number of real multipliers beyond +1, as between two folds of a branch. The
+sign is tested at each state of a branch (`Run.is_stable`).
 
-Disturbances with a multiplier outside the unit circle grow: beyond +1 to another state, beyond -1 with twice the
-period, a complex pair with a second frequency (Neimark-Sacker bifurcation). The multipliers of reported states come
-from the first method that serves:
+The multipliers of reported states come from the first method that serves:
 
 1. the exponents of the linear structure, where no pair slips, opens or closes;
 2. the exponents of Hill's equation, for a small joint that opens and closes;
@@ -45,32 +43,30 @@ from solver.stability.disturbances import (
 from solver.structure.joint import Case, Joint
 
 SMALL_SAMPLES = 512
-"""Samples of the law in a period, for joints of which all multipliers are computed: 72 scenes with one pair lie on the
-right side of 1, most within 0.01. A quarter for larger joints: within 0.003 with 48 pairs."""
+"""Samples of the law in a period of a small joint: 72 scenes with one pair lie on the right side of 1, most within
+0.01. A quarter for larger joints: within 0.003 with 48 pairs."""
 
 SAMPLES_A_VIBRATION = 40
 """Samples in a period of the fastest growing vibration of the structure alone, which BDF2 damps by 0.6 %."""
 
 OPENING_HARMONICS = 19
-"""Smallest number of harmonics for a small joint that opens and closes: with fewer the impacts are too soft (9
-harmonics: multiplier 0.95 in place of 2.8)."""
+"""Fewest harmonics for a small joint that opens and closes: with 9 the multiplier is 0.95 in place of 2.8."""
 
 OTHER_BRANCH = 0.05
 """Relative difference of the vibration above which two states belong to different branches. At a wall more than 9
-harmonics change means and first harmonics by up to 3 %; a corner at which a branch folds back a little is no jump."""
+harmonics change means and first harmonics by up to 3 %."""
 
 MOST_ROWS = 600
 """Largest number of displacements of switching pairs: 200 such pairs take 0.4 GB and 10 s."""
 
 SMALLEST_GROWTH = 1e-3
-"""Growth in a period, beyond 1, that counts, and residual below which a multiplier has converged. Pairs that stick have
-multipliers of 1. The largest multiplier of 48 pairs converges in 20 products."""
+"""Growth in a period, beyond 1, that counts, and residual below which a multiplier has converged."""
 
 _EPS = float(np.finfo(np.float64).eps)
 
 Stability = Literal["stable", "fold", "period doubling", "Neimark-Sacker", "unknown"]
-"""Stable, or the kind of disturbance that grows: one that keeps its sign ("fold", as between two folds), one that
-changes sign in each period, or one with a second frequency."""
+"""Stable, or the disturbance that grows: one that keeps its sign ("fold", as between two folds), one that changes sign
+in each period, or one with a second frequency."""
 
 
 @dataclass(frozen=True)
@@ -83,18 +79,13 @@ class Multipliers:
     values: ComplexArray
     error: float
 
-    @property
-    def grow(self) -> bool:
-        """Whether the largest multiplier lies outside the unit circle by more than its error."""
-        return bool(self.values.size) and bool(abs(self.values[0]) - 1.0 > max(self.error, SMALLEST_GROWTH))
-
     def stability(self, odd: bool) -> Stability:
-        """Kind of stability. odd: whether Hill's determinant shows an odd number of real multipliers beyond +1."""
+        """Kind of stability; odd: whether Hill's determinant shows an odd number of real multipliers beyond +1."""
         if odd:
             return "fold"
         if not self.values.size:
             return "unknown"
-        if not self.grow:
+        if abs(self.values[0]) - 1.0 <= max(self.error, SMALLEST_GROWTH):
             return "stable"
         if self.values[0].imag != 0.0:
             return "Neimark-Sacker"
@@ -104,56 +95,48 @@ class Multipliers:
 def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: bool = True) -> Failure | None:
     """Why a state is unstable at a fixed wear depth; None where it is stable, or where stability is not known.
 
-    The outcome is PERIOD_DOUBLED where a disturbance of a switching joint changes sign in each period, else UNSTABLE.
-    every: False leaves out joints that switch, but for small ones that open and close, for states within a wear
-    history, where only impacts change the motion suddenly. Raises OutOfTimeError.
+    every: False, within a wear history, leaves out joints that switch, but for small ones that open and close.
+    Raises OutOfTimeError.
     """
     switches = bool(switching_pairs(at)[0].any())
-    if (not switches and _is_passive(joint.model.harmonic_structure(1))) or (
-        switches and not every and not _bounces(joint, at)
-    ):
+    left_out = switches and not every and not _bounces(joint, at)
+    if left_out or (not switches and _is_passive(joint.model.harmonic_structure(1))):
         return None
     found = find_multipliers(case, joint, at, run, growing_only=True)
-    if not found.grow:
+    kind = found.stability(odd=False)
+    if kind in ("stable", "unknown"):
         return None
-    largest = found.values[0]
-    doubles = switches and largest.imag == 0.0 and largest.real < 0.0
-    said = f"a small disturbance grows by the factor {abs(largest):.3g} in each period of the excitation"
+    said = f"a small disturbance grows by the factor {abs(found.values[0]):.3g} in each period of the excitation"
     if not switches:
         said = f"{said}, in the linear structure alone"
-    elif largest.imag != 0.0:
-        turn = abs(np.angle(largest)) * joint.omega / (2.0 * np.pi) ** 2
+    elif kind == "Neimark-Sacker":
+        turn = abs(np.angle(found.values[0])) * joint.omega / (2.0 * np.pi) ** 2
         said = f"{said} and brings a second frequency, {turn:.4g} Hz beside that of the excitation"
-    if _is_driven(joint):
-        said = f"{said}: look for negative damping or stiffness of the structure"
+    doubles = switches and kind == "period doubling"
     return Failure(Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE, said)
 
 
-def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing_only: bool = False) -> Multipliers:
+def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, *, growing_only: bool = False) -> Multipliers:
     """Multipliers of a state at a fixed wear depth; none where they are not known:
 
     - in a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
     - for a joint with more than `MOST_ROWS` displacements of switching pairs;
     - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
 
-    growing_only: with one number of time steps where nothing grows, and of a state with more harmonics on any branch.
-    Raises OutOfTimeError.
+    growing_only: without the error of multipliers that do not grow. Raises OutOfTimeError.
     """
     switching, stuck = switching_pairs(at)
     if not switching.any():
-        linear = joint.model.harmonic_structure(1)
-        return Multipliers(
-            _sorted(np.exp(linear_exponents(linear, _moving(joint, stuck)) * 2.0 * np.pi / joint.omega)), 0.0
-        )
+        exponents = linear_exponents(joint.model.harmonic_structure(1), _moving(joint, stuck))
+        return Multipliers(_sorted(np.exp(exponents * 2.0 * np.pi / joint.omega)), 0.0)
     travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
     bounces = _bounces(joint, at)
     if not travels and 3 * np.count_nonzero(switching) <= MOST_ROWS:
         sharp = _sharper(case, joint, at, run) if bounces else (joint, at)
-        # beside folds a solve may change the branch
-        if sharp is not None and (growing_only or _apart(sharp[1], at) <= OTHER_BRANCH):
-            if bounces and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
-                return Multipliers(_sorted(values), 0.0)
-            return _integrated(*sharp, growing_only, case.settings.rtol)
+        if sharp is not None and bounces and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
+            return Multipliers(_sorted(values), 0.0)
+        if sharp is not None:
+            return _integrated(*sharp, case.settings.rtol, growing_only)
     return Multipliers(np.empty(0, np.complex128), np.inf)
 
 
@@ -168,20 +151,19 @@ def _bounces(joint: Joint, at: Evaluation) -> bool:
 
 
 def _sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint, Evaluation] | None:
-    """The state with at least `OPENING_HARMONICS`; None where no such state is found."""
+    """The state with at least `OPENING_HARMONICS`; None where no such state is found on the same branch."""
     if case.resolution.highest >= OPENING_HARMONICS:
         return joint, at
     samples = max(case.resolution.samples, samples_for(OPENING_HARMONICS))
     sharp = case.at(Resolution(all_orders(OPENING_HARMONICS), samples))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
     moved = run.move(case, finer, State(at, at.history))
-    return None if moved is None else (finer, moved.evaluation)
-
-
-def _apart(finer: Evaluation, at: Evaluation) -> float:
-    """Relative difference of means and first harmonics of two states."""
-    one, other = (state.displacement_h[..., :3] for state in (finer, at))
-    return float(np.linalg.norm(one - other)) / max(float(np.linalg.norm(other)), 1e-300)
+    if moved is None:
+        return None
+    # beside folds a solve may change the branch: means and first harmonics
+    one, other = (state.displacement_h[..., :3] for state in (moved.evaluation, at))
+    same = np.linalg.norm(one - other) <= OTHER_BRANCH * np.linalg.norm(other)
+    return (finer, moved.evaluation) if same else None
 
 
 def _sorted(values: ComplexArray) -> ComplexArray:
@@ -192,26 +174,21 @@ def _sorted(values: ComplexArray) -> ComplexArray:
 # --- by time integration ---
 
 
-def _integrated(joint: Joint, at: Evaluation, growing_only: bool, rtol: float) -> Multipliers:
-    """Multipliers by integration in time, with samples doubled until the first one has settled, or lies on one side of
-    1 by more than its error.
-    """
+def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -> Multipliers:
+    """Multipliers by integration in time; samples are doubled until the first one is known, or its side of 1."""
     small, error = _is_small(joint, at), np.inf
-    n_samples = _samples(joint, at, small) // (1 if growing_only else 2)
-
-    def integrated() -> ComplexArray:
-        return _sorted(multipliers_of(build_monodromy(joint, joint.model.linear[0], at, n_samples), small))
-
-    values = integrated()
-    while values.size and error > rtol and n_samples < 8 * SMALL_SAMPLES:
-        largest = abs(values[0])
-        if abs(largest - 1.0) > 2.0 * error or (growing_only and largest <= 1.0 + SMALLEST_GROWTH):
+    n_samples, values = _samples(joint, at, small) // (1 if growing_only else 2), np.empty(0, np.complex128)
+    while n_samples <= 8 * SMALL_SAMPLES:
+        coarse, monodromy = values[:1], build_monodromy(joint, joint.model.linear[0], at, n_samples)
+        values = _sorted(multipliers_of(monodromy, small))
+        if not values.size:
+            return Multipliers(values, np.inf)
+        # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
+        largest = float(abs(values[0]))
+        error = abs(largest - float(abs(coarse[0]))) if coarse.size else np.inf
+        if error <= rtol or abs(largest - 1.0) > 2.0 * error or (growing_only and largest <= 1.0 + SMALLEST_GROWTH):
             break
-        coarse, n_samples = values[0], 2 * n_samples
-        values, error = integrated(), np.inf
-        if values.size:
-            # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
-            error = float(abs(abs(values[0]) - abs(coarse)) if growing_only else abs(values[0] - coarse))
+        n_samples *= 2
     return Multipliers(values, error)
 
 
@@ -252,16 +229,9 @@ def _moving(joint: Joint, fixed: BoolArray) -> BoolArray:
     return moves
 
 
-def _is_driven(joint: Joint) -> bool:
-    """Whether a motion grows while all pairs stick, or a vibration while none does: a free blade leaves its disk."""
-    linear, every = joint.model.harmonic_structure(1), np.ones(joint.contact.n_contact, bool)
-    stuck, free = (_growing(linear, _moving(joint, pairs).tobytes()) for pairs in (every, ~every))
-    return stuck.size > 0 or bool((np.abs(free.imag) > free.real).any())
-
-
 @lru_cache(maxsize=4)
 def _is_passive(linear: LinearModel) -> bool:
-    """Whether mass, damping and stiffness are all positive semidefinite: such a structure only loses energy."""
+    """Whether mass, damping and stiffness are positive semidefinite: such a structure only loses energy."""
     parts = linear.mass, linear.damping, linear.stiffness
     least = (float(np.linalg.eigvalsh(part)[0]) / max(float(np.abs(np.diag(part)).max()), 1e-300) for part in parts)
     return all(value >= -ROUND_OFF for value in least)
@@ -269,7 +239,7 @@ def _is_passive(linear: LinearModel) -> bool:
 
 @lru_cache(maxsize=4)
 def _growing(linear: LinearModel, moves: bytes) -> ComplexArray:
-    """Exponents sigma, 1/s, of the growing motions; moves: bytes of those of `linear_exponents`, for the cache."""
+    """Exponents, 1/s, of the growing motions; moves: bytes of those of `linear_exponents`."""
     if _is_passive(linear):
         return np.empty(0, complex)
     found = linear_exponents(linear, np.frombuffer(moves, bool))

@@ -19,10 +19,10 @@ from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 
 DENSE_BYTES = 2e6
-"""Bytes of the matrices of all harmonics up to which a product with each matrix is fastest (cache of the processor)."""
+"""Bytes of the matrices of all harmonics up to which a product with each matrix is fastest."""
 
-KEPT_STRUCTURES = 8
-"""Condensed structures of a case in its cache. A wear history with its errors uses six."""
+KEPT_STRUCTURES = 12
+"""Condensed structures in the cache. A wear history with its errors uses six."""
 
 
 def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
@@ -31,22 +31,15 @@ def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
     return contact.dofs.ravel()[components], components
 
 
-def _relative_first(n: int, relative: IntArray) -> IntArray:
-    """Indices (n,) of all displacements, the relative ones first, then the others, ascending."""
-    others = np.ones(n, bool)
-    others[relative] = False
-    return np.concatenate([relative, np.flatnonzero(others)])
+def _others(n: int, relative: IntArray) -> IntArray:
+    """Indices of all displacements of a structure but the relative ones, ascending."""
+    return np.setdiff1d(np.arange(n), relative)
 
 
 def _block(linear: LinearModel, rates: FloatArray, rows: IntArray, columns: IntArray) -> ComplexArray:
     """Rows and columns of `K + i r C - r^2 M`, (H, n_rows, n_columns), N/m, at the rates r (H,), rad/s."""
     at, rate = np.ix_(rows, columns), rates[:, None, None]
-    mass, damping, stiffness = linear.mass[at], linear.damping[at], linear.stiffness[at]
-    if any(np.iscomplexobj(part) for part in (stiffness, damping, mass)):
-        return cast("ComplexArray", stiffness + 1j * rate * damping - rate**2 * mass)
-    full = np.empty((rates.size, rows.size, columns.size), complex)
-    full.real, full.imag = stiffness - rate**2 * mass, rate * damping
-    return full
+    return cast("ComplexArray", linear.stiffness[at] + 1j * rate * linear.damping[at] - rate**2 * linear.mass[at])
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +48,11 @@ class CondensedStructure:
 
     The `n_rel` relative displacements u are ordered pair by pair: closing, tangent 1, tangent 2, as far as they exist.
 
-    - static_stiffness (n_rel, n_rel): static Z_r, N/m.
-    - moving: Z_r at the H harmonics above the static one.
-    - static_force (n_rel,): static F_r, N.
-    - harmonic_force (n_rel,): complex F_r of harmonic 1, N, for the actual excitation amplitude.
+    - static_stiffness (n_rel, n_rel), moving: static Z_r, N/m, and Z_r at the H harmonics above the static one.
+    - static_force, harmonic_force (n_rel,): static F_r, and complex F_r of harmonic 1, N.
     - static_response (n_response, n_rel), dynamic_response (H, n_response, n_rel): responses per relative displacement.
-    - static_offset (n_response,), harmonic_offset (n_response,) complex: responses to the loads with u = 0, m.
-    - drive (n_rel,), drive_offset: complex; `drive . u + drive_offset` is `conj(F) . x`, N m, of the harmonic load F
-      and the displacements x.
+    - static_offset, harmonic_offset (n_response,): responses to the loads with u = 0, m.
+    - drive (n_rel,), drive_offset: `drive . u + drive_offset` is `F^H x`, N m, of harmonic load and displacements x.
     """
 
     static_stiffness: FloatArray
@@ -88,14 +78,14 @@ class CondensedStructure:
             amplitudes[:, 0] = self.harmonic_force
         return from_complex(self.static_force, amplitudes)
 
-    def apply(self, displacement_h: FloatArray) -> FloatArray:
-        """`Z_r u` of Eq. (8), N, (n_rel, 2H+1) from u (n_rel, 2H+1), m."""
-        return from_complex(self.static_stiffness @ displacement_h[:, 0], self.moving.apply(displacement_h))
+    def apply(self, displacement_h: FloatArray, *, roughly: bool = False) -> FloatArray:
+        """`Z_r u` of Eq. (8), N, (n_rel, 2H+1) from u (n_rel, 2H+1), m.
 
-    def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
-        """`Z_r u` to at least three digits, for directions of Newton's method; 0.5 to 0.7 of the time of `apply`."""
-        # a joint that slides as a whole moves far: the static part in double precision
-        return from_complex(self.static_stiffness @ displacement_h[:, 0], self.moving.single.apply(displacement_h))
+        roughly: in single precision, which takes 0.5 to 0.7 of the time, but for the static part: a joint that slides
+        as a whole moves far.
+        """
+        moving = self.moving.single if roughly else self.moving
+        return from_complex(self.static_stiffness @ displacement_h[:, 0], moving.apply(displacement_h))
 
     def response_h(self, displacement_h: FloatArray) -> FloatArray:
         """Responses (n_response, 2H+1), m, from u (n_rel, 2H+1), m."""
@@ -107,17 +97,16 @@ class CondensedStructure:
 
     def input_work(self, displacement_h: FloatArray) -> float:
         """Work of the excitation over a period, N m, from u (n_rel, 2H+1), m."""
-        if not len(self.dynamic_response):
-            return 0.0
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
 
+@lru_cache(maxsize=KEPT_STRUCTURES)
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
-    """Condense the structure at the harmonics n of the frequency w.
+    """Condense the structure at a frequency, rad/s, with an excitation amplitude, N, in harmonic 1.
 
-    omega: w, rad/s. excitation_amplitude: N, in harmonic 1. orders: harmonics above the static one, ascending.
+    orders: harmonics above the static one, ascending.
     Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
     """
     relative, _ = relative_indices(model.contact)
@@ -128,7 +117,7 @@ def build_structure(
     shares = 16 * len(orders) * n_rel**2 > DENSE_BYTES and n <= 2 * n_rel
     real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
     rates, load = omega * np.array(orders, np.float64), excitation_amplitude * first.load_harmonic
-    if shares and first is still and real and not model.nodal_diameter:
+    if shares and real and not model.nodal_diameter:
         moving, force, rows, offset = _condense_shared(still, relative, rates, load)
     else:
         moving, force, rows, offset = _condense_each(model, relative, rates, orders, load)
@@ -157,20 +146,20 @@ def _static(linear: LinearModel, relative: tuple[int, ...]) -> tuple[FloatArray,
 
 
 Moving = tuple[DenseStiffness | SharedStiffness, ComplexArray, ComplexArray, ComplexArray]
-"""Z_r; F_r (n_rel,) of harmonic 1; responses and then the work `conj(F) . x` per u, (H, n_response + 1, n_rel), and
-with u = 0 in harmonic 1, (n_response + 1,)."""
+"""Z_r; F_r (n_rel,) of harmonic 1; responses and then `F^H x` per u, (H, n_response + 1, n_rel), and with u = 0 in
+harmonic 1, (n_response + 1,)."""
 
 
 def _condense_each(
     model: ReducedModel, relative: IntArray, rates: FloatArray, orders: tuple[int, ...], load: ComplexArray
 ) -> Moving:
-    """The harmonics with a matrix for each, at the rates n w (H,), rad/s. load (n,): of harmonic 1, N."""
+    """A matrix for each harmonic, at the rates n w (H,), rad/s. load (n,): of harmonic 1, N."""
     n_rel, n_rows, every = relative.size, len(model.linear[0].response) + 1, np.arange(load.size)
     stiffness, rows = (np.empty((len(orders), n, n_rel), complex) for n in (n_rel, n_rows))
     force, offset = np.zeros(n_rel, complex), np.zeros(n_rows, complex)
     structures = [model.harmonic_structure(harmonic) for harmonic in orders]
     for linear in {id(each): each for each in structures}.values():
-        # all harmonics of a structure at once: calls for each harmonic take three times as long for a slider
+        # all harmonics of a structure at once: a third of the time for a slider
         places = np.array([place for place, each in enumerate(structures) if each is linear])
         loads = np.where(np.array(orders)[places, None] == 1, load, 0.0)
         responses = np.broadcast_to(linear.response, (len(places), *linear.response.shape))
@@ -184,7 +173,7 @@ def _condense_each(
 
 def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray, load: ComplexArray) -> Moving:
     """As `_condense_each`, of a real structure, with matrices shared by all harmonics."""
-    others = _relative_first(load.size, relative)[relative.size :]
+    others = _others(load.size, relative)
     compliance = cast("ComplexArray", np.linalg.inv(_block(linear, rates, others, others)))
     rows = np.vstack([linear.response, load.conj()])
     by_pairs = rows[:, relative] - rows[:, others] @ compliance @ _block(linear, rates, others, relative)
@@ -207,12 +196,11 @@ class Condensed(NamedTuple):
 
 
 def condense(full: Matrix, relative: IntArray, load: Matrix, rows: Matrix | None = None) -> Condensed:
-    """Condensation of a stiffness `full` (n, n), N/m, a load (n,), N, and rows (k, n) on displacements (n_rel,).
+    """Condensation of a stiffness (n, n), N/m, a load (n,), N, and rows (k, n), with equal leading axes if any.
 
-    All, and the result, may have the same leading axes. Raises numpy.linalg.LinAlgError where the block of the other
-    displacements is singular.
+    Raises numpy.linalg.LinAlgError where the block of the other displacements is singular.
     """
-    others = _relative_first(full.shape[-1], relative)[relative.size :]
+    others = _others(full.shape[-1], relative)
     seen = np.zeros((*full.shape[:-2], 0, full.shape[-1])) if rows is None else rows
     to_pairs, to_others = full[..., relative, :], full[..., others, :]
     # the other displacements per u, with the sign reversed, and under the load with u = 0
@@ -235,14 +223,13 @@ def whole_motion(
 ) -> ComplexArray:
     """All displacements (n, ...), m, whose relative ones are `moved` (n_rel, ...), m, under a load (n, ...), N.
 
-    For motions and loads with exp(s t), s the `exponent`, 1/s: `i n w` in harmonic n of a periodic motion.
+    Both change with exp(s t); exponent: s, 1/s, `i n w` in harmonic n.
     Raises numpy.linalg.LinAlgError where the structure with its joint held is singular.
     """
-    every, n_rel = _relative_first(len(linear.mass), relative), relative.size
-    others, whole = every[n_rel:], np.zeros(load.shape, complex)
+    n_rel, others, whole = relative.size, _others(len(linear.mass), relative), np.zeros(load.shape, complex)
     whole[relative] = moved
     if others.size:
-        at = np.ix_(others, every)
+        at = np.ix_(others, np.concatenate([relative, others]))
         rows = linear.stiffness[at] + exponent * linear.damping[at] + exponent**2 * linear.mass[at]
         whole[others] = np.linalg.solve(rows[:, n_rel:], load[others] - rows[:, :n_rel] @ moved)
     return whole
@@ -250,11 +237,10 @@ def whole_motion(
 
 @dataclass(frozen=True)
 class FrequencySlope:
-    """Derivatives with respect to the frequency at given relative displacements u and contact forces.
+    """Derivatives by the frequency, rad/s, at given relative displacements u and contact forces.
 
-    - force (n_rel, 2H+1): of `Z_r u - F_r`, N s/rad.
-    - product: of `F^H x` in harmonic 1, N m s/rad.
-    - response (n_response,): complex, of the responses in harmonic 1, m s/rad.
+    force (n_rel, 2H+1): of `Z_r u - F_r`, N. product: of `F^H x` in harmonic 1, N m. response (n_response,): of the
+    responses in harmonic 1, m.
     """
 
     force: FloatArray

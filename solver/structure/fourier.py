@@ -30,11 +30,6 @@ class FourierBasis:
     synthesis: FloatArray
     analysis: FloatArray
 
-    @property
-    def n_harmonics(self) -> int:
-        """Number H of harmonics above the static one."""
-        return len(self.orders)
-
     @cached_property
     def step_mean(self) -> FloatArray:
         """Ratio (2H+1,) of the harmonics of means over a step around each sample to the harmonics of the samples."""

@@ -14,13 +14,9 @@ from solver.structure.fourier import to_complex
 
 @dataclass(frozen=True)
 class DenseStiffness:
-    """Z_r at H harmonics above the static one, for any structure. dense (H, n_rel, n_rel): matrices, N/m."""
+    """Z_r at H harmonics above the static one, for any structure. dense: (H, n_rel, n_rel), N/m."""
 
     dense: ComplexArray
-
-    def matrix(self, place: int) -> ComplexArray:
-        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
-        return cast("ComplexArray", self.dense[place])
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
@@ -29,7 +25,7 @@ class DenseStiffness:
 
     @cached_property
     def single(self) -> DenseStiffness:
-        """Z_r in single precision, for directions of Newton's method: a product takes the time of reading it."""
+        """Z_r in single precision."""
         return DenseStiffness(self.dense.astype(np.complex64))
 
 
@@ -37,13 +33,11 @@ class DenseStiffness:
 class SharedStiffness:
     """Real matrices K, M, C, shared by all harmonics, and the compliance behind the joint at each harmonic.
 
-    With A = K - (n w)^2 M + i n w C, `Z_r = A_rr - A_ri A_ii^-1 A_ir` (`condensation`). A product for all harmonics is
-    one real product of [K M C] with the motions times 1, -(n w)^2 and i n w, real and imaginary parts side by side. Its
-    time is the time of reading 3 n_rel^2 numbers from memory, for any H. With 336 pairs and 13 harmonics the matrices
-    of all harmonics take 211 MB, these take 24 MB. Methods as in `DenseStiffness`.
+    A product with `Z_r = A_rr - A_ri A_ii^-1 A_ir` (`condensation`) for all harmonics is one real product of [K M C]
+    with the motions times 1, -(n w)^2 and i n w. Its time is that of reading 3 n_rel^2 numbers. With 336 pairs and 13
+    harmonics the matrices of all harmonics take 211 MB, these take 24 MB. Methods as in `DenseStiffness`.
 
-    - linear, relative (n_rel,), others (n_i,): the structure, and its displacements of the pairs and all others.
-    - rates (H,): n w, rad/s.
+    - relative (n_rel,), others (n_i,): displacements of the pairs, and all others. rates (H,): n w, rad/s.
     - held_compliance (H, n_i, n_i): `A_ii^-1`, m/N; in the precision of all products.
     """
 
@@ -66,21 +60,19 @@ class SharedStiffness:
 
     @property
     def dense(self) -> ComplexArray:
-        """Computed at each call: the matrices may need as much memory as all other data."""
+        """As in `DenseStiffness`; computed at each call."""
         n_rel = self.relative.size
-        return np.array([self.matrix(place) for place in range(self.rates.size)]).reshape(-1, n_rel, n_rel)
-
-    def matrix(self, place: int) -> ComplexArray:
-        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
-        n_rel, factors = self.relative.size, self._factors[:, 0, place]
-        columns, back = (
-            sum(factor * part for factor, part in zip(factors, np.split(parts, 3, axis=1), strict=True))
-            for parts in self._parts
-        )
-        return cast("ComplexArray", columns[:n_rel] - back @ (self.held_compliance[place] @ columns[n_rel:]))
+        found = np.empty((self.rates.size, n_rel, n_rel), self.held_compliance.dtype)
+        for place, factors in enumerate(self._factors[:, 0].T):
+            columns, back = (
+                sum(factor * part for factor, part in zip(factors, np.split(parts, 3, axis=1), strict=True))
+                for parts in self._parts
+            )
+            found[place] = columns[:n_rel] - back @ (self.held_compliance[place] @ columns[n_rel:])
+        return found
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
-        """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
+        """As in `DenseStiffness`."""
         n_rel, (columns, back) = self.relative.size, self._parts
         forces = self._product(columns, to_complex(displacement_h))
         behind = np.matmul(self.held_compliance, forces[n_rel:].T[:, :, None])[:, :, 0].T
@@ -102,10 +94,7 @@ class SharedStiffness:
 def _real_parts(
     linear: LinearModel, relative: tuple[int, ...], others: tuple[int, ...], kind: str
 ) -> tuple[FloatArray, FloatArray]:
-    """Columns r (n, 3 n_rel) of K, M, C, with rows r before rows i; and their blocks ri (n_rel, 3 n_i).
-
-    They are the same at all frequencies. kind: of the numbers, "float64" or "float32".
-    """
+    """Columns r (n, 3 n_rel) of K, M, C, with rows r before rows i, and blocks ri (n_rel, 3 n_i), at any frequency."""
     three = [np.real(part) for part in (linear.stiffness, linear.mass, linear.damping)]
     columns, back = (
         np.hstack([np.asarray(part[np.ix_(rows, places)], kind) for part in three])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ from solver.contact.law import ContactLaw
 from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
-from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure, build_structure, relative_indices
+from solver.structure.condensation import CondensedStructure, build_structure, relative_indices
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.penalty import Penalty, build_penalty
@@ -19,10 +19,7 @@ from solver.structure.penalty import Penalty, build_penalty
 
 @dataclass(frozen=True)
 class Joint:
-    """All data that are constant while a periodic state is sought.
-
-    model: before condensation. omega, excitation_amplitude: rad/s, N. friction_coefficient (n_contact,).
-    """
+    """A joint at one frequency omega, rad/s, and excitation amplitude, N. friction_coefficient: (n_contact,)."""
 
     model: ReducedModel
     omega: float
@@ -77,11 +74,9 @@ class Joint:
 @packable
 @dataclass(frozen=True)
 class Hold:
-    """A soft spring on the mean position of a joint along a direction in which the joint can slide freely.
+    """A soft spring, N/m, on the mean position of a joint along a direction in which the joint can slide freely.
 
-    - direction (n_rel,): of norm 1.
-    - stiffness: N/m.
-    - position: mean position along the direction at which the spring has no force, m.
+    direction (n_rel,): of norm 1. position: along the direction, at which the spring has no force, m.
     """
 
     direction: FloatArray
@@ -95,11 +90,10 @@ class Hold:
 
 @dataclass(frozen=True)
 class Case:
-    """Data that all states of one computation share. `joint` gives the joint at a frequency and amplitude.
+    """What all states of one computation share. friction_coefficient: (n_contact,).
 
-    - friction_coefficient (n_contact,): for each pair.
-    - penalty_omega: angular frequency for which the penalty is built, rad/s.
-    - hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.
+    penalty_omega: angular frequency for which the penalty is built, rad/s.
+    hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.
     """
 
     model: ReducedModel
@@ -109,37 +103,20 @@ class Case:
     settings: SolverSettings
     resolution: Resolution
     hold: Hold | None = None
-    # a small cache: a wear history uses two structures at one frequency in turns
-    _structures: dict[tuple[float, float, tuple[int, ...]], CondensedStructure] = field(
-        default_factory=dict, repr=False, compare=False
-    )
 
     def joint(self, omega: float, excitation_amplitude: float) -> Joint:
         """Joint at the angular frequency omega (rad/s) and excitation amplitude (N).
 
         Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
         """
-        structure = self._structure(omega, excitation_amplitude)
-        basis = build_basis(self.resolution.orders, self.resolution.samples)
-        friction, penalty = self.friction_coefficient, self.penalty
-        return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, penalty)
-
-    def _structure(self, omega: float, excitation_amplitude: float) -> CondensedStructure:
-        key, cache, hold = (omega, excitation_amplitude, self.resolution.orders), self._structures, self.hold
-        if key not in cache:
-            found = build_structure(self.model, *key)
-            if hold is not None:
-                spring = hold.stiffness * np.outer(hold.direction, hold.direction)
-                force = found.static_force + hold.stiffness * hold.position * hold.direction
-                found = replace(found, static_stiffness=found.static_stiffness + spring, static_force=force)
-            while len(cache) >= KEPT_STRUCTURES:
-                del cache[next(iter(cache))]
-            cache[key] = found
-        return cache[key]
-
-    def held(self, hold: Hold | None) -> Case:
-        """The case with another hold."""
-        return replace(self, hold=hold, _structures={})
+        hold, (orders, samples) = self.hold, (self.resolution.orders, self.resolution.samples)
+        structure = build_structure(self.model, omega, excitation_amplitude, orders)
+        if hold is not None:
+            spring = hold.stiffness * np.outer(hold.direction, hold.direction)
+            force = structure.static_force + hold.stiffness * hold.position * hold.direction
+            structure = replace(structure, static_stiffness=structure.static_stiffness + spring, static_force=force)
+        friction, basis = self.friction_coefficient, build_basis(orders, samples)
+        return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, self.penalty)
 
     def at(self, resolution: Resolution) -> Case:
         """The case with another resolution, and the penalty for its harmonics."""
@@ -158,8 +135,8 @@ def build_case(
 ) -> Case:
     """Case of a scene; errors as of `friction_of_pairs`.
 
-    - omega: angular frequency for which the penalty is built, rad/s; equal for states that are compared.
-    - resolution: first harmonics and samples; by default from the settings.
+    omega: angular frequency for which the penalty is built, rad/s; equal for states that are compared.
+    resolution: by default from the settings.
     """
     chosen = resolution or first_resolution(settings)
     penalty = build_penalty(model, omega, chosen.highest)
@@ -192,8 +169,9 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
         static_force=load_factor * structure.static_force,
         static_offset=load_factor * structure.static_offset,
     )
-    basis, penalty = build_basis((), 1), joint.penalty.static()
-    return replace(joint, excitation_amplitude=0.0, structure=still, basis=basis, penalty=penalty)
+    # without velocities each pair is taken at displacement level
+    penalty = replace(joint.penalty, inertial=np.zeros_like(joint.penalty.inertial))
+    return replace(joint, excitation_amplitude=0.0, structure=still, basis=build_basis((), 1), penalty=penalty)
 
 
 def viscous_joint(joint: Joint, viscosity: float, before: FloatArray) -> Joint:

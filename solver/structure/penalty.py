@@ -1,19 +1,17 @@
 """The penalty eps of each pair, Eq. (9), and the formulation of the pair (elastic or inertial), from the scene alone.
 
-With a finite number of harmonics the error of the balance comes from the harmonics of the *predicted* force that are
-left out: `(1 - E_n / Z_n) lambda_n` with the stiffness Z_n of the structure and the penalty E_n on the displacement. So
-E_n has to be near Z_n above the highest harmonic:
+The error of a balance comes from the harmonics of the *predicted* force that are left out, `(1 - E_n / Z_n) lambda_n`
+with the stiffness Z_n of the structure and the penalty E_n. So E_n has to be near Z_n above the highest harmonic:
 
-- A pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, with
-  E_n = eps near this stiffness, Eq. (10).
-- A mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is inertial: the pair is marched with its mass
+- A pair on an elastic joint is taken at displacement level, with E_n = eps near its stiffness, Eq. (10).
+- A mass directly on a slider (`Z_n` near `-(n w)^2 m`) is inertial: the pair is marched with its mass
   (`solver.contact.sliding_masses`), with `E_n = -(n w)^2 m + i n w c`. So is a mass behind a stiff spring where the
   mass dominates in the harmonics that are left out.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -33,8 +31,8 @@ DRAG_FRACTION = 0.1
 and twice the value change the motion of slider and two masses by 1e-4."""
 
 MEAN_STIFFNESS_FRACTION = 1e-5
-"""Stiffness on the mean position of an inertial pair over the stiffness of the joint at the frequency. It is too small
-to hold a pair that slips. Half and twice the value change states by at most 3e-6."""
+"""Stiffness on the mean position of an inertial pair over the stiffness of the joint at the frequency. Half and twice
+the value change states by at most 3e-6."""
 
 
 @dataclass(frozen=True)
@@ -59,10 +57,6 @@ class Penalty:
     def stiffness(self) -> FloatArray:
         """Penalty (n_contact, 3), N/m, of the three displacements of elastic pairs."""
         return np.stack([self.normal, self.tangential, self.tangential], axis=1)
-
-    def static(self) -> Penalty:
-        """The penalty for a static state, which has no velocity: each pair is taken at displacement level."""
-        return replace(self, inertial=np.zeros_like(self.inertial))
 
     def at_rate(self, rate: float) -> FloatArray:
         """E (n_contact, 2), N/m, normal and tangential, of a motion that grows at a real rate, 1/s."""
@@ -101,10 +95,10 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
 
 
 def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
-    """Diagonal of the condensed `K + s^2 M` at each pair, normal and (larger) tangential, (n_contact, 2), N/m.
+    """Stiffness of each pair that moves alone, normal and (larger) tangential, (n_contact, 2), N/m.
 
-    The diagonal is the stiffness of a pair that moves alone. Measured on the dovetail sector at resonance: three times
-    the value takes four times the Newton iterations, half the value an equal number; all responses agree within 1 %.
+    On the dovetail at resonance three times the value takes four times the Newton iterations, half the value an equal
+    number; all responses agree within 1 %.
     """
     relative, components = relative_indices(model.contact)
     size = np.zeros((model.contact.n_contact, 2))

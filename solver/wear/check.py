@@ -1,31 +1,29 @@
 """Check of a state of a wearing joint: whether it is a result, and whether it is the last one.
 
-In a steady state every pair that slips carries no force, and the slowest pair determines how fast a history approaches
-this state. So a history to the end of wear ends where the wear rate of every pair is below a fraction of its largest
-one. A joint that slips everywhere under a load that nothing else carries has no steady state: its rate is constant.
+In a final state every pair that slips carries no force. So a history to the end of wear ends where the wear rate of
+every pair is below a fraction of its largest one. A joint that slips everywhere under a load that nothing else carries
+has no final state: its wear rate becomes constant.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from solver.accuracy.certificate import NOT_CERTIFIED, certify
-from solver.accuracy.error_estimate import UNKNOWN
+from solver.accuracy.certificate import NOT_CERTIFIED, Certificate, certify
 from solver.accuracy.harmonic_levels import lacks_even, left_out
 from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
+from solver.accuracy.resolved_state import UNKNOWN
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome, in_digits
 from solver.results.state_report import report_state
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution
 from solver.stability.floquet import find_instability
-from solver.wear.course import Course
 from solver.wear.jump import creeps, free_slide
-from solver.wear.slow_time import AS_ASKED
+from solver.wear.slow_time import AS_ASKED, Course
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
@@ -47,20 +45,21 @@ def full_check(
     setup: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
 ) -> Checked | Failure:
     """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
-    anew, certified = needs_new_choice(setup, state), partial(_certified, setup, loops, with_resonance=with_resonance)
-    checked = certified(choose_anew(setup, state) if anew else state)
-    if isinstance(checked, Failure) and not anew and state.accurate and setup.case.settings.automatic:
-        # more harmonics or samples may suffice
-        checked = certified(choose_anew(setup, state))
-    if isinstance(checked, Failure):
-        return checked
-    state, reported = checked
-    estimate, worst = state.estimate, state.worst
+    certificate = None if (anew := needs_new_choice(setup, state)) else _certificate(setup, state)
+    # more harmonics or samples may suffice
+    if anew or (certificate is None and state.accurate and setup.case.settings.automatic):
+        chosen = choose_anew(setup, state)
+        if isinstance(chosen, Failure):
+            return chosen
+        state, certificate = chosen, _certificate(setup, chosen)
+    if certificate is None:
+        return Failure(Outcome.CERTIFICATE_FAILED)
     # NaN for given harmonics and samples, where no state with others was found for a comparison
-    unknown = np.isnan(estimate.largest)
+    unknown = np.isnan(state.estimate.largest)
     if unknown or not state.accurate:
-        if not estimate.largest < worst.largest:
-            worst = UNKNOWN if unknown else estimate
+        worst = state.worst
+        if not state.estimate.largest < worst.largest:
+            worst = UNKNOWN if unknown else state.estimate
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
     case, joint = setup.case_and_joint(state)
     if state.hold is not None and creeps(joint, state.hold, state.at):
@@ -69,23 +68,16 @@ def full_check(
         if (unstable := find_instability(case, joint, state.at, setup.run, False)) is not None:
             return unstable
         state = replace(state, judged_h=state.at.predicted_h)
-    return state, reported
-
-
-def _certified(
-    setup: WearingJoint, loops: tuple[int, ...], state: WearState | Failure, *, with_resonance: bool
-) -> Checked | Failure:
-    """A state with its report, whose estimated errors come from the last choice of the harmonics."""
-    if isinstance(state, Failure):
-        return state
-    joint, estimate = setup.joint_of(state), state.estimate
-    wear_rate_error = setup.wearing.amplification(*worn_by(state.at)) * estimate.wear_rate
-    certificate = certify(joint, state.at)
-    certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
-    if not certificate.holds(setup.case.settings.tolerance):
-        return Failure(Outcome.CERTIFICATE_FAILED)
     report = report_state(joint, state.at, certificate, loops, with_resonance=with_resonance)
     return state, report | {"excitation_frequency_error": setup.frequency_error(state)}
+
+
+def _certificate(setup: WearingJoint, state: WearState) -> Certificate | None:
+    """The certificate of a state, with the errors of the last choice of its harmonics; None where it does not hold."""
+    found, estimate = certify(setup.joint_of(state), state.at), state.estimate
+    wear_rate_error = setup.wearing.amplification(*worn_by(state.at)) * estimate.wear_rate
+    found = replace(found, response_error=estimate.response, wear_rate_error=wear_rate_error)
+    return found if found.holds(setup.case.settings.tolerance) else None
 
 
 def report_only(
@@ -123,7 +115,7 @@ def needs_new_choice(setup: WearingJoint, state: WearState) -> bool:
 
 def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    refined = refine(setup.case_and_joint(state)[0], state.omega, setup.excitation_amplitude, state.point, setup.run)
+    refined = refine(*setup.case_and_joint(state), state.point, setup.run)
     resolution, point = refined.case.resolution, refined.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
     return setup.at_followed(replace(state, estimate=refined.estimate, accurate=refined.accurate))
@@ -131,7 +123,7 @@ def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:
 
 def _vibrates_otherwise(state: WearState) -> bool:
     """Whether the vibration differs from the vibration of the last stability check."""
-    if state.judged_h is None or state.judged_h.shape != state.at.predicted_h.shape:
+    if state.judged_h.shape != state.at.predicted_h.shape:
         return True
     before, now = state.judged_h[:, 1:], state.at.predicted_h[:, 1:]
     return float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
@@ -153,13 +145,11 @@ def end_of_wear(setup: WearingJoint, state: WearState, course: Course, final_sha
     largest = state.largest_rates[:-1]
     if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():
         return AS_ASKED
-    rate, n_steps = float(state.rates[-1]), len(course.ends) - 1
-    if is_steady(setup, state, course):
-        steady = f"from cycle {in_digits(state.cycle, 4)} on they wear at a steady rate of {rate:.6g} m3 a cycle"
-        return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
-    if n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
-        still = f"the joint still wears at {rate:.6g} m3 a cycle"
-        return Failure(Outcome.NO_FINAL_STATE, f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}, {still}")
+    n_steps = len(course.ends) - 1
+    if is_steady(setup, state, course) or n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
+        at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
+        said = f"{at}, the joint still wears at {float(state.rates[-1]):.6g} m3 a cycle"
+        return Failure(Outcome.NO_FINAL_STATE, said)
     return None
 
 

@@ -15,15 +15,12 @@ from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.results.history import StartState, WearHistory
+from solver.results.history import StartState, WearHistory, first_cut_off, judge, last_error
 from solver.results.state_report import LOOP_PHASES
-from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
-from solver.structure.joint import build_case
-from solver.wear.course import Course, Node
-from solver.wear.integrate import Integrations, WearRequest
-from solver.wear.slow_time import ENDS_ALL, Guide, Integrator, Solution, Solutions
-from solver.wear.step import Adaptive
+from solver.structure.joint import Case, build_case
+from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest, reference_of
+from solver.wear.slow_time import ENDS_ALL, Course, Guide, Integrator, Node, Solution, Solutions
 from solver.wear.wearing_joint import WearState
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
@@ -46,16 +43,15 @@ def integrate_together(
     keep: called from time to time with the progress. resume: such progress of some of these histories, which go on from
         there; the results are equal to the last bit, except `run_time`.
     """
-    integrations = None
+    integrator, case = Integrator(settings.time_limit, keep, resume), None
     if start.state is not None:
         case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
-        integrations = Integrations(case, start, Integrator(settings.time_limit, keep, resume))
     for each in asked:
-        if integrations is None:
+        if case is None:
             nothing = Solution(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)))
             solutions = Solutions(nothing, nothing)
         else:
-            solutions = _solve(integrations, model, each, settings.rtol)
+            solutions = _solve(integrator, case, start, each)
         history = _assembled(model, start, each, solutions)
         # the counts that were reached
         rows = np.flatnonzero(np.isfinite(history.worn_volume))
@@ -78,26 +74,25 @@ def unknown_course(model: ReducedModel, n_loops: int) -> Course:
     return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
 
 
-def _solve(integrations: Integrations, model: ReducedModel, asked: WearRequest, rtol: float) -> Solutions:
+def _solve(integrator: Integrator, case: Case, start: StartState, asked: WearRequest) -> Solutions:
     """A history and what it is compared with; without a step the errors of the start state suffice."""
 
     def is_compared(ended: Solution) -> bool:
         steps = len(ended.course.ends) > 1 or asked.follow is not None
         return ended.state is not None and steps and ended.failure.outcome not in ENDS_ALL
 
-    own = integrations.history(asked)
+    own = integrator.integrate(WearProblem(case, start, asked, stable_end=True))
     if own.state is None:
-        own = replace(own, course=unknown_course(model, len(asked.loops)))
+        own = replace(own, course=unknown_course(case.model, len(asked.loops)))
     if not is_compared(own):
         return Solutions(own, own)
     adaptive, spent = own, own.seconds
-    if not asked.adaptive:
+    if isinstance(asked.steps, Given):
         # one for all given steps to one last count; to another end no longer than needed
-        known = asked.end < math.inf and asked.until is None
-        cycles = asked.cycles if known else np.array([0.0, min(own.course.ends[-1], asked.end)])
-        never = asked.until and replace(asked.until, value=math.inf)
-        asked = replace(asked, steps=Adaptive(rtol), cycles=cycles, until=never)
-        adaptive = integrations.history(asked, spent)
+        known = not isinstance(asked.cycles, ToTheEnd) and asked.until is None
+        cycles = _counts(asked, own) if known else np.array([0.0, min(own.course.ends[-1], asked.end)])
+        asked = asked.compared(Adaptive(case.settings.rtol), cycles)
+        adaptive = integrator.integrate(WearProblem(case, start, asked, stable_end=True), spent)
         spent += adaptive.seconds
     if not is_compared(adaptive):
         return Solutions(own, adaptive)
@@ -105,7 +100,7 @@ def _solve(integrations: Integrations, model: ReducedModel, asked: WearRequest, 
     # NaN where no target was reached
     compared = np.concatenate([[0.0, adaptive.course.reached], _counts(asked, adaptive), adaptive.course.counts])
     compared = np.unique(compared[compared <= min(adaptive.course.ends[-1], asked.end)])
-    return Solutions(own, adaptive, integrations.reference(asked, guide, compared, spent))
+    return Solutions(own, adaptive, integrator.integrate(reference_of(case, start, asked, guide, compared), spent))
 
 
 def _counts(asked: WearRequest, own: Solution) -> FloatArray:
@@ -182,7 +177,7 @@ def _of_state(state: WearState, end: float) -> dict[str, Any]:
         "inaccurate_from": state.inaccurate_from,
         "inaccurate_in": "wear rate" if state.worst.wear_rate >= state.worst.response else "response",
         "inaccurate_error": state.worst.largest,
-        "held_from": math.inf if math.isnan(state.held_from) else state.held_from,
+        "held_from": state.held_from,
         # adaptive steps go beyond the last count
         "jump_cycle": state.jump_cycle if state.jump_cycle <= end else math.nan,
     }

@@ -22,7 +22,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome
-from solver.results.verdict import HELD_FORCE
+from solver.results.history import HELD_FORCE
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
@@ -38,7 +38,9 @@ def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) 
         # the last pairs that stick come loose together
         reached = _held(setup, state, worn, drifts=True) or reached
     setup.run.budget.limit = float("inf")
-    return reached if isinstance(reached, Failure) else setup.with_rates(replace(reached, cycle=cycle, previous=None))
+    if isinstance(reached, Failure):
+        return reached
+    return setup.with_rates(replace(reached, cycle=cycle, previous=None, error=0.0))
 
 
 def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
@@ -47,7 +49,7 @@ def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bo
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    joint = case.held(hold).joint(state.omega, setup.excitation_amplitude)
+    joint = replace(case, hold=hold).joint(state.omega, setup.excitation_amplitude)
 
     def balance_at(fraction: float, _: FloatArray) -> Balance:
         return Balance(joint, state.point.history, state.depth + fraction * (worn - state.depth))

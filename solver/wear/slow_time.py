@@ -1,23 +1,26 @@
-"""The integration over the slow time, of cycles or of missions, step by step; saved from time to time, and resumed."""
+"""The integration over the slow time, of cycles or of missions, step by step; saved from time to time, and resumed.
+
+A `Course` has the ends of the steps, read at any counts, and the count of a target.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, Protocol, TypeVar
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
+from typing import Any, Protocol
 
 import numpy as np
 
+from solver.accuracy.certificate import Certificate
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
-from solver.newton.run import Budget, OutOfTimeError
-from solver.outcome import Outcome, describe_error
-from solver.packing import Packed, pack, packable, unpack
-from solver.settings import Resolution
-from solver.wear.course import Course
-
-T = TypeVar("T")
+from solver.model import FloatArray, IntArray
+from solver.newton.run import Budget, guarded
+from solver.outcome import Outcome
+from solver.packing import Packed, in_rows, pack, packable, unpack
+from solver.settings import Resolution, WearTarget
 
 AS_ASKED, UNFINISHED = Failure(Outcome.CONVERGED), Failure(Outcome.NOT_COMPUTED)
 """The regular end of a history, and that of one that goes on."""
@@ -30,23 +33,202 @@ RTOL_RATIO = 2.0
 the steps of a reference solution are too long for pairs that stick again: dovetail, 16 pairs, 13 harmonics, 212.75 Hz:
 1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true."""
 
+MOST_NODES = 800
+"""Most stored steps of a history beside those with an output; half as many after those with the least progress are
+dropped. An adaptive history of 1e5 cycles has about 100 steps."""
+
+CERTIFIED = tuple(each.name for each in fields(Certificate) if each.name != "periodicity_error")
+"""Values of a certificate; within a step, the larger value of both ends holds."""
+
+BISECTIONS = 100
+"""Halvings of a range of counts: more than a number has digits."""
+
+
+@packable
+@dataclass(frozen=True)
+class Node:
+    """The end of a step.
+
+    count: of cycles or missions. depth, rate (k,): worn depths, m, and their rates, m per count, of the pairs; of
+    missions those of all blocks in one row. values: other numbers and arrays, by name. guides: of the blocks.
+    """
+
+    count: float
+    depth: FloatArray
+    rate: FloatArray
+    values: dict[str, Any]
+    guides: tuple[Any, ...] = ()
+
+
+@packable
+@dataclass(frozen=True)
+class Course:
+    """The steps of a history so far, with a dense output.
+
+    Within a step the depth is a cubic with the rates at both ends, whose slopes are at most three times the mean slope,
+    so that the depth never falls (Fritsch and Carlson 1980). All other values are linear in the worn volume.
+
+    area (n_contact,): m2. target: wear whose count is sought; None for none.
+    outputs (n_output,): ascending counts to be read, whose steps are stored; empty for counts not known beforehand.
+    nodes: first state and ends of the steps, thinned where they are many. ends (n_step + 1,): counts of all of them.
+    """
+
+    area: FloatArray
+    outputs: FloatArray = field(default_factory=lambda: np.zeros(0))
+    target: WearTarget | None = None
+    nodes: tuple[Node, ...] = ()
+    ends: tuple[float, ...] = ()
+
+    @cached_property
+    def counts(self) -> FloatArray:
+        """Counts (n_node,) of the nodes."""
+        return np.array([node.count for node in self.nodes])
+
+    @cached_property
+    def depths(self) -> FloatArray:
+        """Depths (n_node, k), m."""
+        return np.array([node.depth for node in self.nodes])
+
+    @cached_property
+    def rates(self) -> FloatArray:
+        """Wear rates (n_node, k), m per count."""
+        return np.array([node.rate for node in self.nodes])
+
+    @cached_property
+    def volumes(self) -> FloatArray:
+        """Worn volumes (n_node,), m3."""
+        return self._volumes(self.depths)
+
+    @cached_property
+    def reached(self) -> float:
+        """Count at which the target was reached, NaN until then."""
+        return math.nan if self.target is None or not self.nodes else self.reach(self.target)[0]
+
+    def after(self, node: Node) -> Course:
+        """The course with another step."""
+        longer = replace(self, nodes=(*self.nodes, node), ends=(*self.ends, node.count))
+        return longer if len(longer.nodes) <= MOST_NODES + 2 * self.outputs.size else longer._thinned()
+
+    def _thinned(self) -> Course:
+        """The course without nodes of little progress in count and volume, between which nothing is read."""
+        at, volumes = self.counts, self.volumes
+        read = np.append(self.outputs, self.reached)
+        ends = np.searchsorted(at, read[read <= at[-1]])
+        way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
+        # the first one in each of so many equal parts
+        firsts = np.unique(np.floor(0.5 * MOST_NODES * way / way[-1]), return_index=True)[1]
+        # with the last three, from which a step over missions goes on
+        places = np.unique([*range(at.size - 3, at.size), *ends, *np.maximum(ends - 1, 0), *firsts])
+        return replace(self, nodes=tuple(self.nodes[place] for place in places))
+
+    def depth_at(self, counts: FloatArray) -> FloatArray:
+        """Depths (n, k), m, at counts (n,); beyond the last step those at its end."""
+        start, end, fraction = self._steps_of(counts)
+        s, length = fraction[:, None], (self.counts[end] - self.counts[start])[:, None]
+        grown = self.depths[end] - self.depths[start]
+        first, last = (np.minimum(self.rates[place] * length, 3.0 * grown) for place in (start, end))
+        bent = (1.0 - s) ** 2 * s * first - s**2 * (1.0 - s) * last
+        return np.asarray(self.depths[start] + s**2 * (3.0 - 2.0 * s) * grown + bent)
+
+    def _steps_of(self, counts: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Nodes at start and end of the steps at counts (n,), and the fractions of the steps."""
+        counts = np.minimum(counts, self.counts[-1])
+        end = np.searchsorted(self.counts, counts, "left")
+        start = np.maximum(end - 1, 0)
+        length = self.counts[end] - self.counts[start]
+        return start, end, np.divide(counts - self.counts[start], length, out=np.ones(counts.size), where=length > 0.0)
+
+    def _volumes(self, depths: FloatArray) -> FloatArray:
+        """Worn volumes (n,), m3, of depths (n, k), m."""
+        return np.asarray(depths @ np.tile(self.area, depths.shape[1] // self.area.size))
+
+    def read(self, counts: FloatArray) -> dict[str, Any]:
+        """Values at ascending counts (n,), by name; beyond the last step NaN, whole numbers 0.
+
+        `wear_depth`, `depth_rate` (n, k): m, m per count; `wear_rate` (n,): m3 per count; and the values of the nodes.
+        """
+        (start, end, fraction), depth = self._steps_of(counts), self.depth_at(counts)
+        grown, part = self.volumes[end] - self.volumes[start], self._volumes(depth) - self.volumes[start]
+        fraction = np.divide(part, grown, out=fraction, where=grown > 0.0)
+
+        def between(each: FloatArray) -> FloatArray:
+            return np.asarray(each[start] + fraction.reshape(-1, *[1] * (each.ndim - 1)) * (each[end] - each[start]))
+
+        found = {"wear_depth": depth, "depth_rate": between(self.rates)}
+        found["wear_rate"] = self._volumes(found["depth_rate"])
+        for name in self.nodes[-1].values:
+            each = np.array([node.values[name] for node in self.nodes])
+            found[name] = each[end] if each.dtype.kind == "i" else between(each)
+            if name in CERTIFIED:
+                found[name] = np.fmax(each[start], each[end])
+        for values in found.values():
+            values[counts > self.counts[-1]] = np.nan if values.dtype.kind in "fc" else 0
+        return found
+
+    def even_counts(self, n_outputs: int) -> FloatArray:
+        """Counts (n_outputs,) to the end or the target, evenly spaced in the shares of volume and cycles together."""
+        end = self.nodes[-1].count if math.isnan(self.reached) else self.reached
+        whole = float(self._volumes(self.depth_at(np.array([end])))[0])
+        low, high, wanted = np.zeros(n_outputs), np.full(n_outputs, end), np.linspace(0.0, 2.0, n_outputs)
+        for _ in range(BISECTIONS if whole > 0.0 else 0):
+            middle = 0.5 * (low + high)
+            before = middle / end + self._volumes(self.depth_at(middle)) / whole < wanted
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        low[-1] = end
+        return low
+
+    def reach(self, target: WearTarget) -> tuple[float, float]:
+        """Count at which a target is reached, NaN if never, and its error by a resonance and its interpolation."""
+        from scipy.optimize import brentq  # where it is used: it takes a while to load
+
+        values = self._compared(target, self.counts)
+        end = int(np.argmax(values >= target.value))
+        if not values[end] >= target.value:
+            return math.nan, 0.0
+        start = max(end - 1, 0)
+        low, high = float(self.counts[start]), float(self.counts[end])
+
+        def above(fraction: float) -> float:
+            return float(self._compared(target, np.array([low + fraction * (high - low)]))[0]) - target.value
+
+        count = low if above(0.0) >= 0.0 else high
+        if above(0.0) < 0.0 < above(1.0):
+            count = low + float(brentq(above, 0.0, 1.0, xtol=1e-12)) * (high - low)
+        if target.quantity != "frequency_shift":
+            return count, 0.0
+        # linear in the worn volume, against linear in the count
+        per_shift = (high - low) / (values[end] - values[start])
+        straight = low + per_shift * (target.value - values[start])
+        error = max(self.nodes[place].values["resonance_error"] for place in (0, end))
+        return count, float(abs(count - straight) + error * per_shift)
+
+    def _compared(self, target: WearTarget, counts: FloatArray) -> FloatArray:
+        """What a target is compared with at counts (n,): wear, or the relative shift of the resonance up or down."""
+        if target.quantity == "frequency_shift":
+            return np.asarray(np.abs(self.read(counts)["resonance"] / self.nodes[0].values["resonance"] - 1.0))
+        depths = self.depth_at(counts)
+        if target.quantity == "worn_volume":
+            return self._volumes(depths)
+        return np.asarray(depths.reshape(len(depths), -1, self.area.size).sum(axis=1).max(axis=1, initial=0.0))
+
 
 class SlowProblem(Protocol):
-    """What is integrated. The next step depends on the state alone; a state is frozen and packable."""
+    """What is integrated. The next step depends on the state alone; a state is frozen and packable.
 
-    @property
-    def budget(self) -> Budget:
-        """Newton iterations so far, and the deadline."""
+    name: tells apart histories that belong together. course: before the first step. budget: Newton iterations so far,
+    and the deadline. iterations_per_save: iterations after which the progress is saved.
+    """
 
-    @property
-    def iterations_per_save(self) -> int:
-        """Newton iterations after which the progress is saved."""
+    name: str
+    course: Course
+    budget: Budget
+    iterations_per_save: int
 
     def advance(self, state: Any, course: Course, /) -> tuple[Any, Course] | Failure:
         """State and course after the next step, or the first ones where the state is None; or why the history ends."""
 
-    def saved(self, state: Any, /) -> Any:
-        """The state as it is read from a saved progress; what is kept from step to step beside the state is dropped."""
+    def fresh(self) -> None:
+        """Drop what a resumed history would not have beside its state."""
 
 
 @packable
@@ -112,12 +294,10 @@ class Integrator:
         self._time_limit, self._keep = time_limit, keep
         self._known: dict[str, Solution] = {} if resume is None else unpack(resume)
 
-    def integrate(self, name: str, problem: SlowProblem, course: Course, spent: float = 0.0) -> Solution:
-        """Integrate from the first or the saved state to the end. name: tells the histories apart.
-
-        course: before the first step. spent: CPU seconds of the time limit so far.
-        """
-        budget, state, began, known = problem.budget, None, computing_time(), self._known.get(name)
+    def integrate(self, problem: SlowProblem, spent: float = 0.0) -> Solution:
+        """Integrate from the first or the saved state to the end. spent: CPU seconds of the time limit so far."""
+        name, course, budget = problem.name, problem.course, problem.budget
+        state, began, known = None, computing_time(), self._known.get(name)
         if known is not None and known.failure != UNFINISHED:
             return known
         if known is not None:
@@ -131,22 +311,9 @@ class Integrator:
             state, course = after
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
-                state, saved_at = problem.saved(state), budget.iterations
+                problem.fresh()
+                state, saved_at = in_rows(state), budget.iterations
                 self._known[name] = Solution(state, UNFINISHED, course, saved_at, computing_time() - began)
                 if self._keep is not None:
                     # what its time limit has ended is not complete
-                    kept = {key: each for key, each in self._known.items() if each.failure.outcome not in ENDS_ALL}
-                    self._keep(pack(kept))
-
-
-def guarded(compute: Callable[[], T]) -> T | Failure:
-    """Result of a computation, or its error as a failure."""
-    try:
-        return compute()
-    except np.linalg.LinAlgError:
-        return Failure(Outcome.SINGULAR)
-    except OutOfTimeError:
-        return Failure(Outcome.TIME_LIMIT)
-    except Exception as error:
-        # an error spoils one point only: the study goes on
-        return Failure(Outcome.EXCEPTION, describe_error(error))
+                    self._keep(pack({key: s for key, s in self._known.items() if s.failure.outcome not in ENDS_ALL}))

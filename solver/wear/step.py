@@ -1,4 +1,4 @@
-"""A step on the slow time scale as one balance: explicit or implicit Euler, or BDF2; its length, and its rescues.
+"""A step on the slow time scale as one balance: explicit or implicit Euler, or BDF2; and how wear acts back.
 
 - explicit, Eqs. (20), (23): W_(n+1) = W_n + h g(W_n), a given depth;
 - implicit, Eqs. (24) to (26): W_(n+1) = W_n + h g(W_(n+1));
@@ -21,220 +21,40 @@ pairs, 212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the path divided 0.
 a straight line from the predicted force towards the extrapolated one, at each until the period repeats. The last part
 is left to the balance: with the whole line, pairs may keep the history of a path that the joint did not take (48 pairs,
 211.5 Hz: 1.667 mm3, another branch, for 2.284 mm3; 2.261 by time integration).
+
+The motion follows the depths as dp = -J^-1 Z E dW, where E puts the depths into the static normal displacements, and
+the rates follow the motion as dg = G dp. A table of factors adds its own derivative with respect to the depth.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
 
 import numpy as np
 
-from solver.contact.coulomb import STICK
+from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.law import Marched
-from solver.continuation.natural import SMOOTH_CHANGE, Lengths, take_step
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, vibration_change
-from solver.model import FloatArray
-from solver.newton.run import SHORTEST_STEP
-from solver.outcome import Outcome
-from solver.settings import ROUND_OFF, Scheme
+from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
+from solver.harmonic_balance.state import Failure
+from solver.model import BoolArray, FloatArray
+from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
+from solver.outcome import Outcome, in_digits
+from solver.settings import Scheme
 from solver.structure.joint import Joint
-from solver.wear.jump import jump
-from solver.wear.rate_slope import explicit_step_limit, too_long
 from solver.wear.wearing_joint import LastStep, WearingJoint, WearState
 
 PARTS_OF_STEP = 32
 """Parts of a step in each of which the pairs slide at their friction limit. Dovetail, 16 pairs, 212.6 Hz, 1e5 cycles:
 1.795, 1.813, 1.819, 1.819 mm3 with 1, 8, 32, 128 parts (`rtol` 2e-4: 1.823). A tenth of the time of a history."""
 
-FOLD_RESOLUTION = 0.005
-"""Shortest adaptive step, as a fraction of the cycle count."""
-
-STEP_ERROR_FRACTION = 0.25
-"""Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
-Dovetail, 16 pairs, 212.42 to 213 Hz, `rtol` 1e-2: errors of the worn volume up to 0.21 %. With 0.5 a quarter to a third
-less steps, up to 0.5 %, and 5.9 % at 212.5 Hz, where a pair that only just slips then sticks."""
-
-FIRST_STEP, FIRST_DEPTH = 0.05, 0.01
-"""Length of the first adaptive step, whose error is not known, as a fraction of the explicit step limit, and its
-largest wear, as a fraction of the largest relative motion."""
-
-SHORTEST_SLOW_STEP = 1e-4
-"""Shortest adaptive step at the start, as a fraction of the first step."""
-
-DOUBLINGS_ACROSS = 4
-"""Most doublings of the shortest step to go across corners. Dovetail, mesh 2, nodal diameter 3, 213.5 Hz: four steps
-across, by 3, 2, 2 and 4 doublings, errors 0.1 to 2.7 times the allowed ones; else `march_failed` at 846 cycles."""
+LARGEST_MOVED_LOAD = 10.0
+"""Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of the
+worn volume is a sufficient warning (27 % with 0.6)."""
 
 
-@dataclass(frozen=True)
-class Given:
-    """Euler steps of `length` cycles, which end at its multiples also after a shorter step: equal steps in `k_w h` of
-    histories that differ in k_w only. To the end of wear, each step wears about as much as the first one.
-
-    depth: in place of the length, wear of the fastest pair at the rate of the start of a step, m, Eq. (22).
-    """
-
-    length: float
-    scheme: Scheme = "implicit"
-    depth: float | None = None
-
-
-@dataclass(frozen=True)
-class Adaptive:
-    """BDF2 steps with a relative error of the worn volume near `rtol`. The last cycle count is interpolated.
-
-    first: length of the first step, cycles; 0: by the explicit step limit.
-    """
-
-    rtol: float
-    first: float = 0.0
-    scheme: ClassVar[Scheme] = "adaptive"
-
-
-Steps = Given | Adaptive
-
-
-def steps_of(scheme: str, length: float, rtol: float, largest_depth: float | None = None) -> Steps:
-    """The steps of a scheme by its name, "final" included; largest_depth: in place of the length of explicit steps."""
-    if scheme in ("adaptive", "final"):
-        return Adaptive(rtol)
-    return Given(length, "explicit", largest_depth) if scheme == "explicit" else Given(length)
-
-
-@dataclass(frozen=True)
-class Step:
-    """A step: its end, and its estimated local error as worn volume, m3."""
-
-    state: WearState
-    error: float = 0.0
-
-
-@dataclass(frozen=True)
-class WearLine:
-    """A joint along its cycles: the line of `take_step`.
-
-    end: cycle count beyond which no step goes; inf for none.
-    bounded: whether a step or a jump that moves many times the normal forces is a failure.
-    """
-
-    setup: WearingJoint
-    steps: Steps
-    end: float
-    bounded: bool = True
-
-    def begin(self, state: WearState) -> WearState:
-        """The first state with its step limit, and the length of an adaptive step; at least two lead to `end`."""
-        steps, length = self.steps, 1.0
-        if isinstance(steps, Adaptive) and steps.first > 0.0:
-            length = steps.first
-        elif state.wears:
-            state = replace(state, step_limit=explicit_step_limit(self.setup, state))
-            moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), self.setup.rate(state.at).max()
-            # the limit is no bound where almost nothing slips
-            length = min(FIRST_STEP * state.step_limit, float(FIRST_DEPTH * moved / fastest), 0.5 * self.end)
-        return replace(state, length=length, first_length=length)
-
-    def step(self, state: WearState) -> Step | Failure:
-        """One step from a state, or why there is none; the new state has the largest length of the next one."""
-        length = self._wanted(state)
-        shortest = self._shortest(state, length)
-        length = length if state.previous is None else min(length, state.length)
-        # no extra step for a remainder below the round-off of the count
-        if state.cycle + length >= self.end * (1.0 - 1e-12):
-            length = self.end - state.cycle
-        shortest = min(shortest, length)
-        taken = take_step(self, state, length, Lengths(2, shortest=shortest, rescue=shortest))
-        if isinstance(taken, Failure):
-            return taken
-        step, ahead = taken
-        failure = self._refused(state, step.state.depth, step.state.cycle - state.cycle)
-        return failure or replace(step, state=replace(step.state, length=ahead))
-
-    def _wanted(self, state: WearState) -> float:
-        """Length of the next step by the rule alone, cycles."""
-        steps = self.steps
-        if isinstance(steps, Adaptive):
-            return state.length
-        if steps.depth is not None:
-            return steps.depth / float(self.setup.rate(state.at).max())
-        if self.end == math.inf:
-            return steps.length * float(state.largest_rates[-1] / state.rates[-1])
-        left = steps.length * (math.floor(state.cycle / steps.length + ROUND_OFF) + 1.0) - state.cycle
-        return left if left < (1.0 - ROUND_OFF) * steps.length else steps.length
-
-    def _shortest(self, state: WearState, length: float) -> float:
-        """Shortest step, cycles: the accuracy to which the end of a branch is located."""
-        if isinstance(self.steps, Adaptive):
-            return max(FOLD_RESOLUTION * state.cycle, SHORTEST_SLOW_STEP * state.first_length)
-        return SHORTEST_STEP * length
-
-    def attempt(self, state: WearState, length: float) -> Step | None:
-        """As in Line."""
-        if isinstance(self.steps, Adaptive):
-            return attempt_step(self.setup, state, length, "adaptive")
-        return self._euler_step(state, length, self.steps.scheme)
-
-    def ratio(self, state: WearState, step: Step, length: float) -> float:
-        """As in Line: an Euler step counts whatever its error, the shortest adaptive step where the vibration changes
-        little: at a corner of the wear rate.
-        """
-        if not isinstance(self.steps, Adaptive):
-            return 0.0
-        before, after = (float(each.depth @ self.setup.area) for each in (state, step.state))
-        allowed = allowed_error(STEP_ERROR_FRACTION * self.steps.rtol, before, after, state.cycle, length)
-        ratio = step.error / allowed
-        return min(ratio, 1.0) if length <= self._shortest(state, length) and is_smooth(state, step) else ratio
-
-    def rescue(self, state: WearState, length: float) -> Step | Failure:
-        """As in Line. In this order: an Euler step, a longer step across corners (both adaptive only), and a jump."""
-        setup = self.setup
-        if isinstance(self.steps, Adaptive):
-            found = self._euler_step(state, length, "implicit") or self._step_across(state, length)
-            if found is not None:
-                return found
-        worn = state.depth + length * setup.rate(state.at)
-        if (failure := self._refused(state, worn, length)) is not None:
-            return failure
-        beyond = jump(setup, state, worn, state.cycle + length)
-        if isinstance(beyond, Failure):
-            return setup.lost(state, beyond)
-        beyond = setup.at_followed(beyond)
-        return beyond if isinstance(beyond, Failure) else Step(beyond)
-
-    def _euler_step(self, state: WearState, length: float, scheme: Scheme) -> Step | None:
-        """An Euler step to a stable state, or None. A followed resonance may be unstable at constant frequency."""
-        step = attempt_step(self.setup, state, length, scheme)
-        return step if step is None or self.setup.follow is not None or self.setup.is_stable(step.state) else None
-
-    def _step_across(self, state: WearState, shortest: float) -> Step | None:
-        """A step longer than the shortest one, cycles, across corners of the branch; None where it is not found.
-
-        Where the last pairs that stick come loose one by one, no step ends between the small folds, however short.
-        """
-        # a search without success leaves no trace: where a joint begins to slide, round-off decides what is found next
-        kept = self.setup.run
-        self.setup.drop_factor()
-        for doubling in range(1, DOUBLINGS_ACROSS + 1):
-            length = 2.0**doubling * shortest
-            if state.cycle + length > self.end:
-                break
-            tried = attempt_step(self.setup, state, length, "adaptive")
-            if tried is not None and is_smooth(state, tried):
-                return tried
-        self.setup.run = kept
-        return None
-
-    def _refused(self, state: WearState, wear_depth: FloatArray, length: float) -> Failure | None:
-        """Why a step or a jump to depths (n_contact,), m, after so many cycles is no result; None if it is."""
-        said = too_long(self.setup, state, wear_depth, length) if self.bounded else None
-        return None if said is None else Failure(Outcome.STEP_TOO_LONG, said)
-
-
-def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | None:
-    """A step of `length` cycles by one balance; None where its end is not found."""
+def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: Scheme) -> WearState | None:
+    """The state after a step of `length` cycles by one balance; None where it is not found."""
     depth, rate = state.depth, setup.rate(state.at)
     worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
     w, grown = 0.0, np.zeros_like(depth)
@@ -244,8 +64,7 @@ def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: S
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
     gain = setup.gain(implicit_cycles)
     balance = Balance(setup.joint_of(state), state.point.history, worn_before, gain, setup.wearing)
-    start, balance = first_guess(setup, state, balance, length)
-    end = setup.solve(balance, start, state)
+    end = setup.solve(*first_guess(setup, state, balance, length), state)
     if end is None:
         return None
     error = 0.5 * length * (setup.rate(end.at) - rate)
@@ -254,17 +73,17 @@ def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: S
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
         error = own / (own + other) * (end.depth - explicit_depth)
     last = LastStep(length, depth, state.at.predicted_h, state.omega, state.resolution)
-    end = setup.with_rates(replace(end, cycle=state.cycle + length, previous=last))
-    return Step(end, float(np.abs(error) @ setup.area))
+    volume = float(np.abs(error) @ setup.area)
+    return setup.with_rates(replace(end, cycle=state.cycle + length, previous=last, error=volume))
 
 
-def first_guess(setup: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[FloatArray, Balance]:
-    """First predicted force of a step (n_rel, 2H+1), N, and the balance with its first frequency and its history:
+def first_guess(setup: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[Balance, FloatArray]:
+    """The balance of a step with its first frequency and its history, and the first predicted force (n_rel, 2H+1), N:
     extrapolated from the last step, or those of the state where this residual is lower.
     """
     now, last = state.at.predicted_h, state.previous
     if last is None or last.resolution != state.resolution:
-        return now, balance
+        return balance, now
     further, there = length / last.length, balance
     ahead = now + further * (now - last.predicted_h)
     if setup.follow is not None:
@@ -272,8 +91,8 @@ def first_guess(setup: WearingJoint, state: WearState, balance: Balance, length:
         there = replace(balance, joint=setup.case_and_joint(state)[0].joint(omega, setup.excitation_amplitude))
     found = there.evaluate(ahead)
     if found.scaled_residual() > balance.evaluate(now).scaled_residual():
-        return now, balance
-    return ahead, replace(there, history=history_along(there.joint, state, found))
+        return balance, now
+    return replace(there, history=history_along(there.joint, state, found)), ahead
 
 
 def history_along(joint: Joint, state: WearState, ahead: Marched) -> FloatArray:
@@ -285,14 +104,92 @@ def history_along(joint: Joint, state: WearState, ahead: Marched) -> FloatArray:
     return joint.law.history_along(state.point.history, ~sticks, before.predicted_t, ahead.predicted_t, parts)
 
 
-def is_smooth(state: WearState, step: Step) -> bool:
-    """Whether the vibration changes so little over a step that the branch does not end within the step."""
-    return vibration_change(state.at, step.state.at) < SMOOTH_CHANGE
-
-
 def allowed_error(share: float, before: float, after: float, count: float, length: float) -> float:
     """Allowed error of an adaptive step, m3: a share of its wear, or of its wear at the mean rate so far if more.
 
     before, after: worn volumes, m3. count, length: cycles or missions at its start, and of the step.
     """
     return max(share * max(after - before, after * length / (count + length)), 1e-300)
+
+
+def rate_slope(setup: WearingJoint, state: WearState, pairs: BoolArray) -> FloatArray:
+    """Derivative dg/dW (n_contact, n_contact), 1 per cycle, with one column a pair; those not in `pairs` are 0."""
+    slope = np.zeros((pairs.size, pairs.size))
+    slope[:, pairs] = _rate_changes(setup, state, np.eye(pairs.size)[pairs], fixed_factors=False).T
+    return slope
+
+
+def _rate_changes(setup: WearingJoint, state: WearState, depths: FloatArray, *, fixed_factors: bool) -> FloatArray:
+    """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m, as exact as a
+    Newton direction. fixed_factors: whether the factors of a table keep their values.
+    """
+    at, joint, balance, gain = state.at, setup.joint_of(state), setup.balance_of(state), setup.gain(1.0)
+    fixed = replace(setup.wearing, depth_held=True)
+    growth = replace(balance, wear_gain=gain, wearing=fixed).linearise(at).growth_tangent
+    found = depths * (gain * (fixed if fixed_factors else setup.wearing).slopes(*worn_by(at))[2])
+    closing = np.where(joint.component_index % 3 == 0, depths[:, joint.component_index // 3], 0.0)
+    # nothing acts back on a constant normal force
+    acting = closing.any(axis=1)
+    if acting.any():
+        rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
+        rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
+        steps = setup.run.steps(balance, at, rights)
+        moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
+        found[acting] += (growth * moved).sum(axis=2)
+    return found
+
+
+def explicit_step_limit(setup: WearingJoint, state: WearState) -> float:
+    """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
+
+    A step multiplies a disturbance of W by 1 + h dg/dW: 2 over the largest positive eigenvalue of -dg/dW, by Arnoldi's
+    method. A complex one counts where its real part is larger than its imaginary part.
+    """
+    wears = setup.rate(state.at) > 0.0
+
+    def product(depths: FloatArray) -> FloatArray:
+        return np.asarray(-_rate_changes(setup, state, depths[None], fixed_factors=True)[0])
+
+    # depths of pairs whose rates follow no depth do not matter
+    start = product(np.where(wears, np.random.default_rng(0).normal(size=wears.size), 0.0))
+    if not np.isfinite(start).all() or not start.any():
+        return math.inf
+    values = ritz_values(product, start, min(SIGN_PRODUCTS, int(np.count_nonzero(wears))))[0]
+    falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
+    # a value below the round-off of the largest one is zero
+    fastest = float(falling.max(initial=0.0))
+    return 2.0 / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else math.inf
+
+
+def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, free_tangents: bool = True) -> float:
+    """Change of the mean normal forces by wear to depths (n_contact,), m, relative to these forces, both as norms.
+
+    Of the linear static structure, from the state before the step. free_tangents: whether the tangents of pairs that
+    slip are free; if not, a bound, which is cheaper.
+    """
+    pair, component = joint.component_index // 3, joint.component_index % 3
+    stuck = (before.status_t == STICK).all(axis=1)
+    opened = (before.status_t == SEPARATED).all(axis=1)
+    free = np.where(component == 0, opened[pair], ~stuck[pair])
+    normal = (component == 0) & ~free
+    preload = float(np.linalg.norm(before.force_h[pair[normal], 0, 0]))
+    stiffness = joint.structure.static_stiffness
+    force = stiffness @ np.where(normal, (wear_depth - before.wear_depth)[pair], 0.0)
+    if free_tangents and free.any():
+        # a root that is free to slide along its slot has neither stiffness nor force in this direction
+        force = force - stiffness[:, free] @ np.linalg.lstsq(stiffness[np.ix_(free, free)], force[free])[0]
+    moved = float(np.linalg.norm(force[normal]))
+    return moved / preload if preload > 0.0 else 0.0
+
+
+def too_long(setup: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> Failure | None:
+    """Why a step or a jump of some cycles to depths (n_contact,), m, is rejected, and how long it may be; else None."""
+    for free_tangents in (False, True):
+        fraction = moved_fraction(setup.joint_of(state), state.at, wear_depth, free_tangents=free_tangents)
+        if fraction <= LARGEST_MOVED_LOAD:
+            return None
+    # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
+    advised = length * LARGEST_MOVED_LOAD / 100.0 / fraction
+    on, times, most = in_digits(length, 3), in_digits(fraction, 2), in_digits(advised, 2)
+    said = f"wearing on for {on} cycles at once from cycle {in_digits(state.cycle)} on moves {times} times the normal"
+    return Failure(Outcome.STEP_TOO_LONG, f"{said} forces of the joint: at most {most} cycles at once would do")

@@ -1,4 +1,4 @@
-"""A joint that wears: its state, from which a history goes on, and what all states of a history have in common.
+"""A joint that wears: its state, from which a history goes on, and how its states are solved.
 
 A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
 amplitude (`solver.continuation.phase_lag`).
@@ -7,13 +7,13 @@ amplitude (`solver.continuation.phase_lag`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.harmonic_levels import left_out
-from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
+from solver.accuracy.resolved_state import NOTHING, Estimate
+from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
@@ -22,7 +22,8 @@ from solver.model import FloatArray
 from solver.newton.run import MOST_ITERATIONS, Run
 from solver.outcome import Outcome, in_digits
 from solver.packing import packable
-from solver.results.history import StartState
+from solver.results.history import PeriodicState, StartState
+from solver.results.state_report import evaluated
 from solver.settings import FollowedFrequency, Resolution
 from solver.structure.joint import Case, Hold, Joint
 
@@ -57,11 +58,11 @@ class WearState:
     rates, largest_rates (n_contact + 1,): wear rates of the pairs and, last, of all together, and their largest values
         so far, m3 per cycle. most_rate: if every pair slipped as far as it moves.
     step_limit: largest stable explicit step at the first state, cycles; NaN where nothing wears.
-    previous: the last step; None at the first state and after a jump.
+    previous: the last step; None at the first state and after a jump. error: local error of the last step, m3.
     length, first_length: largest length of the next step, and length of the first adaptive step, cycles.
-    judged_h (n_rel, 2H+1): predicted force at the last stability check, N; None before.
+    judged_h (n_rel, 2H+1): predicted force at the last stability check, N.
     lag, half_width: of a followed frequency: phase lag, rad, and change of the frequency over that of the lag, rad/s.
-    hold, held_from: soft hold of the mean position, and the count from which on it is held; None and NaN for none.
+    hold, held_from: soft hold of the mean position, None without, and the count from which on it acts, inf if never.
     jump_cycle: count of the first jump to another branch, NaN if none.
     inaccurate_from, worst: count from which on the errors are above rtol, inf if never; the largest ones from there on.
     """
@@ -75,17 +76,18 @@ class WearState:
     accurate: bool
     rates: FloatArray
     largest_rates: FloatArray
+    judged_h: FloatArray
     resolutions: tuple[tuple[float, Resolution], ...] = ()
     most_rate: float = 0.0
     step_limit: float = math.nan
     previous: LastStep | None = None
-    length: float = 0.0
+    error: float = 0.0
+    length: float = 1.0
     first_length: float = 0.0
-    judged_h: FloatArray | None = None
     lag: float = 0.5 * math.pi
     half_width: float = 0.0
     hold: Hold | None = None
-    held_from: float = math.nan
+    held_from: float = math.inf
     jump_cycle: float = math.nan
     inaccurate_from: float = math.inf
     worst: Estimate = NOTHING
@@ -106,50 +108,45 @@ class WearState:
         return bool(self.rates[-1] > NO_WEAR * self.most_rate)
 
 
-@dataclass
 class WearingJoint:
     """The joint of one wear history.
 
     case: model, friction and settings. start: unworn state, which exists; its load is that of the history.
     wear_coefficient: 1/Pa. law: part of the slip work that wears.
     follow: what the frequency of the excitation follows, None for the frequency of the unworn state.
-    run: counts the iterations, limits the time, and keeps a factorisation from one solve to the next.
+    area (n_contact,): m2. wearing: wearing work of the law.
+    run: counts the iterations, limits the time, and has a factorisation from one solve to the next.
     """
 
-    case: Case
-    start: StartState
-    wear_coefficient: float
-    law: WearLaw = ARCHARD
-    follow: FollowedFrequency | None = None
-    excitation_amplitude: float = field(init=False)
-    wearing: WearingWork = field(init=False)
-    run: Run = field(init=False)
-    _joint: tuple[Case, Joint] | None = field(default=None, init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        assert self.start.state is not None
-        self.excitation_amplitude = self.start.state.excitation_amplitude
-        self.wearing = wearing_work(self.law, self.case.model.contact, self.case.friction_coefficient)
-        self.run = Run(self.case.settings.tolerance)
-
-    @property
-    def area(self) -> FloatArray:
-        """Area of the pairs (n_contact,), m2."""
-        return self.case.model.contact.area
+    def __init__(
+        self,
+        case: Case,
+        start: StartState,
+        wear_coefficient: float,
+        law: WearLaw = ARCHARD,
+        follow: FollowedFrequency | None = None,
+    ) -> None:
+        assert start.state is not None
+        self.case, self.start, self.wear_coefficient, self.follow = case, start, wear_coefficient, follow
+        self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude
+        self.area = case.model.contact.area
+        self.wearing = wearing_work(law, case.model.contact, case.friction_coefficient)
+        self.run = Run(case.settings.tolerance)
+        self._last: tuple[Case, Joint] | None = None
 
     def case_and_joint(self, state: WearState) -> tuple[Case, Joint]:
         """Case and joint of a state. The last ones are stored; others drop the factorisation."""
-        last = self._joint
+        last = self._last
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
-            case = self.case if state.hold is None else self.case.held(state.hold)
+            case = replace(self.case, hold=state.hold)
             case = case.at(state.resolution)
             self.drop_factor()
         elif state.omega != last[1].omega:
             case = last[0]
         else:
             return last
-        self._joint = case, case.joint(state.omega, self.excitation_amplitude)
-        return self._joint
+        self._last = case, case.joint(state.omega, self.excitation_amplitude)
+        return self._last
 
     def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
@@ -160,7 +157,7 @@ class WearingJoint:
         return Balance(self.joint_of(state), state.at.history, state.depth)
 
     def drop_factor(self) -> None:
-        """Drop the kept factorisation, so that the next solve depends on the state alone."""
+        """Drop the factorisation, so that the next solve depends on the state alone."""
         self.run = self.run.fresh()
 
     def is_stable(self, state: WearState) -> bool:
@@ -175,14 +172,10 @@ class WearingJoint:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
         return cycles * self.wear_coefficient / self.area
 
-    def begin(self, *, of_reference: bool = False) -> WearState:
-        """The unworn state, or that of the reference sweep where there is one, evaluated and not solved again."""
-        start = self.start
-        state = start.reference if of_reference and start.reference is not None else start.state
-        assert state is not None
-        joint = self.case.at(start.resolution).joint(state.omega, self.excitation_amplitude)
-        balance = Balance(joint, state.start_history, state.wear_depth)
-        at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+    def begin(self, of: PeriodicState | None = None) -> WearState:
+        """The unworn state, or that of the reference sweep, evaluated and not solved again."""
+        start, state = self.start, of or self.unworn
+        balance, at = evaluated(self.case.at(start.resolution).joint(state.omega, self.excitation_amplitude), state)
         nothing = np.zeros(self.area.size + 1)
         begun = WearState(
             0.0,
@@ -198,6 +191,23 @@ class WearingJoint:
             judged_h=at.predicted_h,
         )
         return self.with_rates(begun)
+
+    def begin_reference(self) -> WearState:
+        """The unworn state of the reference solution.
+
+        The state of the reference sweep has another tangential history, which may decide whether a pair goes on
+        slipping while the joint wears. So the state is solved with twice the difference (dovetail, 212.5 Hz: 0.082 or
+        0.106 mm3; both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep
+        is taken.
+        """
+        fine, reference = self.unworn, self.start.reference
+        begun = self.begin(reference)
+        if reference is None:
+            return begun
+        history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
+        balance = Balance(self.joint_of(begun), history, begun.depth)
+        point = self.run.state(balance, begun.at.predicted_h, most=NEAR_ITERATIONS)
+        return begun if point is None else self.with_rates(replace(begun, point=point))
 
     def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates."""
@@ -236,23 +246,17 @@ class WearingJoint:
         if self.follow is None:
             return state
         found = self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS)
-        return found or self.lost(state, Failure(Outcome.RESONANCE_LOST))
+        return found or self.lost(state)
 
-    def lost(self, state: WearState, failure: Failure) -> Failure:
-        """The end of a history where a search beyond its last state has failed."""
-        if self.follow is None:
-            return failure
-        at = f"at cycle {in_digits(state.cycle)} and {state.omega / (2.0 * math.pi):.6g} Hz"
-        said = f"the {self.follow.of} ends {at}: no state beyond is found to go on with"
-        return Failure(Outcome.RESONANCE_LOST, said)
-
-    def out_of_range(self, state: WearState) -> Failure | None:
-        """The end of a history whose frequency leaves its range; None within."""
-        frequency, wanted = state.omega / (2.0 * math.pi), self.follow
-        if wanted is None or wanted.low <= frequency <= wanted.high:
-            return None
-        said = f"at cycle {in_digits(state.cycle)} the {wanted.of} is at {frequency:.6g} Hz"
-        return Failure(Outcome.RESONANCE_LOST, f"{said}, out of the range from {wanted.low:g} to {wanted.high:g} Hz")
+    def lost(self, state: WearState) -> Failure:
+        """The end of a history whose frequency leaves its range, or beyond whose last state none is found."""
+        wanted, frequency = self.follow, state.omega / (2.0 * math.pi)
+        assert wanted is not None
+        said = "ends: no state beyond is found to go on with"
+        if not wanted.low <= frequency <= wanted.high:
+            said = f"is out of the range from {wanted.low:g} to {wanted.high:g} Hz"
+        at = f"at cycle {in_digits(state.cycle)} and {frequency:.6g} Hz"
+        return Failure(Outcome.RESONANCE_LOST, f"{at} the {wanted.of} {said}")
 
     def frequency_error(self, state: WearState) -> float:
         """Error of a followed frequency, Hz; 0 for a given one. The phase lag is wrong by as much as the amplitude, and

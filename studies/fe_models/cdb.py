@@ -15,8 +15,7 @@ import numpy as np
 
 from studies.fe_models.deck.contents import Boundary, Deck
 from studies.fe_models.deck.model import deck_of_arrays
-from studies.fe_models.library_errors import library_errors
-from studies.fe_models.text import IntArray, Place, shown
+from studies.fe_models.text import IntArray, Place, library_errors, shown
 from studies.scene_error import SceneError
 
 # which of the nodes of an element of ANSYS are those of which kind: bricks may be collapsed to wedges or tetrahedra
@@ -34,7 +33,6 @@ _BRICK = {
 _TYPES = {45: 8, 185: 8, 95: 20, 186: 20, 92: 10, 187: 10, 285: 4}
 _WHOLE = {8: "C3D8I", 20: "C3D20R", 10: "C3D10", 4: "C3D4"}
 _PASSED_OVER = (151, 152, 153, 154, 156, 200)  # without a stiffness of their own: surface effects, and those that mesh
-_TARGETS, _CONTACTS = range(169, 171), range(171, 179)
 _HEADER = 10  # numbers of an element before its nodes
 _LETTERS = 4  # of a command; what follows is left out by some programs
 
@@ -71,6 +69,7 @@ _OPTIONS = {
     "2": ((45, 185), "elements of reduced integration (key option 2)", "use full integration, or enhanced strains"),
     "3": ((185, 186, 190), "elements of layers (key option 3)", "use homogeneous solid elements"),
 }
+_ELEMENTS = f"use solid elements: {', '.join(map(str, sorted(_TYPES)))}; delete contact elements (169 to 178: EDELE)"
 _FREE = "export without constraint equations: CEDELE,ALL and CPDELE,ALL"
 _LOADS = "delete it, and give `preload` in the study"
 _REMEDIES = {
@@ -79,10 +78,19 @@ _REMEDIES = {
     **dict.fromkeys(_short("PSTRES SSTIF INISTATE ISFILE"), "delete it, and give `rotation_speed`, or `matrices`"),
     **dict.fromkeys(_short("F SF SFE SFA BF BFE BFUNIF TUNIF ACEL CMACEL"), _LOADS),
     **dict.fromkeys(_short("N EN E EMORE"), "write nodes and elements in blocks: CDWRITE,DB,file,cdb"),
+    "EBLO": "write the elements with CDWRITE,DB,file,cdb",
     "LUMP": "delete it: the mass is consistent",
     "CYCL": "delete it, and give `n_sectors` and `axis` in the study",
     "TB": "delete it, and give `material` in the study: isotropic and elastic",
 }
+
+
+@dataclass
+class _Commands:
+    """Numbers of elements (185 of SOLID185) with their line by types, and nodes that are held by label and value."""
+
+    kinds: dict[int, tuple[int, Place]] = field(default_factory=dict)
+    held: dict[tuple[str, float], list[int]] = field(default_factory=dict)
 
 
 def read_cdb(path: Path) -> Deck:
@@ -102,21 +110,12 @@ def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
     passed: set[int] = set()
     materials: set[int] = set()
     for element in archive.elem:
-        number = int(element[1])
-        kind = commands.kinds.get(number)
-        if kind is None:
-            found = f"{path.name} has elements of the type {number}, which neither ET nor ETBLOCK gives"
-            raise SceneError("model", found, "write it again with CDWRITE,DB,file,cdb")
+        kind, place = commands.kinds.get(int(element[1]), (0, Place(path.name, 1)))
         if kind in _PASSED_OVER:
             passed.add(kind)
             continue
-        if kind in _TARGETS or kind in _CONTACTS:
-            name = f"{'TARGE' if kind in _TARGETS else 'CONTA'}{kind}"
-            remedy = "delete these elements (EDELE), and name the surfaces in `contact` of the study"
-            raise commands.places[number].wrong(f"contact elements ({name})", remedy)
         if kind not in _TYPES:
-            remedy = f"use solid elements: {', '.join(map(str, sorted(_TYPES)))}"
-            raise commands.places[number].wrong(f"elements of type {kind}", remedy)
+            raise place.wrong(f"elements of type {kind or 'unknown'}", _ELEMENTS)
         # without any midside node an element is written by its corners
         name, chosen = _sort_out(np.trim_zeros(np.asarray(element[_HEADER:], dtype=np.int64)[: _TYPES[kind]], "b"))
         if not name or chosen.min() < 1:
@@ -138,7 +137,10 @@ def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
     )
     return replace(
         deck,
-        boundaries=commands.boundaries,
+        boundaries=tuple(
+            Boundary(f"{path.name}: D", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
+            for (label, value), nodes in commands.held.items()
+        ),
         notes=tuple(f"Elements of type {kind} are passed over." for kind in sorted(passed)),
         unassembled=(several,) if len(materials) > 1 else (),
     )
@@ -153,52 +155,6 @@ def _sort_out(nodes: IntArray) -> tuple[str, IntArray]:
     return (_WHOLE.get(nodes.size, "") if np.unique(corners).size == corners.size else ""), nodes
 
 
-@dataclass
-class _Commands:
-    """Numbers of elements (185 of SOLID185) by their types, the line of each type, and nodes that are held."""
-
-    kinds: dict[int, int] = field(default_factory=dict)
-    places: dict[int, Place] = field(default_factory=dict)
-    held: dict[tuple[str, float], list[int]] = field(default_factory=dict)
-
-    @property
-    def boundaries(self) -> tuple[Boundary, ...]:
-        """Displacements that are given."""
-        return tuple(
-            Boundary(f"D,{label}", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
-            for (label, value), nodes in self.held.items()
-        )
-
-    def add_type(self, fields: list[str], place: Place) -> None:
-        """fields: number of the type, number or name of its elements, and its key options from the first on."""
-        name = re.search(r"\d+$", fields[1]) if len(fields) > 1 else None
-        if name is None or not fields[0].isdigit():
-            raise place.wrong("a type of elements that is no number", "write the file with CDWRITE,DB,file,cdb")
-        self.kinds[int(fields[0])], self.places[int(fields[0])] = int(name[0]), place
-        for option, value in enumerate(fields[2:], 1):
-            self.check_option(int(fields[0]), str(option), value, place)
-
-    def check_option(self, number: int, option: str, value: str, place: Place) -> None:
-        """Raises SceneError where a key option makes other elements of a type than those that are read."""
-        kinds, found, remedy = _OPTIONS.get(option, ((), "", ""))
-        if value == "1" and self.kinds.get(number) in kinds:
-            raise place.wrong(found, remedy)
-
-    def add_displacement(self, fields: list[str], place: Place) -> None:
-        """A command D."""
-        fields = [*fields, *[""] * 8]
-        node, label, value = fields[1:4]
-        if (
-            not node.isdigit()
-            or label not in _DIRECTIONS
-            or any(fields[5:])
-            or (value and not _NUMBER.fullmatch(value))
-        ):
-            found = f"D of {shown(node)}, {shown(label)} = {shown(value)}"
-            raise place.wrong(found, "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read")
-        self.held.setdefault((label, float(value.replace("D", "E") or 0.0)), []).append(int(node))
-
-
 def _read_commands(path: Path) -> _Commands:
     """What the commands of a file say beside its blocks of nodes, elements and components.
 
@@ -211,23 +167,47 @@ def _read_commands(path: Path) -> _Commands:
         if command == "":  # a line of numbers
             types_left = types_left and fields[1] != "-1"
             if types_left and fields[1].isdigit():
-                found.add_type(fields[1:], place)
+                _add_type(found, fields[1:], place)
             continue
         types_left = command == "ETBL"
         if command == "ET":
-            found.add_type(fields[1:], place)
+            _add_type(found, fields[1:], place)
         elif command == "KEYO":
-            if fields[1:] and fields[1].isdigit():
-                option, value, *_ = [*fields[2:4], "", ""]
-                found.check_option(int(fields[1]), option, value, place)
+            number, option, value, *_ = [*fields[1:], "", "", ""]
+            _check_option(found.kinds.get(int(number) if number.isdigit() else 0, (0, place))[0], option, value, place)
         elif command == "D":
-            found.add_displacement(fields, place)
-        elif command == "EBLO" and "SOLID" not in fields:
-            raise place.wrong("EBLOCK without SOLID", "write the elements with CDWRITE,DB,file,cdb")
-        elif not _is_skipped(command, fields):
+            _add_displacement(found, fields, place)
+        elif (command == "EBLO" and "SOLID" not in fields) or not _is_skipped(command, fields):
             text = f"{shown(fields[0])} may change the model, and is not acted upon"
             raise place.wrong(text, _REMEDIES.get(command, "delete it if it does not"))
     return found
+
+
+def _add_type(found: _Commands, fields: list[str], place: Place) -> None:
+    """fields: number of the type, number or name of its elements, and its key options from the first on."""
+    name = re.search(r"\d+$", fields[1]) if len(fields) > 1 else None
+    if name is None or not fields[0].isdigit():
+        raise place.wrong("a type of elements that is no number", "write the file with CDWRITE,DB,file,cdb")
+    found.kinds[int(fields[0])] = int(name[0]), place
+    for option, value in enumerate(fields[2:], 1):
+        _check_option(int(name[0]), str(option), value, place)
+
+
+def _check_option(kind: int, option: str, value: str, place: Place) -> None:
+    """Raises SceneError where a key option makes other elements of a kind than those that are read."""
+    kinds, what, remedy = _OPTIONS.get(option, ((), "", ""))
+    if value == "1" and kind in kinds:
+        raise place.wrong(what, remedy)
+
+
+def _add_displacement(found: _Commands, fields: list[str], place: Place) -> None:
+    """A command D."""
+    fields = [*fields, *[""] * 8]
+    node, label, value = fields[1:4]
+    if not node.isdigit() or label not in _DIRECTIONS or any(fields[5:]) or (value and not _NUMBER.fullmatch(value)):
+        what = f"D of {shown(node)}, {shown(label)} = {shown(value)}"
+        raise place.wrong(what, "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read")
+    found.held.setdefault((label, float(value.replace("D", "E") or 0.0)), []).append(int(node))
 
 
 def _lines(path: Path) -> Iterator[tuple[list[str], Place]]:

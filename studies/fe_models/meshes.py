@@ -19,8 +19,7 @@ from studies.fe_models.cdb import read_cdb
 from studies.fe_models.deck.contents import ContactNodes, Deck
 from studies.fe_models.deck.model import deck_of_arrays
 from studies.fe_models.deck.read import read_deck
-from studies.fe_models.library_errors import library_errors
-from studies.fe_models.text import IntArray
+from studies.fe_models.text import IntArray, library_errors
 from studies.scene_error import SceneError
 
 # meshio's names, whose order of nodes is VTK's: for these kinds that of the decks
@@ -85,16 +84,12 @@ def _gmsh_deck(path: Path, mesh: Any) -> Deck:
     from meshio._mesh import topological_dimension
 
     points = np.asarray(mesh.points, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise SceneError("model", f"{path.name} has points of another shape than (n, 3)", "write a mesh in space")
     blocks: dict[str, list[tuple[IntArray, IntArray]]] = {}
     node_sets: dict[str, list[IntArray]] = {}
     element_sets: dict[str, list[IntArray]] = {}
     numbered: dict[bytes, int] = {}
     for place, block in enumerate(mesh.cells):
         nodes = np.asarray(block.data, dtype=np.int64) + 1
-        if nodes.size and nodes.min() < 1:
-            raise SceneError("model", f"{path.name}: an element has a node that does not exist", "write it again")
         numbers = None
         if topological_dimension[block.type] == _SOLID:
             if block.type not in _KINDS:
@@ -148,11 +143,10 @@ def _read_node_table(path: Path) -> Deck:
         places = table[_PLACE].to_numpy(dtype=np.float64)
         contact = table.reindex(columns=_CONTACT).to_numpy(dtype=np.float64)
         numbers = table["node"].to_numpy()
-    if numbers.dtype.kind != "i" or len(np.unique(numbers)) < len(numbers):
-        found = f"{path.name}: a node is no whole number, or there twice"
+    whole = numbers.dtype.kind == "i" and len(np.unique(numbers)) == len(numbers)
+    if not whole or not np.isfinite(places).all():
+        found = f"{path.name}: a node or a coordinate is no number, or a node is there twice"
         raise SceneError("model", found, "give a line for each node")
-    if not np.isfinite(places).all():
-        raise SceneError("model", f"{path.name}: a coordinate is not a finite number", "give x, y and z of each node")
     sets: dict[str, list[int]] = {}
     for number, names in zip(numbers.tolist(), table["sets"].fillna("").astype(str), strict=True):
         for name in names.upper().split():

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from scipy import sparse
 
 from solver.model import FloatArray, IntArray
 from studies.finite_element.surfaces import FACE_SHAPES, Surface, quad_derivatives, quad_values
@@ -15,27 +14,20 @@ _DESCENT_STEPS = 24
 _FACE_STEPS = 6
 
 
-@dataclass(frozen=True)
-class ClosestPoints:
-    """nodes, weights (n_points, 8): of the element face and the values of its shape functions, -1 and 0 after the last.
+def closest_points(
+    points: FloatArray, surface: Surface, coordinates: FloatArray
+) -> tuple[sparse.csr_matrix, FloatArray]:
+    """Closest points on a surface to some points (n_points, 3), m.
 
-    distance (n_points,): to the linear facets, m.
+    Their interpolation weights (n_points, n_nodes), the shape functions of element faces, and the distances (n_points,)
+    to the linear facets, m.
     """
-
-    nodes: IntArray
-    weights: FloatArray
-    distance: FloatArray
-
-
-def closest_points(points: FloatArray, surface: Surface, coordinates: FloatArray) -> ClosestPoints:
-    """Closest points on a surface to some points (n_points, 3), m."""
-    facets = np.concatenate([surface.triangles[:, [0, 1, 2, 2]], surface.quads])
-    corners = coordinates[facets]
+    corners = coordinates[surface.facets]
     centre = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
-    n_triangles = len(surface.triangles)
-    step = max(1, _CHUNK // len(facets))
-    facet_of, weights = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 4))
+    triangle = surface.facets[:, 2] == surface.facets[:, 3]
+    step = max(1, _CHUNK // len(corners))
+    facet_of, within = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 4))
     distance = np.full(len(points), np.inf)
     for first in range(0, len(points), step):
         own = points[first : first + step]
@@ -44,7 +36,7 @@ def closest_points(points: FloatArray, surface: Surface, coordinates: FloatArray
         reach = (apart + radius).min(axis=1, keepdims=True)
         point, facet = np.nonzero(apart - radius <= reach * (1.0 + 1e-12))
         found = np.empty((len(point), 4))
-        flat = facet < n_triangles
+        flat = triangle[facet]
         found[flat] = _on_triangles(own[point[flat]], corners[facet[flat], :3])
         found[~flat] = _on_quads(own[point[~flat]], corners[facet[~flat]])
         away = np.linalg.norm(own[point] - np.einsum("pn,pnj->pj", found, corners[facet]), axis=1)
@@ -52,10 +44,13 @@ def closest_points(points: FloatArray, surface: Surface, coordinates: FloatArray
         order = np.lexsort((np.round(away / radius.max(), 12), point))
         chosen = order[np.unique(point[order], return_index=True)[1]]
         rows = first + point[chosen]
-        facet_of[rows], weights[rows], distance[rows] = facet[chosen], found[chosen], away[chosen]
+        facet_of[rows], within[rows], distance[rows] = facet[chosen], found[chosen], away[chosen]
     nodes = surface.faces[facet_of]
-    places = np.einsum("pn,pna->pa", weights, surface.places[facet_of])
-    return ClosestPoints(nodes, _face_weights(points, nodes, places, coordinates), distance)
+    places = np.einsum("pn,pna->pa", within, surface.places[facet_of])
+    weights = _face_weights(points, nodes, places, coordinates)
+    point, corner = np.nonzero(weights)
+    entries = (weights[point, corner], (point, nodes[point, corner]))
+    return sparse.csr_matrix(entries, shape=(len(points), len(coordinates))), distance
 
 
 def _face_weights(points: FloatArray, nodes: IntArray, places: FloatArray, coordinates: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Linear constraints: displacements that depend on others, and are eliminated before anything is reduced."""
+"""Linear constraints: displacements that depend on others."""
 
 from __future__ import annotations
 
@@ -10,12 +10,9 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.pairing import ContactPairs, ContactSurfaces
 from studies.scene_error import SceneError
 
 _LONGEST_CHAIN = 100  # displacements that depend on others that depend on others
-_ROUND_OFF = 1e-6  # of a direction, which decks give with few digits
 _NOTHING = 1e-12  # square of a motion that moves no node, over that of one that does
 
 
@@ -35,72 +32,40 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Constraints:
-    """`u = transformation @ q`: q are the displacements that depend on no other and are not held, the rest of q is 0.
+    """`u = steps @ u + axes @ y`; y are motions of displacements that are not held and depend on no other.
 
-    dependent (n_nodes, 3): which displacements move with others. origin (n_nodes,): what makes a node depend on others,
-    a place in `origins`; -1 for none. oblique (n_nodes,): nodes that are held along other directions than x, y, z:
-    there q has all three displacements, of which u lacks these directions. across: projection on them. Matrices are (3
-    n_nodes, 3 n_nodes).
+    steps (3 n_nodes, 3 n_nodes): the displacements that depend on others, from these. axes (3 n_nodes, 3 n_nodes): its
+    columns are the directions of the motions, those of x, y, z but at nodes that are held along other directions, and
+    at nodes without elements. idle (3 n_nodes,): motions that are 0, beside held displacements. across (3 n_nodes, 3
+    n_nodes): projection on directions other than x, y, z along which nodes, oblique (n_nodes,), are held. dependent
+    (n_nodes, 3): which displacements move with others. origin (n_nodes,): what makes a node depend on others, a place
+    in `origins`; -1 for none.
     """
 
-    transformation: sparse.csr_matrix
+    steps: sparse.csr_matrix
+    axes: sparse.csr_matrix
+    idle: BoolArray
+    across: sparse.csr_matrix
+    oblique: BoolArray
     dependent: BoolArray
     origin: IntArray
     origins: Sequence[str]
-    oblique: BoolArray
-    across: sparse.csr_matrix
-
-    def apply(self, form: sparse.csr_matrix, *, stiffness: bool) -> sparse.csr_matrix:
-        """A form of q: `T^T K T`. What moves nothing stands on springs of its own in a stiffness."""
-        spring = float(np.abs(form.diagonal()).mean()) if stiffness else 0.0
-        return (self.transformation.T @ form @ self.transformation + spring * self.across).tocsr()
-
-    def forces(self, vectors: FloatArray) -> FloatArray:
-        """Forces (3 n_nodes, ...) on q."""
-        return np.asarray(self.transformation.T @ vectors)
-
-    def turned(self, left: int, right: int, rotation: FloatArray) -> bool:
-        """Whether a node is held as its image is under a rotation (3, 3)."""
-        return bool(np.abs(rotation @ self.held_along(left) @ rotation.T - self.held_along(right)).max() < _ROUND_OFF)
 
     def held_along(self, node: int) -> FloatArray:
         """Projection (3, 3) on the directions along which an oblique node is held."""
         return np.asarray(self.across[3 * node : 3 * node + 3, 3 * node : 3 * node + 3].toarray())
 
 
-def free_ones_first(constraints: Constraints, contacts: Sequence[ContactSurfaces]) -> tuple[ContactSurfaces, ...]:
-    """Contacts whose first surface, which moves where both are alike, does not follow others if the second does not."""
-    follow = np.asarray(constraints.dependent.any(axis=1))
-    return tuple(
-        each.turned_round if follow[each.first.nodes].any() and not follow[each.second.nodes].any() else each
-        for each in contacts
-    )
-
-
-def check_followers(
-    constraints: Constraints, numbers: IntArray, cut: CutFaces | None, pairs: ContactPairs, ties: ContactPairs | None
-) -> None:
-    """Raises SceneError where a node follows others by a constraint and in another way as well."""
-    moving = [(pairs, "moves in a contact pair")] + ([] if ties is None else [(ties, "is tied")])
-    for each, what in moving:
-        _check_free(constraints, each.moving, numbers, what, "take it out of one of them, or refine the other surface")
-    if cut is None:
-        return
-    both = np.concatenate([cut.left, cut.right])
-    _check_free(constraints, both, numbers, "is on a cut face", "let other nodes depend on this one")
-    slanted = constraints.oblique[cut.left] | constraints.oblique[cut.right]
-    for one, other in zip(cut.left[slanted], cut.right[slanted], strict=True):
-        if not constraints.turned(one, other, cut.rotation):
-            found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
-            raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
-
-
-def _check_free(constraints: Constraints, nodes: IntArray, numbers: IntArray, what: str, remedy: str) -> None:
-    """Raises SceneError where one of the nodes depends on others. what: the nodes are, for the message."""
-    wrong = nodes[constraints.dependent[nodes].any(axis=1)]
-    if len(wrong):
-        origin = constraints.origins[constraints.origin[wrong[0]]]
-        raise SceneError("model", f"{origin}: node {numbers[wrong[0]]} depends on others and {what}", remedy)
+def resolve(steps: sparse.csr_matrix) -> sparse.csr_matrix | None:
+    """`(1 - steps)^-1`: displacements from those that depend on no other; None where they depend in a circle."""
+    total, power = sparse.eye(steps.shape[0], format="csr"), steps
+    for _ in range(_LONGEST_CHAIN):
+        if power.nnz == 0:
+            return total
+        total = total + power
+        power = steps @ power
+        power.eliminate_zeros()
+    return None
 
 
 def eliminate(
@@ -114,7 +79,7 @@ def eliminate(
 
     held (n_nodes, 3): displacements that are 0. oblique: projections (3, 3) of nodes on other directions in which they
     are held. numbers (n_nodes,): of the nodes in the file. n_with_elements: number of nodes with elements; motions of
-    the others that move none of these are held. Raises SceneError where a displacement depends twice, on itself, or is
+    the others that move none of these are 0. Raises SceneError where a displacement depends twice, on itself, or is
     held as well.
     """
     size, places = held.size, [each.place for each in entries]
@@ -124,39 +89,30 @@ def eliminate(
     slanted = np.zeros(len(held), dtype=np.bool_)
     slanted[list(oblique)] = True
     _check_once(dependent, [places[each] for each in origin_of], held | slanted[:, None], numbers)
-    shape = (size, size)
     rows = np.concatenate([none, *(each.dependent[each.row] for each in entries)])
     columns = np.concatenate([none, *(each.column for each in entries)])
     values = np.concatenate([np.empty(0), *(each.value for each in entries)])
-    steps = sparse.csr_matrix((values, (rows, columns)), shape=shape)
-    own = np.ones(size)
-    own[dependent] = 0.0
-    total = sparse.diags(own, format="csr")
-    power = steps
-    for _ in range(_LONGEST_CHAIN):
-        total = total + power @ sparse.diags(own)
-        power = power @ steps
-        power.eliminate_zeros()
-        if power.nnz == 0:
-            break
-    else:
+    steps = sparse.csr_matrix((values, (rows, columns)), shape=(size, size))
+    total = resolve(steps)
+    if total is None:
         found = f"{places[0]}: displacements depend on each other in a circle"
         raise SceneError("model", found, "let each depend on others that do not depend on it")
-    fixed = held.ravel().copy()
-    across = sparse.lil_matrix(shape)
-    for node, projection in oblique.items():
-        across[3 * node : 3 * node + 3, 3 * node : 3 * node + 3] = projection
-    across = across.tocsr()
-    total = (total @ (sparse.eye(size) - across)) @ sparse.diags((~fixed).astype(float))
-    total, idle = _without_idle(total.tocsr(), 3 * n_with_elements, fixed)
-    fixed[idle] = True
-    total.eliminate_zeros()
-    moves = np.zeros(size, dtype=np.bool_)
-    moves[dependent] = np.diff(total.indptr)[dependent] > 0
+    axes, across = sparse.eye(size, format="lil"), sparse.lil_matrix((size, size))
+    idle, fixed = np.zeros(size, dtype=np.bool_), held.ravel().copy()
     fixed[dependent] = True
+    for node, projection in oblique.items():
+        own = slice(3 * node, 3 * node + 3)
+        sizes, axes[own, own] = np.linalg.eigh(projection)
+        across[own, own], idle[own] = projection, sizes > 0.5
+    axes = axes.tocsr()
+    axes = axes @ _sorted_out(total @ axes, fixed, 3 * n_with_elements, idle)
+    moved = total @ axes @ sparse.diags((~(fixed | idle)).astype(float), format="csr")
+    moved.eliminate_zeros()
+    moves = np.zeros(size, dtype=np.bool_)
+    moves[dependent] = np.diff(moved.indptr)[dependent] > 0
     origin = np.full(len(held), -1)
     origin[dependent // 3] = origin_of
-    constraints = Constraints(total, moves.reshape(-1, 3), origin, places, slanted, across)
+    constraints = Constraints(steps, axes, idle, across.tocsr(), slanted, moves.reshape(-1, 3), origin, places)
     return constraints, fixed.reshape(-1, 3)
 
 
@@ -178,17 +134,18 @@ def _check_once(dependent: IntArray, origins: Sequence[str], held: BoolArray, nu
         raise SceneError("model", f"{found(wrong[0])} and is held", "take the node out of one of them")
 
 
-def _without_idle(total: sparse.csr_matrix, first: int, fixed: BoolArray) -> tuple[sparse.csr_matrix, IntArray]:
-    """The transformation with motions of nodes without elements of which some move nothing, and these.
+def _sorted_out(total: sparse.csr_matrix, fixed: BoolArray, first: int, idle: BoolArray) -> sparse.csr_matrix:
+    """Motions of nodes without elements so that each of them moves others or nothing: the latter are marked as idle.
 
-    A turn about a line on which all nodes are moves nothing. Displacements from `first` on have no elements.
+    A turn about a line on which all nodes are moves nothing. total: all displacements from those that depend on none;
+    those from `first` on have no elements. The matrix has the new motions in terms of the given ones.
     """
     change = sparse.eye(len(fixed), format="lil")
-    extra = first + np.flatnonzero(~fixed[first:])
+    extra = first + np.flatnonzero(~(fixed | idle)[first:])
     columns = total[:first][:, extra]
     gram = (columns.T @ columns).tocsr()
     scale = np.sqrt(gram.diagonal())
-    idle: list[int] = extra[scale == 0.0].tolist()
+    idle[extra[scale == 0.0]] = True
     _, groups = connected_components(gram, directed=False)
     order = np.argsort(groups, kind="stable")
     for rows in np.split(order, np.flatnonzero(np.diff(groups[order])) + 1) if len(order) else []:
@@ -199,7 +156,5 @@ def _without_idle(total: sparse.csr_matrix, first: int, fixed: BoolArray) -> tup
         nothing = values < _NOTHING * values[-1]
         if nothing.any():
             change[np.ix_(extra[rows], extra[rows])] = vectors / scale[rows][:, None]
-            idle += extra[rows][nothing].tolist()
-    keep = np.ones(len(fixed))
-    keep[idle] = 0.0
-    return (total @ change.tocsr() @ sparse.diags(keep)).tocsr(), np.array(idle, dtype=np.int64)
+            idle[extra[rows[nothing]]] = True
+    return change.tocsr()

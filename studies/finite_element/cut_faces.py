@@ -9,7 +9,8 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from solver.model import ComplexArray, FloatArray, IntArray
+from solver.model import FloatArray, IntArray
+from studies.finite_element.solid_mesh import SolidMesh
 from studies.scene_error import SceneError
 
 _SAME = 1e-3  # distance of two nodes that are images, over the distance of neighbouring nodes on the face
@@ -32,17 +33,13 @@ class CyclicAxis:
     point: FloatArray
     axis: FloatArray
 
-    def turn(self, angle: float) -> FloatArray:
-        """Rotation (3, 3) by an angle in rad."""
-        return turn_about(self.axis, angle)
-
     def turned(self, points: FloatArray, sectors: int) -> FloatArray:
         """Points (n, 3), m, turned by a number of sectors about the axis, against the clock as seen from its end."""
         return np.asarray(self.point + (points - self.point) @ self.pitch(sectors).T)
 
     def pitch(self, sectors: int = 1) -> FloatArray:
         """Rotation (3, 3) by a number of sectors."""
-        return self.turn(2.0 * np.pi * sectors / self.n_sectors)
+        return turn_about(self.axis, 2.0 * np.pi * sectors / self.n_sectors)
 
     def cylinder(self, coordinates: FloatArray) -> FloatArray:
         """Radius, m, angle, rad, and height, m (n, 3), of points (n, 3)."""
@@ -72,16 +69,15 @@ class CutFaces:
         """Rotation (3, 3) by one sector."""
         return self.axis.pitch()
 
-    def across(self, sectors: IntArray, nodal_diameter: int) -> FloatArray | ComplexArray:
-        """Factors (n, 3, 3) from displacements in this sector to those at the same places, sectors (n,) further on."""
-        steps = [self.phase(nodal_diameter) ** int(each) * self.axis.pitch(int(each)) for each in sectors]
-        return np.array(steps).reshape(-1, 3, 3)
+    def across(self, sectors: IntArray, nodal_diameter: int) -> sparse.bsr_matrix:
+        """Factors (3 n, 3 n) from displacements of points (n,) in this sector to those of their images.
 
-    def images(self, nodal_diameter: int, n_nodes: int) -> sparse.csr_matrix:
-        """Displacements (3 n, 3 n_nodes) of the right nodes from those of all nodes."""
-        blocks = np.tile(self.phase(nodal_diameter) * self.rotation, (len(self.left), 1, 1))
-        starts = np.arange(len(self.left) + 1)
-        return sparse.bsr_matrix((blocks, self.left, starts), shape=(3 * len(self.left), 3 * n_nodes)).tocsr()
+        sectors (n,): how far the images are from this sector.
+        """
+        steps, which = np.unique(sectors, return_inverse=True)
+        blocks = np.array([self.phase(nodal_diameter) ** int(each) * self.axis.pitch(int(each)) for each in steps])
+        each = np.arange(len(sectors) + 1)
+        return sparse.bsr_matrix((blocks[which], each[:-1], each))
 
     def phase(self, nodal_diameter: int) -> complex | float:
         """`exp(i 2 pi k / N)` of a nodal diameter in 0..n_sectors // 2, real at both ends."""
@@ -92,17 +88,12 @@ class CutFaces:
         return cmath.exp(2j * np.pi * nodal_diameter / self.axis.n_sectors)
 
 
-def match_cut_faces(
-    coordinates: FloatArray, numbers: IntArray, bodies: IntArray, axis: CyclicAxis, first: IntArray, second: IntArray
-) -> CutFaces:
+def match_cut_faces(mesh: SolidMesh, axis: CyclicAxis, first: IntArray, second: IntArray) -> CutFaces:
     """Cut faces from the nodes (n,) of both, in any order; which one is left is found.
-
-    numbers (n_nodes,): of the nodes in the file, for messages. bodies (n_nodes,): which body each node is of, as
-    `SolidMesh.bodies` has it: where nodes of two bodies coincide, images are of the same one.
 
     Raises SceneError where the faces are not one sector apart, or nodes have no image.
     """
-    angle = 2.0 * np.pi / axis.n_sectors
+    angle, coordinates = 2.0 * np.pi / axis.n_sectors, mesh.coordinates
     cylinder = axis.cylinder(coordinates)
     apart = _mean_angle(cylinder[second]) - _mean_angle(cylinder[first])
     apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
@@ -111,60 +102,47 @@ def match_cut_faces(
         remedy = "give the number of sectors and the axis of the mesh"
         raise SceneError("n_sectors", f"{found} {np.degrees(angle):.4g}", remedy)
     left, right = (first, second) if apart > 0.0 else (second, first)
-    tree = cKDTree(coordinates[left])
-    spacing = tree.query(coordinates[left], k=2)[0][:, 1]
+    spacing = cKDTree(coordinates[left]).query(coordinates[left], k=2)[0][:, 1]
     tolerance = _SAME * (np.median(spacing) if len(left) > 1 else np.ptp(coordinates, axis=0).max())
-    image = _images(coordinates, numbers, bodies, axis, left, right, float(tolerance))
-    lonely_left, lonely_right = left[image < 0], np.setdiff1d(right, image)
-    for lonely, other in ((lonely_left, right), (lonely_right, left)):
+    image = _images(mesh, axis, left, right, float(tolerance))
+    for lonely, other in ((left[image < 0], right), (np.setdiff1d(right, image), left)):
         if len(lonely):
-            some = ", ".join(str(number) for number in numbers[lonely[:5]]) + (", ..." if len(lonely) > 5 else "")
+            some = ", ".join(str(number) for number in mesh.numbers[lonely[:5]]) + (", ..." if len(lonely) > 5 else "")
             found = f"{len(lonely)} nodes of one cut face have no image among the {len(other)} of the other: {some}"
             raise SceneError("cut_faces", found, "mesh both cut faces alike, and give all their nodes")
-    _no_node_on_axis(left, image, numbers)
-    return CutFaces(axis, left, image)
+    return _cut_faces(mesh, axis, left, image)
 
 
-def find_cut_faces(
-    coordinates: FloatArray, numbers: IntArray, bodies: IntArray, axis: CyclicAxis, in_contact: IntArray
-) -> CutFaces:
+def find_cut_faces(mesh: SolidMesh, axis: CyclicAxis, in_contact: IntArray) -> CutFaces:
     """Cut faces from the mesh alone: all nodes with an image under rotation by one sector.
 
-    Other arguments as in `match_cut_faces`. in_contact (m,): nodes that touch the next sector, and are on no cut face.
-
-    Raises SceneError where there is none, and no node touches the next sector.
+    in_contact (m,): nodes that touch the next sector, and are on no cut face. Raises SceneError where there is no
+    image, and no node touches the next sector.
     """
-    extent = float(np.ptp(coordinates, axis=0).max())
-    elsewhere = np.setdiff1d(np.arange(len(coordinates)), in_contact)
-    found = _images(coordinates, numbers, bodies, axis, elsewhere, elsewhere, _EXTENT * extent)
-    left, image = elsewhere[found >= 0], found[found >= 0]
-    if len(left) == 0 and len(in_contact) == 0:
+    extent = float(np.ptp(mesh.coordinates, axis=0).max())
+    elsewhere = np.setdiff1d(np.arange(mesh.n_nodes), in_contact)
+    image = _images(mesh, axis, elsewhere, elsewhere, _EXTENT * extent)
+    if (image < 0).all() and len(in_contact) == 0:
         none = f"no node has an image under rotation by {360.0 / axis.n_sectors:.4g} degrees, one of"
         remedy = "give the number of sectors and the axis of the mesh, or the sets of both cut faces"
         raise SceneError("n_sectors", f"{none} {axis.n_sectors} sectors", remedy)
-    _no_node_on_axis(left, image, numbers)
-    return CutFaces(axis, left, image)
+    return _cut_faces(mesh, axis, elsewhere[image >= 0], image[image >= 0])
 
 
-def _images(
-    coordinates: FloatArray,
-    numbers: IntArray,
-    bodies: IntArray,
-    axis: CyclicAxis,
-    left: IntArray,
-    right: IntArray,
-    tolerance: float,
-) -> IntArray:
-    """Of each left node (n,) the right one that it turns into, -1 where there is none within the tolerance, m."""
-    turned = axis.turned(coordinates[left], 1)
+def _images(mesh: SolidMesh, axis: CyclicAxis, left: IntArray, right: IntArray, tolerance: float) -> IntArray:
+    """Of each left node (n,) the right one that it turns into, -1 where there is none within the tolerance, m.
+
+    Where nodes of two bodies coincide, the image is of the same body.
+    """
+    turned, bodies = axis.turned(mesh.coordinates[left], 1), mesh.bodies
     image = np.full(len(left), -1)
-    for place, found in enumerate(cKDTree(coordinates[right]).query_ball_point(turned, tolerance)):
+    for place, found in enumerate(cKDTree(mesh.coordinates[right]).query_ball_point(turned, tolerance)):
         candidates = right[found]
         if len(candidates) > 1:
             candidates = candidates[bodies[candidates] == bodies[left[place]]]
         if len(candidates) > 1:
-            one, other = numbers[candidates[:2]]
-            several = f"node {numbers[left[place]]} has {len(candidates)} images on the other cut face, as nodes"
+            one, other = mesh.numbers[candidates[:2]]
+            several = f"node {mesh.numbers[left[place]]} has {len(candidates)} images on the other cut face, as nodes"
             raise SceneError("cut_faces", f"{several} {one} and {other}", "merge nodes of one body that coincide")
         if len(candidates) == 1:
             image[place] = candidates[0]
@@ -177,8 +155,9 @@ def _mean_angle(cylinder: FloatArray) -> float:
     return float(np.angle((radius * np.exp(1j * angle)).sum()))
 
 
-def _no_node_on_axis(left: IntArray, right: IntArray, numbers: IntArray) -> None:
+def _cut_faces(mesh: SolidMesh, axis: CyclicAxis, left: IntArray, right: IntArray) -> CutFaces:
     both = np.intersect1d(left, right)
     if len(both):
-        found = f"{len(both)} nodes are on both cut faces, as node {numbers[both[0]]}"
+        found = f"{len(both)} nodes are on both cut faces, as node {mesh.numbers[both[0]]}"
         raise SceneError("cut_faces", found, "a sector must not reach the axis, nor be the whole ring")
+    return CutFaces(axis, left, right)

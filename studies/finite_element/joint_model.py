@@ -21,8 +21,8 @@ class MeshModel:
 
     prestress: whether the stiffness contains the stress and the displacements of the glued structure under the
     centrifugal load, and spin softening. preload (3 n_nodes,): constant forces, N, and gravity (3,): acceleration of
-    all mass, m/s2. They are no part of the prestress: forces that press on gaps and flanks act otherwise on a glued
-    structure. extra (m,): numbers of nodes without elements, behind those of the mesh: others follow them.
+    all mass, m/s2; no part of the prestress, as forces on gaps and flanks act otherwise on a glued structure. extra
+    (m,): numbers of nodes without elements, behind those of the mesh: others follow them.
     """
 
     mesh: SolidMesh
@@ -126,8 +126,7 @@ class JointDefinition:
     """What is done with a model.
 
     held (n_nodes, 3): displacements that are 0, or follow others by the constraints. load: harmonic load of 1 N. cut:
-    None where the structure is no cyclic sector. along (3,): direction near the first tangents; None for the axis of
-    rotation or of the cyclic structure, else z. ties: surfaces that are always glued. pairs: those of the contacts in
+    None where the structure is no cyclic sector. ties: surfaces that are always glued. pairs: those of the contacts in
     another order or with other frames than `build_contact_pairs` gives them.
     """
 
@@ -136,7 +135,6 @@ class JointDefinition:
     load: SetMotion
     responses: Mapping[str, SetMotion | RowMotion]
     cut: CutFaces | None = None
-    along: FloatArray | None = None
     retainer: Retainer | None = None
     ties: tuple[ContactSurfaces, ...] = ()
     constraints: Constraints | None = None
@@ -150,18 +148,3 @@ class ReductionOptions:
     nodal_diameter: int = 0
     n_modes: int = 20
     loss_factor: float = 1e-3
-
-
-@dataclass(frozen=True)
-class ModelSummary:
-    """Values for a user to check.
-
-    mass: kg. centre (3,), extent (3,): m. n_dofs: number of displacements of nodes that are not held.
-    glued_frequencies: of the glued structure, Hz, by nodal diameter.
-    """
-
-    mass: float
-    centre: FloatArray
-    extent: FloatArray
-    n_dofs: int
-    glued_frequencies: Mapping[int, FloatArray] = field(default_factory=dict)

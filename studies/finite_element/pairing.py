@@ -27,12 +27,11 @@ class ContactSurfaces:
     """Two surfaces in contact.
 
     The nodes of the finer surface move, those of the first one where both are alike; where one surface alone is covered
-    by the other, its nodes move. tolerance: largest distance of a node that is paired, m; None for a share of the size
-    of a facet. friction_coefficient: None where all pairs have the same. with_gaps: whether distances in the mesh are
-    gaps of the joint; else they are errors of flat facets on curved surfaces, and the pairs touch. clearance: gap of
-    all pairs in place of the distances, m, negative for an interference. label: of the pairs; the names of both
-    surfaces if empty. sector: of the second surface: 1 where it belongs to the next sector in the sense of the axis, -1
-    to the one before.
+    by the other, its nodes move. tolerance: largest distance of a node that is paired, m; None for a share of a facet.
+    friction_coefficient: None where all pairs have the same. with_gaps: whether distances in the mesh are gaps of the
+    joint, and no errors of flat facets on curved surfaces. clearance: gap of all pairs in place of the distances, m,
+    negative for an interference. label: of the pairs; the names of both surfaces if empty. sector: of the second
+    surface: 1 for the next sector in the sense of the axis, -1 for the one before.
     """
 
     first: Surface
@@ -49,6 +48,14 @@ class ContactSurfaces:
         """Label of the pairs."""
         return self.label or f"{self.first.name}-{self.second.name}"
 
+    def beside(self, coordinates: FloatArray, axis: CyclicAxis | None) -> FloatArray:
+        """Coordinates (n_nodes, 3), m, where the second surface is; axis: of the cyclic structure."""
+        if not self.sector:
+            return coordinates
+        if axis is None:
+            raise ValueError("a contact between sectors needs the axis of the cyclic structure")
+        return axis.turned(coordinates, self.sector)
+
     @property
     def turned_round(self) -> ContactSurfaces:
         """The same contact with the surfaces in the other order."""
@@ -57,15 +64,14 @@ class ContactSurfaces:
 
 @dataclass(frozen=True)
 class ContactPairs:
-    """Contact pairs, `n_contact` of them.
+    """Contact pairs; the relative displacement is that of the moving node minus that of the opposite point.
 
-    moving (n_contact,): nodes; the relative displacement is that of the node minus that of the opposite point. opposite
-    (n_contact, n_nodes): interpolation weights of the opposite points, of the nodes of this sector whose images they
-    are; sector (n_contact,): where the point is, 0, 1 or -1. frames (n_contact, 3, 3): rows are normal (out of the
-    moving body, so that motion along it closes the pair), first and second tangent. present (n_contact, 3): whether a
-    relative displacement exists; the others are held. area (n_contact,): m2. position (n_contact, 3): of the moving
-    node, m. distance (n_contact,): along the normal, positive where the pair is open, m. gap (n_contact,): m. surface
-    (n_contact,): number of the pair of surfaces, whose names are moving_name and opposite_name.
+    moving (n_contact,): nodes. opposite (n_contact, n_nodes): interpolation weights of the opposite points, of the
+    nodes of this sector whose images they are; sector (n_contact,): where the point is, 0, 1 or -1. frames (n_contact,
+    3, 3): rows are normal (out of the moving body: motion along it closes the pair), first and second tangent. present
+    (n_contact, 3): whether a relative displacement exists; the others are held. area (n_contact,): m2. position
+    (n_contact, 3): of the moving node, m. distance (n_contact,): along the normal, positive where the pair is open, m.
+    gap (n_contact,): m. surface (n_contact,): number of the pair of surfaces, with moving_name and opposite_name.
     """
 
     moving: IntArray
@@ -104,17 +110,28 @@ def build_contact_pairs(
     """Pairs of all surfaces, those of the first ones first, each by its moving nodes in ascending order.
 
     coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. contacts: at least one.
-    along (3,): the first tangents are the projections of this direction where it does not stand on the surface; else
-    of the axis of coordinates that lies flattest on it. axis: of the cyclic structure, for contacts between sectors.
+    along (3,): see `local_frames`. axis: of the cyclic structure, for contacts between sectors.
 
     Raises SceneError where nodes find no point of the other surface, do not face it, or find it behind their own body,
     and where nodes belong to two pairs.
     """
     parts = []
     for place, contact in enumerate(contacts):
-        match, used = _find_match(coordinates, numbers, contact, axis)
-        frames = local_frames(match.normals, along)
-        parts.append(_pairs_of(coordinates, used, place, match.weights, match.area, frames, match.distance))
+        shared = np.intersect1d(contact.first.nodes, contact.second.nodes)
+        if len(shared):
+            found = f"{contact.first.name} and {contact.second.name} share {len(shared)} nodes"
+            raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
+        sizes = [each.facet_size(coordinates) for each in (contact.first, contact.second)]
+        finer = contact.turned_round if sizes[1] < (1.0 - 1e-6) * sizes[0] else contact
+        facet = max(sizes)
+        limit = min(facet, _TOLERANCE * facet if contact.tolerance is None else contact.tolerance)
+        match = _match(coordinates, finer, place, along, axis)
+        if (match.apart > limit).any():
+            # a coarse surface may lie inside a finer one that goes on
+            other = _match(coordinates, finer.turned_round, place, along, axis)
+            match = match if (other.apart > limit).any() else other
+        _check_match(match, numbers, limit)
+        parts.append(match.pairs)
     return _joined(parts, numbers)
 
 
@@ -125,12 +142,11 @@ def match_nodes(
     given: tuple[FloatArray, FloatArray, FloatArray],
     axis: CyclicAxis | None,
 ) -> ContactPairs:
-    """As `build_contact_pairs`, of nodes that meet, of reduced matrices, which have no facets.
+    """As `build_contact_pairs`, of nodes of the first surface that meet nodes of the second, as reduced matrices have.
 
-    Pairs of the nodes of the first surface and the nearest ones of the second. given, of the first surface: areas
-    (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, initial gaps (n_nodes,), m; NaN where there is
-    none. The first tangents are as near to the axis as possible, else to z. Raises SceneError where a node has no area
-    or normal, or finds no node that it meets.
+    given, of the first surface: areas (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, initial gaps
+    (n_nodes,), m; NaN where there is none. The first tangents are as near to the axis as possible, else to z. Raises
+    SceneError where a node has no area or normal, or meets no node.
     """
     along = np.array([0.0, 0.0, 1.0]) if axis is None else axis.axis
     area, normals, gap = given
@@ -141,46 +157,41 @@ def match_nodes(
         if len(unknown):
             found = f"{len(unknown)} nodes of {contact.first.name} have no area or normal, as node"
             raise SceneError("contact", f"{found} {numbers[unknown[0]]}", "give both in the table of nodes")
-        there = coordinates if axis is None or not contact.sector else axis.turned(coordinates, contact.sector)
+        there = contact.beside(coordinates, axis)
         apart, nearest = cKDTree(there[others]).query(coordinates[nodes])
-        tolerance = contact.tolerance or _TOLERANCE * float(np.sqrt(area[nodes].min()))
-        far = np.flatnonzero(apart > tolerance)
-        if len(far):
-            turned = " after a turn by one sector" if contact.sector else ""
-            found = (
-                f"{len(far)} of {len(nodes)} nodes of {contact.first.name} are farther than {tolerance:.3g} m from"
-                f" those of {contact.second.name}{turned}, as node {numbers[nodes[far[0]]]}"
-            )
-            raise SceneError("contact", found, "give nodes that meet, node by node, or a larger tolerance")
-        n, opposite = len(nodes), others[nearest]
-        weights = sparse.csr_matrix((np.ones(n), (np.arange(n), opposite)), shape=(n, len(coordinates)))
-        distance = np.einsum("ij,ij->i", there[opposite] - coordinates[nodes], normals[nodes])
-        frames = local_frames(normals[nodes], along)
-        pairs = _pairs_of(coordinates, contact, place, weights, area[nodes], frames, distance)
+        limit = contact.tolerance or _TOLERANCE * float(np.sqrt(area[nodes].min()))
+        _check_near(contact, apart, limit, numbers, "give nodes that meet, node by node, or a larger tolerance")
+        weights = sparse.eye(len(coordinates), format="csr")[others[nearest]]
+        pairs = _pairs_of(coordinates, there, contact, place, weights, (area[nodes], normals[nodes]), along)
         parts.append(replace(pairs, gap=np.where(np.isnan(gap[nodes]), pairs.gap, gap[nodes])))
     return _joined(parts, numbers)
 
 
 def _pairs_of(
     coordinates: FloatArray,
+    there: FloatArray,
     contact: ContactSurfaces,
     place: int,
     weights: sparse.csr_matrix,
-    area: FloatArray,
-    frames: FloatArray,
-    distance: FloatArray,
+    surface: tuple[FloatArray, FloatArray],
+    along: FloatArray,
 ) -> ContactPairs:
-    """Pairs of the nodes of the first surface; place: of the contact among all."""
-    n = len(area)
+    """Pairs of the nodes of the first surface, with areas and normals; place: of the contact among all.
+
+    there (n_nodes, 3): coordinates where the sector of the second surface is.
+    """
+    nodes, (area, normals) = contact.first.nodes, surface
+    n = len(nodes)
+    distance = np.einsum("ij,ij->i", weights @ there - coordinates[nodes], normals)
     gap = distance if contact.with_gaps else np.zeros(n)
     return ContactPairs(
-        moving=contact.first.nodes,
+        moving=nodes,
         opposite=weights,
         sector=np.full(n, contact.sector),
-        frames=frames,
+        frames=local_frames(normals, along),
         present=np.ones((n, 3), dtype=np.bool_),
         area=area,
-        position=coordinates[contact.first.nodes],
+        position=coordinates[nodes],
         distance=distance,
         gap=gap if contact.clearance is None else np.full(n, contact.clearance),
         surface=np.full(n, place),
@@ -207,7 +218,11 @@ def _joined(parts: Sequence[ContactPairs], numbers: IntArray) -> ContactPairs:
 
 
 def local_frames(normals: FloatArray, along: FloatArray) -> FloatArray:
-    """Frames (n, 3, 3) of unit normals (n, 3): rows normal, first tangent near `along`, second tangent."""
+    """Frames (n, 3, 3) of unit normals (n, 3): rows normal, first tangent, second tangent.
+
+    The first tangents are projections of the direction along (3,) where it does not stand on the surface, else of the
+    axis of coordinates that lies flattest on it.
+    """
     candidates = [along / np.linalg.norm(along), *np.eye(3)]
     steepest = [np.abs(normals @ each).max(initial=0.0) for each in candidates]
     # one direction for the whole surface, so that neighbouring frames are alike
@@ -223,72 +238,55 @@ def local_frames(normals: FloatArray, along: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Match:
-    """Nodes of one surface, and the closest points of the other.
+    """Pairs of a contact, whose first surface moves, and how they fit.
 
-    weights (n, n_nodes): of the points. area, normals (n,), (n, 3): of the nodes. apart (n,): to the facets, m.
-    distance (n,): along the normals, m. facing (n,): cosine between the normals of node and point. depth (n,): of the
-    elements below node or point, the smaller one, m.
+    apart (n,): from the nodes to the facets, m. facing (n,): cosine between the normals of node and point. depth (n,):
+    of the elements below node or point, the smaller one, m.
     """
 
-    weights: sparse.csr_matrix
-    area: FloatArray
-    normals: FloatArray
+    contact: ContactSurfaces
+    pairs: ContactPairs
     apart: FloatArray
-    distance: FloatArray
     facing: FloatArray
     depth: FloatArray
 
 
-def _match(coordinates: FloatArray, contact: ContactSurfaces, axis: CyclicAxis | None) -> _Match:
-    """The first surface, which moves, and the second one where its sector has it."""
-    moving, opposite, there = contact.first, contact.second, coordinates
-    if contact.sector:
-        if axis is None:
-            raise ValueError("a contact between sectors needs the axis of the cyclic structure")
-        there = axis.turned(coordinates, contact.sector)
-    found = closest_points(coordinates[moving.nodes], opposite, there)
+def _match(
+    coordinates: FloatArray, contact: ContactSurfaces, place: int, along: FloatArray, axis: CyclicAxis | None
+) -> _Match:
+    """Nodes of the first surface and the closest points of the second one where its sector has it."""
+    moving, opposite, there = contact.first, contact.second, contact.beside(coordinates, axis)
+    weights, apart = closest_points(coordinates[moving.nodes], opposite, there)
     area, normals = moving.areas_and_normals(coordinates)
-    point, corner = np.nonzero(found.weights)
-    entries = (found.weights[point, corner], (point, found.nodes[point, corner]))
-    weights = sparse.csr_matrix(entries, shape=(len(moving.nodes), len(coordinates)))
     facing, depth = np.zeros_like(coordinates), np.zeros(len(coordinates))
     facing[opposite.nodes] = opposite.areas_and_normals(there)[1]
     depth[opposite.nodes] = opposite.depth
-    offset = weights @ there - coordinates[moving.nodes]
     return _Match(
-        weights=weights,
-        area=area,
-        normals=normals,
-        apart=found.distance,
-        distance=np.einsum("ij,ij->i", offset, normals),
+        contact=contact,
+        pairs=_pairs_of(coordinates, there, contact, place, weights, (area, normals), along),
+        apart=apart,
         facing=np.einsum("ij,ij->i", weights @ facing, normals),
         depth=np.minimum(moving.depth, weights @ depth),
     )
 
 
-def _check_match(match: _Match, contact: ContactSurfaces, numbers: IntArray, facet: float) -> None:
-    """Raises SceneError where no tolerance makes pairs of these nodes. facet: size of the larger facets, m."""
-    turned = " after a turn by one sector" if contact.sector else ""
-    moving, opposite, n = contact.first.name, contact.second.name, len(match.apart)
+def _check_match(match: _Match, numbers: IntArray, limit: float) -> None:
+    """Raises SceneError where nodes are no pairs. limit: largest distance from the facets, m."""
+    contact, distance, n = match.contact, match.pairs.distance, match.pairs.n_contact
+    moving, opposite = contact.first.name, contact.second.name
     if (match.facing > 0.0).all():
         raise SceneError("contact", f"{moving} and {opposite} face the same way", "give faces that touch")
-    inside = (match.distance < -_OVERLAP * match.depth) & (match.distance < -_STRAIGHT * match.apart)
+    inside = (distance < -_OVERLAP * match.depth) & (distance < -_STRAIGHT * match.apart)
     if inside.any():
-        deepest = np.argmin(match.distance)
+        deepest = np.argmin(distance)
         found = (
             f"between {moving} and {opposite} there is material: at {inside.sum()} of {n} nodes {opposite} is up to"
-            f" {-match.distance[deepest]:.3g} m below {moving}, whose elements are {match.depth[deepest]:.3g} m deep"
+            f" {-distance[deepest]:.3g} m below {moving}, whose elements are {match.depth[deepest]:.3g} m deep"
         )
         remedy = "give two surfaces that face each other in the same sector, or name them in next_sector"
         raise SceneError("contact", found, remedy)
-    away = match.apart > facet
-    if away.any():
-        found = (
-            f"{away.sum()} of {n} nodes of {moving} are farther from {opposite} than a facet ({facet:.3g} m);"
-            f" the farthest is at {match.apart.max():.3g} m{turned}"
-        )
-        remedy = f"give surfaces that touch{turned}, one of which covers the other: a larger tolerance is no remedy"
-        raise SceneError("contact", found, remedy)
+    remedy = "give surfaces that touch, of which one covers the other, or a larger tolerance, at most a facet"
+    _check_near(contact, match.apart, limit, numbers, remedy)
     aside = np.flatnonzero(match.facing > 0.0)
     if len(aside):
         found = f"{len(aside)} of {n} nodes of {moving} do not face {opposite}, as node"
@@ -296,33 +294,14 @@ def _check_match(match: _Match, contact: ContactSurfaces, numbers: IntArray, fac
         raise SceneError("contact", f"{found} {numbers[contact.first.nodes[aside[0]]]}", remedy)
 
 
-def _find_match(
-    coordinates: FloatArray, numbers: IntArray, contact: ContactSurfaces, axis: CyclicAxis | None
-) -> tuple[_Match, ContactSurfaces]:
-    """Pairs of a contact, and the contact with the surface whose nodes move first."""
-    first, second = contact.first, contact.second
-    shared = np.intersect1d(first.nodes, second.nodes)
-    if len(shared):
-        found = f"{first.name} and {second.name} share {len(shared)} nodes"
-        raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
-    sizes = first.facet_size(coordinates), second.facet_size(coordinates)
-    if sizes[1] < (1.0 - 1e-6) * sizes[0]:
-        contact = contact.turned_round
-    tolerance = _TOLERANCE * max(sizes) if contact.tolerance is None else contact.tolerance
-    match = _match(coordinates, contact, axis)
-    far = match.apart > tolerance
-    if far.any():
-        # a coarse surface may lie inside a finer one that goes on
-        other = _match(coordinates, contact.turned_round, axis)
-        if (other.apart > tolerance).any():
-            _check_match(match, contact, numbers, max(sizes))
-            count = f"{np.count_nonzero(far)} of {len(far)} nodes of {contact.first.name}"
-            found = f"{count} are farther than {tolerance:g} m from {contact.second.name}"
-            remedy = (
-                f"give a larger tolerance (the farthest is at {match.apart.max():.3g} m), or surfaces of which one"
-                " covers the other"
-            )
-            raise SceneError("contact", found, remedy)
-        match, contact = other, contact.turned_round
-    _check_match(match, contact, numbers, max(sizes))
-    return match, contact
+def _check_near(contact: ContactSurfaces, apart: FloatArray, limit: float, numbers: IntArray, remedy: str) -> None:
+    """Raises SceneError where nodes of the first surface are farther from the second than the limit; apart (n,), m."""
+    far = int(np.count_nonzero(apart > limit))
+    if far:
+        worst, turned = int(np.argmax(apart)), " after a turn by one sector" if contact.sector else ""
+        found = (
+            f"{far} of {len(apart)} nodes of {contact.first.name} are farther than {limit:.3g} m from"
+            f" {contact.second.name}{turned}; the farthest, node {numbers[contact.first.nodes[worst]]}, is at"
+            f" {apart[worst]:.3g} m"
+        )
+        raise SceneError("contact", found, remedy)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
 from solver.model import (
-    BoolArray,
     ContactInterface,
     FloatArray,
     LinearModel,
@@ -17,17 +17,15 @@ from solver.model import (
     ReducedModel,
     needed_nodal_diameters,
 )
-from studies.finite_element.constraints import check_followers, free_ones_first
 from studies.finite_element.elimination import NotPositiveDefiniteError
 from studies.finite_element.joint_model import (
     JointDefinition,
     MatrixModel,
     MeshModel,
-    ModelSummary,
     ReductionOptions,
     Retainer,
 )
-from studies.finite_element.pairing import ContactPairs, build_contact_pairs
+from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduction import Reduction
 from studies.finite_element.solid_mesh import (
     Rotation,
@@ -38,8 +36,7 @@ from studies.finite_element.solid_mesh import (
     check_elements,
     spin_softening,
 )
-from studies.finite_element.structure import Structure, hold_cut_faces, hold_pairs, loose_ties, merge_cut_pairs
-from studies.scene_answers import N_MODES, NaturalFrequencies
+from studies.finite_element.structure import Structure, build_structure
 from studies.scene_error import SceneError
 
 Progress = Callable[[str], None]
@@ -48,11 +45,14 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class FeScene:
-    """A reduced model, its pairs in the order of the model, and values for a user to check."""
+    """A reduced model, its pairs in the order of the model, and frequencies of the glued structure.
+
+    glued_frequencies: Hz, ascending, by nodal diameter.
+    """
 
     model: ReducedModel
     pairs: ContactPairs
-    summary: ModelSummary
+    glued_frequencies: Mapping[int, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def build_fe_scene(
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
     prepared = prepare_model(model, joint, progress)
     motions = [each.row(len(model.numbers)) for each in (joint.load, *joint.responses.values())]
-    vectors = np.stack([prepared.static_load, *(_on_free(joint, each) for each in motions)], axis=1)
+    vectors = np.stack([prepared.static_load, *motions], axis=1)
     linear: dict[int, LinearModel] = {}
     frequencies: dict[int, FloatArray] = {}
     damping = 0.0
@@ -113,10 +113,8 @@ def build_fe_scene(
     order = sorted({excited, *wanted}, key=lambda k: (k != excited, k))
     for number, k in enumerate(order):
         progress(f"reduction at nodal diameter {k} ({number + 1} of {len(order)})" if n_sectors else "reduction")
-        try:
+        with _positive_definite(k, model.rotation):
             reduced = prepared.reduction.reduce(k, options.n_modes, vectors)
-        except NotPositiveDefiniteError as error:
-            raise _refused(error, k, model.rotation) from error
         frequencies[k] = reduced.frequencies / (2.0 * np.pi)
         if k == excited:
             damping = options.loss_factor / reduced.frequencies[0]
@@ -133,101 +131,67 @@ def build_fe_scene(
             )
     contact = _interface(prepared.pairs, joint)
     reduced_model = ReducedModel({k: linear[k] for k in wanted}, contact, tuple(joint.responses), n_sectors, excited)
-    return FeScene(reduced_model, prepared.pairs, _summary(model, joint, prepared, frequencies))
+    return FeScene(reduced_model, prepared.pairs, frequencies)
 
 
 def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progress: Progress = silent) -> PreparedModel:
     """Pairs and matrices of a model. Raises SceneError where the model describes no possible joint."""
     progress("pairing of the contact surfaces")
-    structure, constraints = _structure(model, joint), joint.constraints
+    structure = build_structure(model, joint)
     if isinstance(model, MatrixModel):
-        return _prepare(model, joint, structure, model.forms)
+        return _prepare(model, structure, model.forms)
     progress("assembly of stiffness and mass")
     check_elements(model.mesh)
     elastic, mass = (model.padded(form) for form in (assemble_stiffness(model.mesh), assemble_mass(model.mesh)))
-    still = _prepare(model, joint, structure, {"stiffness": elastic, "mass": mass})
+    still = _prepare(model, structure, {"stiffness": elastic, "mass": mass})
     if not model.prestress or model.rotation is None:
         return still
     progress("static state of the glued structure under the centrifugal load")
-    load = _on_free(joint, _centrifugal_load(mass, model.coordinates, model.rotation))
-    try:
+    load = centrifugal_load(mass, model.coordinates, model.rotation)
+    with _positive_definite(0, model.rotation):
         displacements = still.reduction.solve_static(load)
-    except NotPositiveDefiniteError as error:
-        raise _refused(error, 0, model.rotation) from error
-    if constraints is not None:
-        displacements = np.asarray(constraints.transformation @ displacements)
     progress("assembly of the prestressed stiffness")
     stressed = assemble_tangent_stiffness(model.mesh, displacements[: 3 * model.mesh.n_nodes])
     stiffness = (model.padded(stressed) + spin_softening(mass, model.rotation)).tocsr()
-    forms = {"stiffness": stiffness if constraints is None else constraints.apply(stiffness, stiffness=True)}
-    forms |= {"mass": still.reduction.forms["mass"], "elastic": still.reduction.forms["stiffness"]}
+    forms = {"stiffness": stiffness, "mass": mass, "elastic": elastic}
     return replace(still, reduction=replace(still.reduction, forms=forms), at_rest=still.reduction)
 
 
-def _structure(model: MeshModel | MatrixModel, joint: JointDefinition) -> Structure:
-    """The pairs of the joint, with the displacements that are held."""
-    numbers, coordinates, cut, constraints = model.numbers, model.coordinates, joint.cut, joint.constraints
-    axis = None if cut is None else cut.axis
-    along = joint.along
-    if along is None:
-        along = axis.axis if axis is not None else model.rotation.axis if model.rotation is not None else np.eye(3)[2]
-    pairs = joint.pairs
-    if pairs is None:
-        contacts = joint.contacts if constraints is None else free_ones_first(constraints, joint.contacts)
-        pairs = build_contact_pairs(coordinates, numbers, contacts, along, axis)
-    glued = build_contact_pairs(coordinates, numbers, joint.ties, along) if joint.ties else None
-    if constraints is not None:
-        check_followers(constraints, numbers, cut, pairs, glued)
-    held = hold_cut_faces(joint.held, cut, numbers)
-    pairs = merge_cut_pairs(hold_pairs(pairs, numbers, held, constraints, cut), cut, numbers)
-    ties = None if glued is None else loose_ties(glued, held, cut, pairs)
-    return Structure(held, cut, constraints, pairs, ties)
-
-
 def _prepare(
-    model: MeshModel | MatrixModel, joint: JointDefinition, structure: Structure, forms: dict[str, sparse.csr_matrix]
+    model: MeshModel | MatrixModel, structure: Structure, forms: dict[str, sparse.csr_matrix]
 ) -> PreparedModel:
-    """A model with the forms as they are, without what depends on others."""
+    """A model with the forms as they are."""
     mass, placed = forms["mass"], ~np.isnan(model.coordinates)
     load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
     if model.gravity is not None:
         load = load + mass @ (placed * model.gravity).ravel()
     if model.rotation is not None:
-        load = load + _centrifugal_load(mass, model.coordinates, model.rotation)
+        load = load + centrifugal_load(mass, model.coordinates, model.rotation)
     along_x = placed * np.array([1.0, 0.0, 0.0])
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
-    if joint.constraints is not None:
-        apply = joint.constraints.apply
-        forms = {name: apply(form, stiffness=name == "stiffness") for name, form in forms.items()}
-    reduction = Reduction(structure, forms, _positions(model, joint, forms.values()))
-    return PreparedModel(reduction, _on_free(joint, load), None, model.rotation, weight)
+    reduction = Reduction(structure, forms, _positions(model, structure, forms.values()))
+    return PreparedModel(reduction, load, None, model.rotation, weight)
 
 
-def _positions(
-    model: MeshModel | MatrixModel, joint: JointDefinition, forms: Iterable[sparse.csr_matrix]
-) -> FloatArray:
+def _positions(model: MeshModel | MatrixModel, structure: Structure, forms: Iterable[sparse.csr_matrix]) -> FloatArray:
     """Coordinates of the nodes, and radius, angle and height of a sector, over the extent of the mesh.
 
-    Nodes without a place stand among those to which the forms couple them. Rounded, layers of a regular mesh are
-    layers.
+    Nodes without a place stand among those to which forms and constraints couple them. Rounded, layers of a regular
+    mesh are layers.
     """
     positions, nowhere = model.coordinates.copy(), np.asarray(np.isnan(model.coordinates).any(axis=1))
     if nowhere.any():
         node = sparse.kron(sparse.eye(len(nowhere)), np.ones((1, 3)), format="csr")
-        coupled = sum(node @ (abs(form) > 0.0).astype(float) @ node.T for form in forms).tocsr()
+        joins = (*forms, structure.constraints.steps.T)
+        coupled = sum(node @ (abs(form) > 0.0).astype(float) @ node.T for form in joins).tocsr()
         near = (coupled[nowhere][:, ~nowhere] > 0.0).astype(float)
         count = np.maximum(np.asarray(near.sum(axis=1)), 1.0)
         positions[nowhere] = (near @ positions[~nowhere]) / count.reshape(-1, 1)
     extent = np.ptp(positions, axis=0).max()
     directions = [positions]
-    if joint.cut is not None:
-        directions.append(joint.cut.axis.cylinder(positions) * [1.0, extent, 1.0])
+    if structure.cut is not None:
+        directions.append(structure.cut.axis.cylinder(positions) * [1.0, extent, 1.0])
     return np.asarray(np.round(np.hstack(directions) / extent, 7))
-
-
-def _on_free(joint: JointDefinition, forces: FloatArray) -> FloatArray:
-    """Nodal forces (3 n_nodes,) on displacements that depend on no other."""
-    return forces if joint.constraints is None else joint.constraints.forces(forces)
 
 
 def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int) -> FloatArray:
@@ -235,24 +199,8 @@ def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int
 
     Raises SceneError where the glued structure is not held, or unstable.
     """
-    try:
+    with _positive_definite(nodal_diameter, prepared.rotation):
         return prepared.reduction.frequencies(nodal_diameter, n_modes) / (2.0 * np.pi)
-    except NotPositiveDefiniteError as error:
-        raise _refused(error, nodal_diameter, prepared.rotation) from error
-
-
-def natural_frequencies(prepared: PreparedModel, n_sectors: int) -> NaturalFrequencies:
-    """Those at all nodal diameters 0..n_sectors // 2. Raises SceneError as `glued_frequencies` does."""
-    found = np.full((n_sectors // 2 + 1, N_MODES), np.nan)
-    for k, row in enumerate(found):
-        own = glued_frequencies(prepared, k, N_MODES)
-        row[: len(own)] = own
-    return NaturalFrequencies(tuple(range(len(found))), found)
-
-
-def _centrifugal_load(mass: sparse.csr_matrix, coordinates: FloatArray, rotation: Rotation) -> FloatArray:
-    # what has no place has no arm: an amplitude within an element
-    return centrifugal_load(mass, np.where(np.isnan(coordinates), rotation.point, coordinates), rotation)
 
 
 def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
@@ -286,29 +234,19 @@ def _retained(stiffness: Matrix, pairs: ContactPairs, retainer: Retainer | None)
     return stiffness + retainer.stiffness * np.outer(row, row)
 
 
-def _summary(
-    model: MeshModel | MatrixModel,
-    joint: JointDefinition,
-    prepared: PreparedModel,
-    frequencies: dict[int, FloatArray],
-) -> ModelSummary:
-    weight, coordinates = prepared.weight, model.coordinates
-    free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
-    if joint.cut is not None:
-        free[joint.cut.right] = False
-    return ModelSummary(
-        mass=float(weight.sum()),
-        centre=weight @ np.nan_to_num(coordinates) / weight.sum(),
-        extent=np.nanmax(coordinates, axis=0) - np.nanmin(coordinates, axis=0),
-        n_dofs=3 * int(np.count_nonzero(free)),
-        glued_frequencies=frequencies,
-    )
-
-
-def _refused(error: NotPositiveDefiniteError, nodal_diameter: int, rotation: Rotation | None) -> SceneError:
-    if error.unstable:
-        speed = "that of the matrices" if rotation is None else f"{np.sqrt(rotation.omega_squared) * 30.0 / np.pi:.6g}"
-        found = "the glued structure is unstable: spin softening exceeds its stiffness"
-        return SceneError("rotation_speed", speed, f"reduce it: at nodal diameter {nodal_diameter} {found}")
-    found = f"at nodal diameter {nodal_diameter} nothing holds the glued structure: its stiffness is singular"
-    return SceneError("clamp", found, "clamp nodes, so that with all contact pairs glued no body can move as a whole")
+@contextmanager
+def _positive_definite(nodal_diameter: int, rotation: Rotation | None) -> Iterator[None]:
+    """Raises SceneError where a glued stiffness is not positive definite."""
+    try:
+        yield
+    except NotPositiveDefiniteError as error:
+        if error.unstable:
+            speed = (
+                "that of the matrices" if rotation is None else f"{np.sqrt(rotation.omega_squared) * 30.0 / np.pi:.6g}"
+            )
+            found = "the glued structure is unstable: spin softening exceeds its stiffness"
+            remedy = f"reduce it: at nodal diameter {nodal_diameter} {found}"
+            raise SceneError("rotation_speed", speed, remedy) from error
+        found = f"at nodal diameter {nodal_diameter} nothing holds the glued structure: its stiffness is singular"
+        remedy = "clamp nodes, so that with all contact pairs glued no body can move as a whole"
+        raise SceneError("clamp", found, remedy) from error

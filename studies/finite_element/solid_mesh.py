@@ -85,7 +85,7 @@ def check_elements(mesh: SolidMesh) -> None:
         for chosen in _batches(group):
             wrong = np.flatnonzero(~(smallest_jacobians(kind, mesh.coordinates[group.nodes[chosen]]) > 0.0))
             if len(wrong):
-                found = f"element {group.numbers[chosen][wrong[0]]} ({group.kind}) is turned inside out"
+                found = f"element {group.numbers[chosen][wrong[0]]} is turned inside out"
                 remedy = "give its nodes in the order of CalculiX and Abaqus, or mend the mesh"
                 raise SceneError("model", found, remedy)
 
@@ -114,8 +114,11 @@ def spin_softening(mass: sparse.csr_matrix, rotation: Rotation) -> sparse.csr_ma
 
 
 def centrifugal_load(mass: sparse.csr_matrix, coordinates: FloatArray, rotation: Rotation) -> FloatArray:
-    """Centrifugal load (3 n_nodes,), N: elements are isoparametric, so that int N rho x is mass times positions."""
-    arms = (coordinates - rotation.point) @ rotation.across
+    """Centrifugal load (3 n_nodes,), N: elements are isoparametric, so that int N rho x is mass times positions.
+
+    What has no place, NaN, has no arm: an amplitude within an element.
+    """
+    arms = np.nan_to_num(coordinates - rotation.point) @ rotation.across
     return np.asarray(rotation.omega_squared * (mass @ arms.ravel()))
 
 

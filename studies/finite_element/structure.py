@@ -1,7 +1,7 @@
 """Which displacements of a structure are free, which follow others, and which are held.
 
 Nodes of the right cut face follow those of the left one, the moving node of a contact pair or of a tie follows the
-opposite point, plus the relative displacement of the pair.
+opposite point, plus the relative displacement of the pair; constraints are the same of other displacements.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.finite_element.constraints import Constraints
+from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.pairing import ContactPairs
+from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel
+from studies.finite_element.pairing import ContactPairs, build_contact_pairs
 from studies.scene_error import SceneError
 
-_LONGEST_CHAIN = 8  # surfaces on surfaces: nodes that follow nodes that follow
 _SLANTED = 0.1  # sine of the angle between the normal of a pair and a plane of symmetry that round-off or facets make
+_ROUND_OFF = 1e-6  # of a direction, which decks give with few digits
 
 
 @dataclass(frozen=True)
@@ -39,66 +40,102 @@ class Structure:
     """A structure with contact pairs.
 
     held (n_nodes, 3): displacements that are 0, or depend on others by the constraints. cut: cut faces; None where the
-    structure is no cyclic sector. constraints: None where no displacement depends on others; forms and forces are
-    those on the displacements q of `Constraints`. ties: pairs that are glued for good; None of none.
+    structure is no cyclic sector. ties: pairs that are glued for good; None of none.
     """
 
     held: BoolArray
     cut: CutFaces | None
-    constraints: Constraints | None
+    constraints: Constraints
     pairs: ContactPairs
     ties: ContactPairs | None
 
     def coordinates(self, nodal_diameter: int) -> Coordinates:
         """Those of a wave. Raises SceneError where nodes follow each other in a circle, or none is free."""
-        pairs, size = self.pairs, self.held.size
-        nodes, follow = [pairs.moving], [self._opposite(pairs, nodal_diameter)]
+        pairs, constraints, held = self.pairs, self.constraints, self.held.ravel()
+        followers = [(pairs.moving, pairs.opposite, pairs.sector)]
         if self.ties is not None:
-            nodes.append(self.ties.moving)
-            follow.append(self._opposite(self.ties, nodal_diameter))
+            followers.append((self.ties.moving, self.ties.opposite, self.ties.sector))
         if self.cut is not None:
-            nodes.append(self.cut.right)
-            follow.append(self.cut.images(nodal_diameter, len(self.held)))
-        followers, what = np.concatenate(nodes), sparse.vstack(follow, format="csr")
-        dofs = (3 * followers[:, None] + np.arange(3)).ravel()
-        if self.constraints is not None:
-            what = (what - self.constraints.across[dofs][:, dofs] @ what).tocsr()
-        loose = (~self.held[followers]).ravel().astype(float)
-        scatter = sparse.csr_matrix((loose, (dofs, np.arange(len(dofs)))), shape=(size, len(dofs)))
-        frames = sparse.block_diag(list(np.swapaxes(pairs.frames, 1, 2)), format="csr")[:, pairs.present.ravel()]
-        driven = scatter[:, : 3 * pairs.n_contact] @ frames
-        total, step = sparse.eye(size, format="csr"), scatter @ what
-        power = step
-        for _ in range(_LONGEST_CHAIN):
-            if power.nnz == 0:
-                break
-            total = total + power
-            power = step @ power
-            power.eliminate_zeros()
-        else:
+            left = sparse.eye(len(self.held), format="csr")[self.cut.left]
+            followers.append((self.cut.right, left, np.ones(len(self.cut.right), dtype=np.int64)))
+        nodes, opposite, sectors = zip(*followers, strict=True)
+        dofs = (3 * np.concatenate(nodes)[:, None] + np.arange(3)).ravel()
+        points = sparse.kron(sparse.vstack(opposite), np.eye(3), format="csr")
+        if self.cut is not None:
+            # a point of the next sector moves as its image in this one, turned and with the phase of the wave
+            points = (self.cut.across(np.concatenate(sectors), nodal_diameter) @ points).tocsr()
+        follow = (sparse.diags((~held).astype(float), format="csr") - constraints.across)[:, dofs]
+        total = resolve(follow @ points + constraints.steps)
+        if total is None:
             raise SceneError("contact", "surfaces follow each other in a circle", "give every pair of surfaces once")
-        own = ~self.held.ravel()
+        own = ~(held | constraints.idle)
         own[dofs] = False
         if not own.any():
             remedy = "refine the mesh, or keep modes in reduced matrices"
             raise SceneError("contact", "all nodes that move are in contact pairs", remedy)
         free = np.flatnonzero(own)
-        return Coordinates(total[:, free].tocsr(), (total @ driven).tocsr(), free // 3)
-
-    def _opposite(self, pairs: ContactPairs, nodal_diameter: int) -> sparse.csr_matrix:
-        """Displacements (3 n_contact, 3 n_nodes) of the opposite points.
-
-        A point of the next sector moves as its image in this one, turned and with the phase of the wave.
-        """
-        points = sparse.kron(pairs.opposite, np.eye(3), format="csr")
-        if self.cut is not None and pairs.sector.any():
-            each = np.arange(pairs.n_contact + 1)
-            steps = self.cut.across(pairs.sector, nodal_diameter), each[:-1], each
-            points = (sparse.bsr_matrix(steps) @ points).tocsr()
-        return points if self.constraints is None else (points @ self.constraints.transformation).tocsr()
+        frames = sparse.block_diag(list(np.swapaxes(pairs.frames, 1, 2)), format="csr")[:, pairs.present.ravel()]
+        driven = follow[:, : 3 * pairs.n_contact] @ frames
+        return Coordinates((total @ constraints.axes[:, free]).tocsr(), (total @ driven).tocsr(), free // 3)
 
 
-def hold_cut_faces(held: BoolArray, cut: CutFaces | None, numbers: IntArray) -> BoolArray:
+def build_structure(model: MeshModel | MatrixModel, joint: JointDefinition) -> Structure:
+    """The structure of a joint, with its pairs. Raises SceneError where the model describes no possible joint."""
+    numbers, coordinates, cut = model.numbers, model.coordinates, joint.cut
+    constraints = joint.constraints or eliminate((), joint.held, {}, numbers, len(numbers))[0]
+    axis = None if cut is None else cut.axis
+    # first tangents lie along the axis
+    along = axis.axis if axis is not None else model.rotation.axis if model.rotation is not None else np.eye(3)[2]
+    pairs = joint.pairs
+    if pairs is None:
+        follow = np.asarray(constraints.dependent.any(axis=1))
+        # of surfaces that are alike the first one moves: one that does not follow others if the second does not
+        contacts = [
+            each.turned_round if follow[each.first.nodes].any() and not follow[each.second.nodes].any() else each
+            for each in joint.contacts
+        ]
+        pairs = build_contact_pairs(coordinates, numbers, contacts, along, axis)
+    ties = build_contact_pairs(coordinates, numbers, joint.ties, along) if joint.ties else None
+    _check_followers(constraints, numbers, cut, pairs, ties)
+    held = _hold_cut_faces(joint.held, cut, numbers)
+    pairs = _merge_cut_pairs(_hold_pairs(pairs, numbers, held, constraints, cut), cut, numbers)
+    if ties is not None:
+        # held nodes, those that follow their image or move in a contact pair are bound already
+        bound: BoolArray = np.asarray(held.all(axis=1))
+        bound[pairs.moving] = True
+        if cut is not None:
+            bound[cut.right] = True
+        ties = ties.chosen(~bound[ties.moving])
+    return Structure(held, cut, constraints, pairs, ties)
+
+
+def _check_followers(
+    constraints: Constraints, numbers: IntArray, cut: CutFaces | None, pairs: ContactPairs, ties: ContactPairs | None
+) -> None:
+    """Raises SceneError where a node follows others by a constraint and in another way as well, or its image cannot."""
+    remedy = "take it out of one of them, or refine the other surface"
+    ways = [(pairs.moving, "moves in a contact pair", remedy)]
+    if ties is not None:
+        ways.append((ties.moving, "is tied", remedy))
+    if cut is not None:
+        both = np.concatenate([cut.left, cut.right])
+        ways.append((both, "is on a cut face", "let other nodes depend on this one"))
+    for nodes, what, remedy in ways:
+        wrong = nodes[constraints.dependent[nodes].any(axis=1)]
+        if len(wrong):
+            origin = constraints.origins[constraints.origin[wrong[0]]]
+            raise SceneError("model", f"{origin}: node {numbers[wrong[0]]} depends on others and {what}", remedy)
+    if cut is None:
+        return
+    slanted = constraints.oblique[cut.left] | constraints.oblique[cut.right]
+    for one, other in zip(cut.left[slanted], cut.right[slanted], strict=True):
+        image = cut.rotation @ constraints.held_along(one) @ cut.rotation.T
+        if np.abs(image - constraints.held_along(other)).max() > _ROUND_OFF:
+            found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
+            raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
+
+
+def _hold_cut_faces(held: BoolArray, cut: CutFaces | None, numbers: IntArray) -> BoolArray:
     """Held displacements (n_nodes, 3), those of nodes on one cut face as those of their images.
 
     numbers (n_nodes,): of the nodes in the file. Raises SceneError where an image does not have the directions in which
@@ -117,7 +154,7 @@ def hold_cut_faces(held: BoolArray, cut: CutFaces | None, numbers: IntArray) -> 
     return held
 
 
-def merge_cut_pairs(pairs: ContactPairs, cut: CutFaces | None, numbers: IntArray) -> ContactPairs:
+def _merge_cut_pairs(pairs: ContactPairs, cut: CutFaces | None, numbers: IntArray) -> ContactPairs:
     """Pairs without those on the right cut face, which are the same as their images: these get their areas.
 
     Raises SceneError where a pair on the right cut face has no image.
@@ -141,29 +178,18 @@ def merge_cut_pairs(pairs: ContactPairs, cut: CutFaces | None, numbers: IntArray
     return replace(pairs, area=area).chosen(np.setdiff1d(np.arange(pairs.n_contact), right))
 
 
-def loose_ties(ties: ContactPairs, held: BoolArray, cut: CutFaces | None, pairs: ContactPairs) -> ContactPairs:
-    """Ties without those of nodes that are held, follow their image on a cut face, or move in a contact pair."""
-    bound: BoolArray = np.asarray(held.all(axis=1))
-    bound[pairs.moving] = True
-    if cut is not None:
-        bound[cut.right] = True
-    return ties.chosen(~bound[ties.moving])
-
-
-def hold_pairs(
-    pairs: ContactPairs, numbers: IntArray, held: BoolArray, constraints: Constraints | None, cut: CutFaces | None
+def _hold_pairs(
+    pairs: ContactPairs, numbers: IntArray, held: BoolArray, constraints: Constraints, cut: CutFaces | None
 ) -> ContactPairs:
     """Pairs whose frames have a tangent along each direction that is held; the pairs do not have this tangent.
 
     Raises SceneError where a moving node is held along its normal, or the opposite point is not held as well.
     """
-    slanted = np.zeros(len(held), dtype=np.bool_) if constraints is None else constraints.oblique
+    slanted = constraints.oblique
 
     def along(node: int) -> FloatArray:
         """Projection (3, 3) on the directions along which a node is held."""
-        if constraints is not None and slanted[node]:
-            return constraints.held_along(node)
-        return np.diag(held[node].astype(float))
+        return constraints.held_along(node) if slanted[node] else np.diag(held[node].astype(float))
 
     frames, present = pairs.frames.copy(), pairs.present.copy()
     for place in np.flatnonzero((held.any(axis=1) | slanted)[pairs.moving]):

@@ -14,16 +14,15 @@ import numpy as np
 from solver.model import FloatArray, IntArray
 from studies.finite_element.elements import CORNERS, ELEMENT_KINDS, HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
 from studies.finite_element.solid_mesh import SolidMesh
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
 
 
 @dataclass(frozen=True)
 class FaceShape:
-    """Shape functions of an element face: those of an element whose face it is.
+    """Shape functions of the face of an element at a reference coordinate zeta, the height.
 
-    element, nodes: the element and its nodes on the face, corners first. height: reference coordinate zeta of the face.
-    facets: its linear facets, by the face's nodes.
+    nodes: of the element on the face, corners first. facets: linear ones by these, of a triangle the last one twice.
     """
 
     element: ReferenceElement
@@ -46,12 +45,14 @@ class FaceShape:
         return self.element.derivatives(points)[:, list(self.nodes), :2]
 
 
-_QUADRATIC = ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7))
+_TRIANGLE = ((0, 1, 2, 2),)
+_TRIANGLES = ((0, 3, 5, 5), (1, 4, 3, 3), (2, 5, 4, 4), (3, 4, 5, 5))
+_QUADS = ((0, 4, 7, 7), (1, 5, 4, 4), (2, 6, 5, 5), (3, 7, 6, 6), (4, 5, 6, 7))
 FACE_SHAPES = {
-    3: FaceShape(TET_4, (0, 1, 2), 0.0, ((0, 1, 2),)),
+    3: FaceShape(TET_4, (0, 1, 2), 0.0, _TRIANGLE),
     4: FaceShape(HEX_8, (0, 1, 2, 3), -1.0, ((0, 1, 2, 3),)),
-    6: FaceShape(TET_10, (0, 1, 2, 4, 5, 6), 0.0, ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5))),
-    8: FaceShape(HEX_20, (0, 1, 2, 3, 8, 9, 10, 11), -1.0, _QUADRATIC),
+    6: FaceShape(TET_10, (0, 1, 2, 4, 5, 6), 0.0, _TRIANGLES),
+    8: FaceShape(HEX_20, (0, 1, 2, 3, 8, 9, 10, 11), -1.0, _QUADS),
 }
 """Element faces by their number of nodes."""
 
@@ -64,7 +65,6 @@ _TRIANGLE_RULE = (
     np.stack([(1.0 + _XI) * (1.0 - _ETA) / 4.0, (1.0 + _ETA) / 2.0], axis=1),
     _QUAD_RULE[1] * (1.0 - _ETA) / 8.0,
 )
-_THIRDS = np.full(3, 1.0 / 3.0)
 
 
 def quad_values(points: FloatArray) -> FloatArray:
@@ -82,15 +82,14 @@ def quad_derivatives(points: FloatArray) -> FloatArray:
 class Surface:
     """A surface of one body.
 
-    triangles (n_triangles, 3), quads (n_quads, 4): facets, rows of `SolidMesh.coordinates`, anticlockwise as seen from
-    outside. Of triangles, then quads: faces (n, 8): nodes of the element face that each is of, -1 after the last;
-    places (n, 4, 2): reference coordinates of its corners there, of a triangle the last one twice. depth (n_nodes,):
-    how deep the elements are below each of `nodes`, the least one, m.
+    facets (n_facets, 4): rows of `SolidMesh.coordinates`, anticlockwise as seen from outside, of a triangle the last
+    one twice. faces (n_facets, 8): nodes of the element face that each is of, -1 after the last. places (n_facets, 4,
+    2): reference coordinates of its corners there. depth (n_nodes,): how deep the elements are below each of `nodes`,
+    the least one, m.
     """
 
     name: str
-    triangles: IntArray
-    quads: IntArray
+    facets: IntArray
     faces: IntArray
     places: FloatArray
     depth: FloatArray
@@ -98,7 +97,7 @@ class Surface:
     @cached_property
     def nodes(self) -> IntArray:
         """Its nodes, ascending."""
-        return np.unique(np.concatenate([self.triangles.ravel(), self.quads.ravel()]))
+        return np.unique(self.facets)
 
     def areas_and_normals(self, coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Area (n_nodes,), m2, and unit outward normal (n_nodes, 3) of each of `nodes`.
@@ -107,15 +106,11 @@ class Surface:
         facets, weighted alike.
         """
         area, normal = np.zeros(len(coordinates)), np.zeros((len(coordinates), 3))
-        corners = coordinates[self.triangles]
-        vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        np.add.at(normal, self.triangles, vectors[:, None, :] * _THIRDS[:, None])
-        np.add.at(area, self.triangles, np.linalg.norm(vectors, axis=1)[:, None] * _THIRDS)
-        tangents = np.einsum("pna,fnj->fapj", quad_derivatives(_QUAD_POINTS), coordinates[self.quads])
+        tangents = np.einsum("pna,fnj->fapj", quad_derivatives(_QUAD_POINTS), coordinates[self.facets])
         vectors = np.cross(tangents[:, 0], tangents[:, 1])
         values = quad_values(_QUAD_POINTS)
-        np.add.at(normal, self.quads, np.einsum("pn,fpj->fnj", values, vectors))
-        np.add.at(area, self.quads, np.linalg.norm(vectors, axis=2) @ values)
+        np.add.at(normal, self.facets, np.einsum("pn,fpj->fnj", values, vectors))
+        np.add.at(area, self.facets, np.linalg.norm(vectors, axis=2) @ values)
         sizes = np.linalg.norm(normal[self.nodes], axis=1)
         if not (sizes > 1e-6 * area[self.nodes]).all():
             found = f"surface {self.name} folds back on itself"
@@ -124,12 +119,11 @@ class Surface:
 
     def facet_size(self, coordinates: FloatArray) -> float:
         """Typical size of a facet, m: root of the mean area."""
-        area, _ = self.areas_and_normals(coordinates)
-        return float(np.sqrt(area.sum() / (len(self.triangles) + len(self.quads))))
+        return float(np.sqrt(self.areas_and_normals(coordinates)[0].sum() / len(self.facets)))
 
 
 def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> Surface:
-    """Surface of faces of elements, as `loops_of_faces` has them."""
+    """Surface of faces of elements, as `loops_of_faces` has them. Raises SceneError where there is none."""
     return _surface(mesh, name, *loops_of_faces(mesh, name, elements, faces))
 
 
@@ -195,10 +189,9 @@ def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
 
 
 def surface_of_points(name: str, nodes: IntArray) -> Surface:
-    """Surface of nodes (n,) of a model without elements: triangles of no extent."""
+    """Surface of nodes (n,) of a model without elements: facets of no extent."""
     n = len(nodes)
-    none = np.empty((0, 4), dtype=np.int64)
-    return Surface(name, np.tile(nodes[:, None], 3), none, np.full((n, 8), -1), np.zeros((n, 4, 2)), np.zeros(n))
+    return Surface(name, np.tile(nodes[:, None], 4), np.full((n, 8), -1), np.zeros((n, 4, 2)), np.zeros(n))
 
 
 def outer_faces(mesh: SolidMesh) -> list[tuple[IntArray, IntArray, str]]:
@@ -230,26 +223,15 @@ def _surface(mesh: SolidMesh, name: str, loops: list[IntArray], behind: list[Int
     """behind: nodes of the element of each face."""
     if not loops:
         raise SceneError("contact", f"surface {name} has no face", "give at least one face of an element")
-    facets: dict[int, list[IntArray]] = {3: [], 4: []}
-    faces: dict[int, list[IntArray]] = {3: [], 4: []}
-    places: dict[int, list[FloatArray]] = {3: [], 4: []}
     depth = np.full(mesh.n_nodes, np.inf)
+    facets, faces, places = [], [], []
     for loop, element in zip(loops, behind, strict=True):
         first, second, third = mesh.coordinates[loop[:3]]
         normal = np.cross(second - first, third - first)
         below = (first - mesh.coordinates[element]) @ (normal / np.linalg.norm(normal))
         depth[loop] = np.minimum(depth[loop], below.max())
         shape = FACE_SHAPES[len(loop)]
-        padded = np.append(loop, np.full(8 - len(loop), -1))
-        for facet in shape.facets:
-            facets[len(facet)].append(loop[list(facet)])
-            faces[len(facet)].append(padded)
-            places[len(facet)].append(shape.places[[*facet, facet[-1]][:4]])
-    return Surface(
-        name,
-        np.array(facets[3], dtype=np.int64).reshape(-1, 3),
-        np.array(facets[4], dtype=np.int64).reshape(-1, 4),
-        np.array(faces[3] + faces[4]),
-        np.array(places[3] + places[4]),
-        depth[np.isfinite(depth)],
-    )
+        facets.append(loop[np.array(shape.facets)])
+        faces += [np.append(loop, np.full(8 - len(loop), -1))] * len(shape.facets)
+        places.append(shape.places[np.array(shape.facets)])
+    return Surface(name, np.concatenate(facets), np.array(faces), np.concatenate(places), depth[np.isfinite(depth)])

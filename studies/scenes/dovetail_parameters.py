@@ -1,23 +1,32 @@
-"""Parameters of the scene `dovetail_sector`, and the checks that tie them together."""
+"""Parameters of the scene `dovetail_sector`, and what ties them together."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Iterator
 from math import cos, radians, sin, tan
+from typing import ClassVar
 
 from pydantic import Field
 
-from studies.scene_error import SceneError
 from studies.scenes.sector import SectorParameters
 
 _TRAVELLING_RETAINER = 1e7  # N/m: stiff against the slip of the flanks, soft against the flanks themselves
 
 
-class Parameters(SectorParameters):
-    """x is the centre line of the sector, y the tangential direction, z the axis of rotation, to the trailing edge.
+class DovetailParameters(SectorParameters):
+    """Parameters of the sector, without its mesh."""
 
-    Radii of the dovetail and of the blade are measured along the centre line.
-    """
+    ASCENDING: ClassVar = (
+        "bore_radius",
+        "hub_radius",
+        "web_inner_radius",
+        "web_outer_radius",
+        "rim_inner_radius",
+        "slot_bottom_radius",
+        "flank_top_radius",
+        "rim_radius",
+        "platform_radius",
+    )
 
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks, -")
     rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together, rpm")
@@ -79,54 +88,18 @@ class Parameters(SectorParameters):
             self.flank_top_half_width + self.flank_length * sin(angle),
         )
 
-
-_ASCENDING = (
-    "bore_radius",
-    "hub_radius",
-    "web_inner_radius",
-    "web_outer_radius",
-    "rim_inner_radius",
-    "slot_bottom_radius",
-    "flank_top_radius",
-    "rim_radius",
-    "platform_radius",
-)
-
-
-def check_parameters(parameters: Parameters) -> None:
-    """Raises SceneError where parameters that are fine one by one do not go together."""
-    p = parameters
-    p.check_wave()
-    bottom_radius, bottom_half_width = p.flank_bottom
-    neck = p.flank_top_half_width
-    shorten = "shorten the flanks or "
-    for wrong, key, remedy in (
-        *(
-            (getattr(p, inner) >= getattr(p, outer), outer, f"make it larger than {inner} = {getattr(p, inner)}")
-            for inner, outer in pairwise(_ASCENDING)
-        ),
-        (
-            bottom_radius <= p.slot_bottom_radius + p.root_clearance,
-            "flank_length",
-            f"{shorten}lower slot_bottom_radius, so that they end above the slot bottom",
-        ),
-        (bottom_half_width <= p.root_clearance, "root_clearance", "make it smaller than the root"),
-        (
-            bottom_half_width >= 0.9 * p.slot_bottom_radius * sin(p.half_pitch),
-            "flank_length",
-            f"{shorten}use fewer sectors, so that a post is left between two slots",
-        ),
-        (
-            neck + p.platform_gap >= p.platform_radius * tan(p.half_pitch),
-            "platform_gap",
-            "make it smaller, the platform vanishes",
-        ),
-        (
-            neck + p.mouth_clearance >= p.rim_radius * sin(p.half_pitch),
-            "mouth_clearance",
-            "make it smaller, the post vanishes",
-        ),
-        (p.fillet_height >= p.blade_length, "fillet_height", "make it smaller than blade_length"),
-    ):
-        if wrong:
-            raise SceneError(key, str(getattr(p, key)), remedy)
+    def impossible(self) -> Iterator[tuple[bool, str, str]]:
+        """As `SectorParameters.impossible`."""
+        (bottom_radius, bottom_half_width), neck = self.flank_bottom, self.flank_top_half_width
+        low = bottom_radius <= self.slot_bottom_radius + self.root_clearance
+        remedy = "shorten the flanks or lower slot_bottom_radius, so that they end above the slot bottom"
+        yield low, "flank_length", remedy
+        yield bottom_half_width <= self.root_clearance, "root_clearance", "make it smaller than the root"
+        wide = bottom_half_width >= 0.9 * self.slot_bottom_radius * sin(self.half_pitch)
+        remedy = "shorten the flanks or use fewer sectors, so that a post is left between two slots"
+        yield wide, "flank_length", remedy
+        none = neck + self.platform_gap >= self.platform_radius * tan(self.half_pitch)
+        yield none, "platform_gap", "make it smaller, the platform vanishes"
+        none = neck + self.mouth_clearance >= self.rim_radius * sin(self.half_pitch)
+        yield none, "mouth_clearance", "make it smaller, the post vanishes"
+        yield self.fillet_height >= self.blade_length, "fillet_height", "make it smaller than blade_length"

@@ -4,20 +4,23 @@ Compliances are of the relative displacement of both bodies under uniform tracti
 normal tractions cause no tangential displacement and the other way round (Johnson, Contact Mechanics, 1985, sections
 2.6, 3.2, 3.6).
 
-Under gross slip the scar grows beyond the unworn contact, without end. Worn flat, a body of radius R lies on the other
-over a half-width b: wear has removed a segment of area `2 b^3 / (3 R)` of a cylinder, a cap of volume `pi b^4 / (4 R)`
-of a sphere, and its depth is `b^2 / (2 R)`. By Archard's law the volume is at most `4 k_w N P s` after N cycles of
-stroke s under the force P.
+Under gross slip the scar grows without end. Worn flat, a body of radius R lies on the other over a half-width b: wear
+has removed a segment of area `2 b^3 / (3 R)` of a cylinder, a cap of volume `pi b^4 / (4 R)` of a sphere, and its depth
+is `b^2 / (2 R)`. By Archard's law the volume is at most `4 k_w N P s` after N cycles of stroke s under the force P.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from abc import abstractmethod
+from typing import ClassVar, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from solver.model import BoolArray, ContactInterface, FloatArray, LinearModel, ReducedModel
+from studies.scene import ExpectedWear, Scene
+from studies.scene_error import SceneError
 
 _HOLDER = 1e-9  # stiffness that holds the body over that of the contact: no result changes by more
 _MARGIN = 1.1
@@ -76,12 +79,101 @@ def patch_compliance(position: FloatArray, width: float, young: float, poisson: 
     return 0.5 * (normal + normal.T), 0.5 * (tangential + tangential.T)
 
 
+class PressedBody(Scene):
+    """A body of radius R that a force P presses on a flat, and a force Q or a stroke moves.
+
+    SCAR: n and c of `b^n = a^n + c R V`, half-width of a scar of the worn volume V, per length of a cylinder.
+    """
+
+    FRICTION_IN_MODEL: ClassVar = True  # the default load and the width of what wears
+    SCAR: ClassVar[tuple[int, float]]
+
+    friction_coefficient: float = Field(0.6, ge=0, description="Coulomb friction coefficient mu, 1")
+    R: float
+    P: float
+    Q: float | None
+    stroke: float | None = Field(
+        None, gt=0, description="amplitude of the prescribed tangential motion in place of Q, m"
+    )
+    E: float = Field(200e9, gt=0, description="Young's modulus of both bodies, Pa")
+    nu: float = Field(0.3, ge=0, lt=0.5, description="Poisson's ratio of both bodies, 1")
+    half_width: float | None
+
+    @model_validator(mode="after")
+    def _check_motion(self) -> Self:
+        if self.Q is not None and self.stroke is not None:
+            raise SceneError("stroke", str(self.stroke), "give Q or stroke, not both")
+        return self
+
+    @property
+    def modulus(self) -> float:
+        """E*, Pa."""
+        return composite_modulus(self.E, self.nu)
+
+    @property
+    def tangential_force(self) -> float:
+        """Amplitude of the tangential force, where no stroke is given; in the unit of P."""
+        return 0.5 * self.friction_coefficient * self.P if self.Q is None else self.Q
+
+    @property
+    def share(self) -> float:
+        """Of the force at which the body slides; 1 for a stroke."""
+        return self.tangential_force / max(self.friction_coefficient * self.P, 1e-300) if self.stroke is None else 1.0
+
+    @property
+    def thickness(self) -> float:
+        """Length over which P and Q are distributed, m; 1 where they are forces."""
+        return 1.0
+
+    @property
+    @abstractmethod
+    def contact(self) -> float:
+        """Half-width a of the unworn contact, m."""
+
+    @property
+    @abstractmethod
+    def patched(self) -> float:
+        """Half-width that pairs cover, m."""
+
+    @abstractmethod
+    def worn_edge(self, stroke: float) -> float:
+        """Half-width, m, over which the bodies touch once a stroke, m, has worn all that it can; inf without end."""
+
+    @abstractmethod
+    def room(self, worn: float) -> float:
+        """Half-width that pairs have to cover, m, where the worn one is given, as far as the model allows."""
+
+    def scar(self, volume: float, depth: float) -> float:
+        """Half-width of what is worn, m, with a margin.
+
+        Where both volume, m3 (m2 of a cylinder), and depth, m, are at most these; inf where neither has an end.
+        """
+        n, form = self.SCAR
+        by_volume = math.pow(self.contact**n + form * self.R * volume, 1.0 / n)
+        return _MARGIN * min(by_volume, math.sqrt(self.contact**2 + 2.0 * self.R * depth))
+
+    def with_room_for_wear(self, expected: ExpectedWear) -> Self:
+        """With the half-width that a stroke needs: where it slides by what is worn, below that by what can be.
+
+        As it is where the half-width is given, wear has no end, or no more is needed than is taken without it.
+        """
+        if self.half_width is not None or self.stroke is None:
+            return self
+        stroke = self.stroke * expected.amplitude
+        volume = min(4.0 * expected.per_slip_work * self.P * stroke, expected.volume / self.thickness)
+        worn = min(self.scar(volume, expected.depth), 1.1 * self.worn_edge(stroke))
+        needed = self.room(worn)
+        if not np.isfinite(worn) or needed <= self.patched:
+            return self
+        return self.model_copy(update={"half_width": round_up(needed)})
+
+
 def press_body(
+    body: PressedBody,
     compliance: tuple[FloatArray, FloatArray],
-    contact: ContactInterface,
-    load: float,
-    force: float | None,
-    stroke: float | None,
+    position: FloatArray,
+    area: FloatArray,
+    edge: BoolArray,
     name: str,
 ) -> ReducedModel:
     """Reduced model; displacements are u_N of all pairs, u_T of all pairs, d, and where a force moves the body, s.
@@ -93,35 +185,31 @@ def press_body(
     the inverse compliances, between the pairs and the one displacement that moves them all. There is no mass: all is
     quasi-static, and the frequency is that of the load alone.
 
-    compliance: normal and tangential one, (n_contact, n_contact), m/N. load: normal force, N. force, stroke: amplitude
-    of the tangential force, N, or of the motion, m, per unit of excitation amplitude; the other is None. name: of the
-    response under a force, which is s. Under a stroke it is u_T of the pair nearest to the middle, "slip".
+    compliance: normal and tangential one, (n_contact, n_contact), m/N. position (n_contact, 3): m, from the middle.
+    area (n_contact,): m2. edge (n_contact,): pairs beside which the half-spaces go on without pairs. name: of the body.
+    The response under a force is s, under a stroke u_T of the pair nearest to the middle, "slip".
     """
-    n = contact.n_contact
+    n = len(area)
     normal, tangential = (np.asarray(np.linalg.inv(each), np.float64) for each in compliance)
-    moved = force is not None
+    moved = body.stroke is None
     stiffness = np.zeros((2 * n + 1 + moved, 2 * n + 1 + moved))
     _join(stiffness, np.arange(n), 2 * n, normal)
     load_static, load_harmonic = np.zeros((2, len(stiffness)))
-    load_static[2 * n] = load
+    load_static[2 * n] = body.P * body.thickness
     response = np.zeros((1, len(stiffness)))
-    if force is not None:
+    if body.stroke is None:
         _join(stiffness, np.arange(n, 2 * n), 2 * n + 1, tangential)
-        load_harmonic[2 * n + 1] = force
+        load_harmonic[2 * n + 1] = body.tangential_force * body.thickness
         response[0, 2 * n + 1] = 1.0
     else:
-        assert stroke is not None
         stiffness[n : 2 * n, n : 2 * n] = 0.5 * (tangential + tangential.T)
-        load_harmonic[n : 2 * n] = stroke * tangential.sum(axis=1)
-        response[0, n + int(np.argmin(np.linalg.norm(contact.position, axis=1)))] = 1.0
-    linear = LinearModel(
-        mass=np.zeros_like(stiffness),
-        damping=np.zeros_like(stiffness),
-        stiffness=stiffness,
-        load_static=load_static,
-        load_harmonic=load_harmonic.astype(np.complex128),
-        response=response,
-    )
+        load_harmonic[n : 2 * n] = body.stroke * tangential.sum(axis=1)
+        response[0, n + int(np.argmin(np.linalg.norm(position, axis=1)))] = 1.0
+    nothing = np.zeros_like(stiffness)
+    linear = LinearModel(nothing, nothing, stiffness, load_static, load_harmonic.astype(np.complex128), response)
+    dofs = np.stack([np.arange(n), np.arange(n, 2 * n), np.full(n, -1)], axis=1)
+    gap = (position**2).sum(axis=1) / (2.0 * body.R)
+    contact = ContactInterface(dofs, area, gap, np.zeros(n), position, (f"flat/{name}",) * n, edge=edge)
     return ReducedModel({0: linear}, contact, (name if moved else "slip",))
 
 
@@ -131,52 +219,6 @@ def _join(stiffness: FloatArray, pairs: np.ndarray, body: int, joint: FloatArray
     stiffness[np.ix_(pairs, pairs)] = joint
     stiffness[pairs, body] = stiffness[body, pairs] = -joint.sum(axis=1)
     stiffness[body, body] = (1.0 + _HOLDER) * joint.sum()
-
-
-def pairs_of_patches(
-    position: FloatArray, area: FloatArray, gap: FloatArray, surface: str, edge: BoolArray
-) -> ContactInterface:
-    """Pairs with a closing and one tangential displacement; position (n_contact, 3), m, area, m2, and gap, m.
-
-    edge (n_contact,): those beside which the half-spaces go on without pairs.
-    """
-    n = len(area)
-    dofs = np.stack([np.arange(n), np.arange(n, 2 * n), np.full(n, -1)], axis=1)
-    return ContactInterface(dofs, area, gap, np.zeros(n), position, (surface,) * n, edge=edge)
-
-
-@dataclass(frozen=True)
-class ExpectedWear:
-    """What a study wears at most.
-
-    amplitude: largest excitation amplitude. per_slip_work: largest `k_w N`, m3/J: volume worn over slip work of a
-    cycle; inf where cycles have no end. volume, m3, and depth, m: at which the wear ends, inf where they end nothing.
-    """
-
-    amplitude: float
-    per_slip_work: float
-    volume: float = math.inf
-    depth: float = math.inf
-
-
-@dataclass(frozen=True)
-class Scar:
-    """Half-width of a worn contact, m. radius: R, m. contact: a, m, of the unworn one.
-
-    exponent, form: n and c of `b^n = a^n + c R V`.
-    """
-
-    radius: float
-    contact: float
-    exponent: int
-    form: float
-
-    def half_width(self, volume: float, depth: float) -> float:
-        """Where both volume, m3, and depth, m, are at most these: with a margin; inf where neither has an end."""
-        n = self.exponent
-        by_volume = math.pow(self.contact**n + self.form * self.radius * volume, 1.0 / n)
-        by_depth = math.sqrt(self.contact**2 + 2.0 * self.radius * depth)
-        return _MARGIN * min(by_volume, by_depth)
 
 
 def round_up(width: float) -> float:

@@ -8,27 +8,167 @@ stops, the motion is that of Den Hartog, Trans. ASME 53 (1931).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from solver.contact.wear_law import wearing_work
-from solver.model import ReducedModel
+from solver.contact.wear_law import WearingWork, wearing_work
+from solver.model import FloatArray, ReducedModel
 from solver.model_from_matrices import build_model
-from studies.contact_compliance import ContactStiffness
-from studies.scene_answers import ExactAnswer, WearQuestion, unknown_answer
-from studies.scenes.den_hartog import DenHartogSlider, WearingSlider
+from studies.scene import ExactAnswer, Scene, WearQuestion
+
+_SINGULAR = 1e-9  # 1/r beside an odd number, where G has no bound
+_POINTS = 4001  # in a half period, among which the slowest moment of the motion is sought
+_STEPS = 64  # at least, from the first cycle to the last
+_LEAST_FORCE = 1e-200  # of the first one: any number that can be divided by
+_KNOWN = {"scene.worn", *(f"axes.{key}" for key in ("frequency", "wear_coefficient", "excitation_amplitude"))}
+_KNOWN |= {f"wear.{key}" for key in ("law", "threshold", "pressure", "depth", "factor", "surfaces")}
+"""Keys of a study, beside the parameters of the scene, on which the exact answer depends."""
 
 
-class Parameters(BaseModel):
+@dataclass(frozen=True)
+class DenHartogSlider:
+    """Den Hartog's closed form: a mass on a spring under a harmonic force with rigid Coulomb friction, without stops.
+
+    With r = omega / omega_0, V = 1 / (1 - r^2) and G = tan(pi / (2 r)) / r the amplitude is
+
+        X = sqrt(V^2 - (F_f / F)^2 G^2) F / k.
+
+    From the turn at x = X on the friction force is F_f against the motion for half a period, so that with theta =
+    omega t from there, the force F cos(theta + phi), cos(phi) = X k / (F V) and sin(phi) = -(F_f / F) G / V, the first
+    harmonic is
+
+        x_1 = X cos(theta) + (F_f / k) (G + 4 V / pi) sin(theta).
+
+    mass, kg; stiffness, N/m; force: amplitude, N; omega: rad/s.
+    """
+
+    mass: float
+    stiffness: float
+    force: float
+    omega: float
+
+    @property
+    def ratio(self) -> float:
+        """r, the frequency over the natural one."""
+        return float(self.omega / np.sqrt(self.stiffness / self.mass))
+
+    @cached_property
+    def _factors(self) -> tuple[float, float]:
+        """V and G."""
+        return 1.0 / (1.0 - self.ratio**2), float(np.tan(0.5 * np.pi / self.ratio)) / self.ratio
+
+    def holds(self, friction_force: float) -> bool:
+        """Whether the mass never stops under this friction force, N; less friction does not stop it either.
+
+        With tau = omega_0 t from the turn x' = -r X sin(r tau) + (F_f / k) (sin(tau) + r G (cos(r tau) - cos(tau))),
+        which has to stay negative until the next turn: X > S F_f / k, S the largest ratio of the two functions of tau.
+        """
+        singular = self.ratio == 1.0 if friction_force == 0.0 else abs((1.0 / self.ratio) % 2.0 - 1.0) < _SINGULAR
+        if singular:
+            return False
+        if friction_force == 0.0:
+            return True
+        v, g = self._factors
+        square = v**2 - (friction_force / self.force * g) ** 2
+        return square > 0.0 and float(np.sqrt(square)) * self.force > self._needed * friction_force
+
+    @cached_property
+    def _needed(self) -> float:
+        """S; at tau = 0, where spring and force have to overcome the friction, the ratio is 1 / r^2."""
+        from scipy.optimize import minimize_scalar  # where it is used: it takes a while to load
+
+        r, (_, g) = self.ratio, self._factors
+
+        def ratio(tau: FloatArray) -> FloatArray:
+            return np.asarray((np.sin(tau) + r * g * (np.cos(r * tau) - np.cos(tau))) / (r * np.sin(r * tau)))
+
+        taus = np.linspace(0.0, np.pi / r, _POINTS)[1:-1]
+        best = int(np.argmax(ratio(taus)))
+        around = (taus[max(best - 1, 0)], taus[min(best + 1, len(taus) - 1)])
+        inside = minimize_scalar(lambda tau: -ratio(tau), bounds=around, method="bounded", options={"xatol": 1e-12})
+        return max(1.0 / r**2, -float(inside.fun))
+
+    def amplitude(self, friction_force: FloatArray) -> FloatArray:
+        """Largest displacement X, m, where the form holds."""
+        v, g = self._factors
+        return np.asarray(np.sqrt(v**2 - (friction_force / self.force * g) ** 2) * self.force / self.stiffness)
+
+    def first_harmonic(self, friction_force: FloatArray) -> FloatArray:
+        """Amplitude of the first harmonic of the displacement, m, where the form holds."""
+        v, g = self._factors
+        return np.hypot(self.amplitude(friction_force), friction_force / self.stiffness * (g + 4.0 / np.pi * v))
+
+
+@dataclass(frozen=True)
+class WearingSlider:
+    """The slider with one pair that wears; a spring presses the pair, or a constant force.
+
+    mu: friction coefficient. load: normal force at the start, N. normal_stiffness: k_N of the spring, N/m; 0 for a
+    constant force. area: m2. work: part of the slip work that wears, of the only pair.
+    """
+
+    slider: DenHartogSlider
+    mu: float
+    load: float
+    normal_stiffness: float
+    area: float
+    work: WearingWork
+
+    def worn(self, sliding: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Depth worn since the start, m, and normal force, N, at each sliding (n,), 1/Pa, ascending from 0 or above.
+
+        Sliding: s, wear coefficient times cycle count. The depth W follows `dW/ds = X(S, N / area, W) / area` with the
+        normal force `N = load - k_N W`, the slip work of a cycle `S = 4 N X_0(mu N)`, X_0 the amplitude of the motion,
+        and the wearing work X of the law (`solver.contact.wear_law`). With a spring the unknown is z = ln(N / load),
+        `dz/ds = -(k_N / area) X / N`, which stays calm however much is worn.
+        """
+        if self.load <= 0.0:
+            return np.zeros_like(sliding), np.zeros_like(sliding)
+        if self.normal_stiffness <= 0.0:
+            depth = _integrated(lambda w: self._rate(self.load, w) * self.load, sliding)
+            return depth, np.full_like(sliding, self.load)
+
+        def fall(z: float) -> float:
+            depth = -np.expm1(z) * self.load / self.normal_stiffness
+            return -self.normal_stiffness * self._rate(self.load * max(np.exp(z), _LEAST_FORCE), depth)
+
+        z = _integrated(fall, sliding)
+        return np.abs(np.expm1(z)) * self.load / self.normal_stiffness, self.load * np.exp(z)
+
+    def _rate(self, force: float, depth: float) -> float:
+        """`dW/ds` over the normal force, 1/N m: of the force, N, and the depth, m."""
+        slip_work = 4.0 * force * float(self.slider.amplitude(np.array(self.mu * force)))
+        worn = self.work.work(np.array([slip_work]), np.array([force]), np.array([depth]))
+        return float(worn[0]) / force / self.area
+
+
+def _integrated(rate: Callable[[float], float], sliding: FloatArray) -> FloatArray:
+    """The solution y (n,) of `dy/ds = rate(y)`, y(0) = 0, at ascending s (n,) from 0 or above."""
+    from scipy.integrate import solve_ivp  # where it is used: it takes a while to load
+
+    found, fastest, later = np.zeros_like(sliding), abs(rate(0.0)), sliding > 0.0
+    if fastest > 0.0 and later.any():
+        end = float(sliding[-1])
+        # between two steps the solution is interpolated, with an error that the tolerance does not bound
+        limits = {"rtol": 1e-11, "atol": 1e-13 * fastest * float(sliding[later][0]), "max_step": end / _STEPS}
+        wearing = solve_ivp(lambda _, y: [rate(float(y[0]))], (0.0, end), [0.0], "DOP853", sliding[later], **limits)
+        found[later] = wearing.y[0]
+    return found
+
+
+class Parameters(Scene):
     """The defaults resonate at 201.3 Hz without friction.
 
     With 10 N at 160 Hz the mass never stops, and 1e5 cycles at 1.1e-11 1/Pa wear off half of the normal force.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    OFFERS: ClassVar = ("exact",)
 
-    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, 1")
-    contact_stiffness: ContactStiffness = None
     mass: float = Field(0.1, gt=0, description="mass, kg")
     damping: float = Field(0.0, ge=0, description="viscous damping of the mount, N s/m")
     stiffness: float = Field(1.6e5, gt=0, description="tangential stiffness of the mount, N/m")
@@ -38,61 +178,47 @@ class Parameters(BaseModel):
     )
     area: float = Field(1e-4, gt=0, description="contact area, m2")
 
+    def reduced_model(self) -> ReducedModel:
+        """The response is the displacement of the mass, on which the load acts.
 
-def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
-    """Reduced model: the response is the displacement of the mass, the unit harmonic load acts on the mass.
+        With a spring the closing displacement of the pair comes before that of the mass: a massless degree of freedom,
+        pressed by `normal_load`.
+        """
+        mass, damping, stiffness = (np.diag(each) for each in (
+            (0.0, self.mass), (0.0, self.damping), (self.normal_stiffness, self.stiffness)
+        ))  # fmt: skip
+        sprung = self.normal_stiffness > 0
+        own = slice(0 if sprung else 1, None)  # with the closing displacement, or without it
+        return build_model(
+            mass[own, own],
+            damping[own, own],
+            stiffness[own, own],
+            [[0, 1, -1]] if sprung else [[-1, 0, -1]],
+            self.area,
+            load_harmonic=np.array([0.0, 1.0])[own],
+            load_static=np.array([self.normal_load, 0.0]) if sprung else None,
+            response=np.array([[0.0, 1.0]])[:, own],
+            normal_load=0.0 if sprung else self.normal_load,
+            surface=("support",),
+            response_names=("mass",),
+        )
 
-    With a constant normal force the only displacement is that of the mass. With a spring the closing displacement of
-    the pair comes before it: a massless degree of freedom, pressed by `normal_load`. `n_harmonics` has no influence:
-    all harmonics see the same structure.
-    """
-    del n_harmonics
-    p = parameters
-    mass, damping, stiffness = (np.diag(each) for each in (
-        (0.0, p.mass), (0.0, p.damping), (p.normal_stiffness, p.stiffness)
-    ))  # fmt: skip
-    sprung = p.normal_stiffness > 0
-    own = slice(0 if sprung else 1, None)  # with the closing displacement, or without it
-    return build_model(
-        mass[own, own],
-        damping[own, own],
-        stiffness[own, own],
-        [[0, 1, -1]] if sprung else [[-1, 0, -1]],
-        p.area,
-        load_harmonic=np.array([0.0, 1.0])[own],
-        load_static=np.array([p.normal_load, 0.0]) if sprung else None,
-        response=np.array([[0.0, 1.0]])[:, own],
-        normal_load=0.0 if sprung else p.normal_load,
-        surface=("support",),
-        response_names=("mass",),
-    )
+    def exact_answer(self, asked: WearQuestion) -> ExactAnswer:
+        """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
 
-
-_OF_SCENE = "friction_coefficient", "mass", "stiffness", "normal_load", "normal_stiffness", "area", "worn"
-_OF_WEAR = "law", "threshold", "pressure", "depth", "factor", "surfaces"
-_OF_AXES = "frequency", "wear_coefficient", "excitation_amplitude"
-_KNOWN = {"scene": _OF_SCENE, "wear": _OF_WEAR, "axes": _OF_AXES}
-EXACT_ANSWER_KNOWS = frozenset(f"{table}.{key}" for table, keys in _KNOWN.items() for key in keys)
-"""Keys of a study on which `exact_answer` depends; a damped mount or a compliant contact has no closed form."""
-
-
-def exact_answer(parameters: Parameters, asked: WearQuestion) -> ExactAnswer:
-    """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
-
-    NaN where the mass stops on its way, or the frequency is one of the singular ones of the form.
-    """
-    p = parameters
-    load = p.normal_load - p.normal_stiffness * asked.worn_depth
-    slider = DenHartogSlider(p.mass, p.stiffness, asked.excitation_amplitude, 2.0 * np.pi * asked.frequency)
-    if not slider.holds(p.friction_coefficient * max(load, 0.0)):
-        return unknown_answer(asked, 1)
-    law, contact = asked.law.begun_at(np.array([asked.worn_depth])), build(p, 1).contact
-    work = wearing_work(law, contact, np.array([p.friction_coefficient]))
-    # the worn state depends on wear coefficient and cycle count through their product alone
-    sliding = np.multiply.outer(asked.wear_coefficients, asked.cycles)
-    different, places = np.unique(sliding, return_inverse=True)
-    pair = WearingSlider(slider, p.friction_coefficient, load, p.normal_stiffness, p.area, work)
-    depth, force = pair.worn(different)
-    response = slider.first_harmonic(p.friction_coefficient * force)
-    places = places.reshape(sliding.shape)
-    return ExactAnswer(p.area * depth[places], response[places][..., np.newaxis])
+        NaN where the mass stops on its way, the frequency is one of the singular ones of the form, the mount is damped
+        or the contact compliant, or a key of the study is changed that the form does not know.
+        """
+        mu, load = self.friction_coefficient, self.normal_load - self.normal_stiffness * asked.worn_depth
+        slider = DenHartogSlider(self.mass, self.stiffness, asked.excitation_amplitude, 2.0 * np.pi * asked.frequency)
+        # the worn state depends on wear coefficient and cycle count through their product alone
+        sliding = np.multiply.outer(asked.wear_coefficients, asked.cycles)
+        known = self.damping == 0.0 and self.contact_stiffness is None and asked.changed <= _KNOWN
+        if not (known and slider.holds(mu * max(load, 0.0))):
+            return ExactAnswer(np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan))
+        law, contact = asked.law.begun_at(np.array([asked.worn_depth])), self.reduced_model().contact
+        different, places = np.unique(sliding, return_inverse=True)
+        work = wearing_work(law, contact, np.array([mu]))
+        depth, force = WearingSlider(slider, mu, load, self.normal_stiffness, self.area, work).worn(different)
+        response, places = slider.first_harmonic(mu * force), places.reshape(sliding.shape)
+        return ExactAnswer(self.area * depth[places], response[places][..., np.newaxis])

@@ -1,40 +1,41 @@
-"""What the scenes of bladed disks have in common: parameters of a sector, its bodies in blocks, its functions."""
+"""What the scenes of bladed disks have in common: parameters of a sector, its bodies in blocks, its reduction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import pi
-from typing import TypeVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray, ReducedModel
-from studies.contact_compliance import ContactStiffness
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions
-from studies.finite_element.reduced_joint import build_fe_scene, natural_frequencies, prepare_model
+from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.finite_element.surfaces import describe_mesh
-from studies.scene_answers import NaturalFrequencies, SurfaceMesh
+from studies.scene import N_MODES, NaturalFrequencies, Scene, SurfaceMesh
 from studies.scene_error import SceneError
 
 _SAME_NODE = 1e-9  # points closer than this, in m, are one node
 AXIS, ORIGIN = np.array([0.0, 0.0, 1.0]), np.zeros(3)
 
 
-class SectorParameters(BaseModel):
-    """Parameters that every sector has. SI units, except rotation speed and angles."""
+class SectorParameters(Scene):
+    """Parameters that every sector has. SI units, except rotation speed and angles.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    ASCENDING: radii, from the inside to the outside.
+    """
 
-    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, -")
-    contact_stiffness: ContactStiffness = None
+    OFFERS: ClassVar = ("mesh",)
+    ASCENDING: ClassVar[tuple[str, ...]]
+
     rotation_speed: float = Field(3000.0, ge=0, description="speed of rotation, rpm")
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades, -")
     loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
@@ -52,11 +53,6 @@ class SectorParameters(BaseModel):
         return pi / self.n_sectors
 
     @property
-    def angular_speed(self) -> float:
-        """Speed of rotation, rad/s."""
-        return pi * self.rotation_speed / 30.0
-
-    @property
     def axis(self) -> CyclicAxis:
         """The axis of the disk, z."""
         return CyclicAxis(self.n_sectors, ORIGIN, AXIS)
@@ -66,45 +62,61 @@ class SectorParameters(BaseModel):
         """That of disk and blades."""
         return Material(self.young_modulus, self.poisson_ratio, self.density)
 
+    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+        """The sector as a finite-element model, and what is done with it.
+
+        Raises SceneError where the parameters do not go together.
+        """
+        raise NotImplementedError
+
+    def impossible(self) -> Iterator[tuple[bool, str, str]]:
+        """Whether parameters that are fine one by one do not go together, which one, and what would be right."""
+        raise NotImplementedError
+
+    def check(self) -> None:
+        """Raises SceneError where parameters do not go together."""
+        most = f"use at most n_sectors // 2 = {self.n_sectors // 2}; more is the same wave turning the other way"
+        wave = (self.nodal_diameter > self.n_sectors // 2, "nodal_diameter", most)
+        radii = (
+            (
+                getattr(self, inner) >= getattr(self, outer),
+                outer,
+                f"make it larger than {inner} = {getattr(self, inner)}",
+            )
+            for inner, outer in pairwise(self.ASCENDING)
+        )
+        for wrong, key, remedy in (wave, *radii, *self.impossible()):
+            if wrong:
+                raise SceneError(key, str(getattr(self, key)), remedy)
+
     def model_of(self, mesh: SolidMesh) -> MeshModel:
         """The turning mesh."""
-        rotation = Rotation(self.angular_speed**2, ORIGIN, AXIS) if self.rotation_speed else None
+        rotation = Rotation((pi * self.rotation_speed / 30.0) ** 2, ORIGIN, AXIS) if self.rotation_speed else None
         return MeshModel(mesh, rotation, self.stress_stiffening)
 
-    def check_wave(self) -> None:
-        """Raises SceneError where the ring has no such nodal diameter."""
-        if self.nodal_diameter > self.n_sectors // 2:
-            remedy = f"use at most n_sectors // 2 = {self.n_sectors // 2}; more is the same wave turning the other way"
-            raise SceneError("nodal_diameter", str(self.nodal_diameter), remedy)
+    def build(self, n_harmonics: int) -> ReducedModel:
+        """As `build_fe_scene`.
 
+        Stress stiffening takes the stress of the sector with its contacts glued, the usual reference state of a modal
+        analysis with prestress: in the blade it follows from equilibrium alone, and how the contacts share the load
+        matters only beside them. With spin softening it is part of every stiffness, the static one included.
+        """
+        options = ReductionOptions(self.nodal_diameter, self.stuck_modes, self.loss_factor)
+        return build_fe_scene(*self.define_sector(), options, n_harmonics).model
 
-Sector = tuple[MeshModel, JointDefinition]
-P = TypeVar("P", bound=SectorParameters)
+    def describe_mesh(self) -> SurfaceMesh:
+        """Outer faces of the sector."""
+        return describe_mesh(self.define_sector()[0].mesh)
 
-
-def functions_of(
-    define_sector: Callable[[P], Sector],
-) -> tuple[Callable[[P, int], ReducedModel], Callable[[P], SurfaceMesh], Callable[[P], NaturalFrequencies]]:
-    """Functions `build`, `describe_mesh` and `natural_frequencies` of a scene, see `studies.scenes`.
-
-    build: as `build_fe_scene`. Stress stiffening takes the stress of the sector with its contacts glued, the usual
-    reference state of a modal analysis with prestress: in the blade it follows from equilibrium alone, and how the
-    contacts share the load matters only beside them. With spin softening it is part of every stiffness, the static one
-    included. describe_mesh: outer faces of the sector. natural_frequencies: with all contacts glued, at all nodal
-    diameters 0..N/2. All raise SceneError where the parameters do not go together.
-    """
-
-    def build(parameters: P, n_harmonics: int) -> ReducedModel:
-        options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-        return build_fe_scene(*define_sector(parameters), options, n_harmonics).model
-
-    def mesh(parameters: P) -> SurfaceMesh:
-        return describe_mesh(define_sector(parameters)[0].mesh)
-
-    def frequencies(parameters: P) -> NaturalFrequencies:
-        return natural_frequencies(prepare_model(*define_sector(parameters)), parameters.n_sectors)
-
-    return build, mesh, frequencies
+    def natural_frequencies(self, model: ReducedModel) -> NaturalFrequencies:
+        """With all contacts glued, at all nodal diameters 0..N/2; of a compliant contact those of the model."""
+        if self.contact_stiffness is not None:
+            return super().natural_frequencies(model)
+        prepared, found = prepare_model(*self.define_sector()), np.full((self.n_sectors // 2 + 1, N_MODES), np.nan)
+        for k, row in enumerate(found):
+            own = glued_frequencies(prepared, k, N_MODES)
+            row[: len(own)] = own
+        return NaturalFrequencies(tuple(range(len(found))), found)
 
 
 def mesh_of_bodies(
@@ -157,10 +169,12 @@ def block_of(
     """Points (n_radial, n_tangential, n_axial, 3) of a block.
 
     radii, angles (n_radial, n_tangential), or what broadcasts to it: m, and rad about the axis in the middle of the
-    width. axial (n_axial,): m. inclined (n_radial,): angle of the lines along the width to the axis, degrees.
+    width. axial (n_axial,) or (n_radial, n_axial): m. inclined (n_radial,): angle of the lines along the width to the
+    axis, degrees.
     """
     radii, angles = np.broadcast_arrays(radii, angles)
+    along = np.broadcast_to(axial, (len(radii), np.shape(axial)[-1]))[:, None]
     slope = np.tan(np.radians(np.broadcast_to(inclined, len(radii))))[:, None] / radii
-    around = angles[:, :, None] + slope[:, :, None] * axial
+    around = angles[:, :, None] + slope[:, :, None] * along
     radius = radii[:, :, None]
-    return np.stack([radius * np.cos(around), radius * np.sin(around), np.broadcast_to(axial, around.shape)], axis=-1)
+    return np.stack([radius * np.cos(around), radius * np.sin(around), np.broadcast_to(along, around.shape)], axis=-1)

@@ -12,7 +12,9 @@ second tangent. A mesh of density m has 4 m axial x (m + 1) pairs.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import cos, radians, sin
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -20,21 +22,15 @@ from pydantic import Field
 from solver.model import FloatArray
 from studies.finite_element import surfaces
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import JointDefinition, SetMotion
+from studies.finite_element.joint_model import JointDefinition, MeshModel, SetMotion
 from studies.finite_element.pairing import ContactSurfaces
-from studies.scene_error import SceneError
-from studies.scenes.sector import (
-    Sector,
-    SectorParameters,
-    block_of,
-    functions_of,
-    graded,
-    mesh_of_bodies,
-)
+from studies.scenes.sector import SectorParameters, block_of, graded, mesh_of_bodies
 
 
 class Parameters(SectorParameters):
     """One sector of a shrouded bladed disk. SI units, except rotation speed and angles."""
+
+    ASCENDING: ClassVar = ("bore_radius", "rim_radius")
 
     friction_coefficient: float = Field(0.3, ge=0, description="Coulomb friction coefficient of the shrouds, -")
     interference: float = Field(
@@ -50,68 +46,55 @@ class Parameters(SectorParameters):
     shroud_angle: float = Field(35.0, ge=-60, le=60, description="angle of blade and contact faces at the tip, degrees")
     shroud_thickness: float = Field(0.006, gt=0, description="radial thickness of the shroud, m")
 
-    @property
-    def tip_radius(self) -> float:
-        """Inner radius of the shroud, m."""
-        return self.rim_radius + self.blade_length
+    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+        """The sector as a finite-element model, and what is done with it.
 
+        Raises SceneError where the parameters do not go together.
+        """
+        self.check()
+        m, angle = self.mesh, radians(self.shroud_angle)
+        solid, (disk, _, shroud) = mesh_of_bodies([(self._blocks(), ("disk", "blade", "shroud"), self.material)])
+        held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
+        held[disk[0].ravel()] = True
+        middle = shroud[-1, m : m + 2, 2 * m - 1 : 2 * m + 1].ravel()
+        tip = SetMotion(middle, np.array([0.0, cos(angle), -sin(angle)]))
+        leading = surfaces.surface_of_nodes(solid, "leading face", shroud[:, -1].ravel())
+        trailing = surfaces.surface_of_nodes(solid, "trailing face", shroud[:, 0].ravel())
+        joint = JointDefinition(
+            contacts=(ContactSurfaces(leading, trailing, clearance=-self.interference, label="shroud", sector=1),),
+            held=held,
+            load=tip,
+            responses={"tip": tip},
+            cut=CutFaces(self.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
+        )
+        return self.model_of(solid), joint
 
-def define_sector(parameters: Parameters) -> Sector:
-    """The sector as a finite-element model, and what is done with it.
-
-    Raises SceneError where the parameters do not go together.
-    """
-    _check(parameters)
-    p, m = parameters, parameters.mesh
-    solid, (disk, _, shroud) = mesh_of_bodies([(_blocks(p), ("disk", "blade", "shroud"), p.material)])
-    held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
-    held[disk[0].ravel()] = True
-    angle = radians(p.shroud_angle)
-    middle = shroud[-1, m : m + 2, 2 * m - 1 : 2 * m + 1].ravel()
-    tip = SetMotion(middle, np.array([0.0, cos(angle), -sin(angle)]))
-    leading = surfaces.surface_of_nodes(solid, "leading face", shroud[:, -1].ravel())
-    trailing = surfaces.surface_of_nodes(solid, "trailing face", shroud[:, 0].ravel())
-    joint = JointDefinition(
-        contacts=(ContactSurfaces(leading, trailing, clearance=-p.interference, label="shroud", sector=1),),
-        held=held,
-        load=tip,
-        responses={"tip": tip},
-        cut=CutFaces(p.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
-    )
-    return p.model_of(solid), joint
-
-
-def _check(parameters: Parameters) -> None:
-    p = parameters
-    p.check_wave()
-    if p.bore_radius >= p.rim_radius:
-        raise SceneError("rim_radius", str(p.rim_radius), f"make it larger than bore_radius = {p.bore_radius}")
-    if _blade_half_angle(p, p.rim_radius, p.root_angle) > 0.9 * p.half_pitch:
+    def impossible(self) -> Iterator[tuple[bool, str, str]]:
+        """As `SectorParameters.impossible`."""
+        wide = self._blade_half_angle(self.rim_radius, self.root_angle) > 0.9 * self.half_pitch
         remedy = "make it thinner, or use fewer blades, so that there is room between the blades"
-        raise SceneError("blade_thickness", str(p.blade_thickness), remedy)
+        yield wide, "blade_thickness", remedy
 
+    def _blade_half_angle(self, radius: float, angle: float) -> float:
+        """Half of the thickness of the blade as an angle about the axis, rad; angle: to the axis, degrees."""
+        return 0.5 * self.blade_thickness / (radius * cos(radians(angle)))
 
-def _blade_half_angle(parameters: Parameters, radius: float, angle: float) -> float:
-    """Half of the thickness of the blade as an angle about the axis, rad; angle: of the blade to the axis, degrees."""
-    return 0.5 * parameters.blade_thickness / (radius * cos(radians(angle)))
-
-
-def _blocks(parameters: Parameters) -> list[FloatArray]:
-    """Disk, blade and shroud. Both cut faces are inclined alike, so that they are images of each other."""
-    p, m = parameters, parameters.mesh
-    half, foot = p.half_pitch, _blade_half_angle(p, p.rim_radius, p.root_angle)
-    tip = _blade_half_angle(p, p.tip_radius, p.shroud_angle)
-    disk, blade = graded([p.bore_radius, p.rim_radius], [4 * m]), graded([p.rim_radius, p.tip_radius], [8 * m])
-    shroud = graded([p.tip_radius, p.tip_radius + p.shroud_thickness], [m])
-    share = (blade - p.rim_radius) / p.blade_length
-    thickness, turned = foot + share * (tip - foot), p.root_angle + share * (p.shroud_angle - p.root_angle)
-    axial = p.width * np.linspace(-0.5, 0.5, 4 * m)
-    around_foot, around_tip = (graded([-half, -each, each, half], [m, 1, m]) for each in (foot, tip))
-    return [
-        block_of(disk[:, None], around_foot, axial, p.root_angle * (disk - disk[0]) / np.ptp(disk)),
-        block_of(blade[:, None], np.outer(thickness, [-1.0, 1.0]), axial, turned),
-        block_of(shroud[:, None], around_tip, axial, p.shroud_angle),
-    ]
-
-
-build, describe_mesh, natural_frequencies = functions_of(define_sector)
+    def _blocks(self) -> list[FloatArray]:
+        """Disk, blade and shroud. Both cut faces are inclined alike, so that they are images of each other."""
+        m, half, axial = self.mesh, self.half_pitch, self.width * np.linspace(-0.5, 0.5, 4 * self.mesh)
+        tip_radius = self.rim_radius + self.blade_length
+        foot = self._blade_half_angle(self.rim_radius, self.root_angle)
+        tip = self._blade_half_angle(tip_radius, self.shroud_angle)
+        disk, blade = (
+            graded([self.bore_radius, self.rim_radius], [4 * m]),
+            graded([self.rim_radius, tip_radius], [8 * m]),
+        )
+        shroud = graded([tip_radius, tip_radius + self.shroud_thickness], [m])
+        share = (blade - self.rim_radius) / self.blade_length
+        thickness, turned = foot + share * (tip - foot), self.root_angle + share * (self.shroud_angle - self.root_angle)
+        around_foot, around_tip = (graded([-half, -each, each, half], [m, 1, m]) for each in (foot, tip))
+        return [
+            block_of(disk[:, None], around_foot, axial, self.root_angle * (disk - disk[0]) / np.ptp(disk)),
+            block_of(blade[:, None], np.outer(thickness, [-1.0, 1.0]), axial, turned),
+            block_of(shroud[:, None], around_tip, axial, self.shroud_angle),
+        ]

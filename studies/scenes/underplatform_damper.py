@@ -13,7 +13,9 @@ second tangent (up or down the roof). A mesh of density m has 4 m axial x (m + 1
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import cos, radians, sin, tan
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -22,22 +24,15 @@ from solver.model import FloatArray
 from studies.finite_element import surfaces
 from studies.finite_element.cut_faces import CutFaces
 from studies.finite_element.element_matrices import Material
-from studies.finite_element.joint_model import JointDefinition, Retainer, SetMotion
+from studies.finite_element.joint_model import JointDefinition, MeshModel, Retainer, SetMotion
 from studies.finite_element.pairing import ContactSurfaces
-from studies.scene_error import SceneError
-from studies.scenes.sector import (
-    AXIS,
-    Sector,
-    SectorParameters,
-    block_of,
-    functions_of,
-    graded,
-    mesh_of_bodies,
-)
+from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
 
 
 class Parameters(SectorParameters):
     """One sector of a bladed disk with an underplatform damper. SI units, except rotation speed and angles."""
+
+    ASCENDING: ClassVar = ("bore_radius", "rim_radius", "platform_radius")
 
     friction_coefficient: float = Field(0.3, ge=0, description="Coulomb friction coefficient of the wedge, -")
     rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the wedge, rpm")
@@ -63,108 +58,90 @@ class Parameters(SectorParameters):
         """Radial height of the roof over the sides of the wedge, m."""
         return (self.damper_half_width - 0.5 * self.platform_gap) * tan(radians(self.roof_angle))
 
+    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+        """The sector as a finite-element model, and what is done with it.
 
-def define_sector(parameters: Parameters) -> Sector:
-    """The sector as a finite-element model, and what is done with it.
+        Raises SceneError where the parameters do not go together.
+        """
+        self.check()
+        m, angle = self.mesh, radians(self.tip_angle)
+        blade_body = (self._blade_body(), ("disk", "shank", "platform", "blade"), self.material)
+        wedge_material = Material(self.young_modulus, self.poisson_ratio, self.damper_density)
+        solid, grids = mesh_of_bodies([blade_body, ([self._wedge()], ("wedge",), wedge_material)])
+        disk, _, platform, blade, wedge = grids
+        held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
+        held[disk[0].ravel()] = True
+        tip = SetMotion(blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)]))
 
-    Raises SceneError where the parameters do not go together.
-    """
-    _check(parameters)
-    p, m = parameters, parameters.mesh
-    blade_body = (_blade_body(p), ("disk", "shank", "platform", "blade"), p.material)
-    wedge_body = ([_wedge(p)], ("wedge",), Material(p.young_modulus, p.poisson_ratio, p.damper_density))
-    solid, grids = mesh_of_bodies([blade_body, wedge_body])
-    disk, _, platform, blade, wedge = grids
-    held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
-    held[disk[0].ravel()] = True
-    angle = radians(p.tip_angle)
-    tip = SetMotion(blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)]))
+        def contact(label: str, own: slice, other: slice, sector: int) -> ContactSurfaces:
+            first = surfaces.surface_of_nodes(solid, f"roof, {label}", wedge[-1, own].ravel())
+            second = surfaces.surface_of_nodes(solid, f"underside, {label}", platform[0, other].ravel())
+            return ContactSurfaces(first, second, label=label, sector=sector)
 
-    def contact(label: str, own: slice, other: slice, sector: int) -> ContactSurfaces:
-        first = surfaces.surface_of_nodes(solid, f"roof, {label}", wedge[-1, own].ravel())
-        second = surfaces.surface_of_nodes(solid, f"underside, {label}", platform[0, other].ravel())
-        return ContactSurfaces(first, second, label=label, sector=sector)
+        joint = JointDefinition(
+            contacts=(
+                contact("this platform", slice(m + 1), slice(-m - 1, None), 0),
+                contact("next platform", slice(-m - 1, None), slice(m + 1), 1),
+            ),
+            held=held,
+            load=tip,
+            responses={"tip": tip},
+            cut=CutFaces(self.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
+            retainer=Retainer(self.retention_stiffness, AXIS),
+        )
+        return self.model_of(solid), joint
 
-    joint = JointDefinition(
-        contacts=(
-            contact("this platform", slice(m + 1), slice(-m - 1, None), 0),
-            contact("next platform", slice(-m - 1, None), slice(m + 1), 1),
-        ),
-        held=held,
-        load=tip,
-        responses={"tip": tip},
-        cut=CutFaces(p.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
-        retainer=Retainer(p.retention_stiffness, AXIS),
-    )
-    return p.model_of(solid), joint
-
-
-def _check(parameters: Parameters) -> None:
-    p = parameters
-    p.check_wave()
-    for inner, outer in (("bore_radius", "rim_radius"), ("rim_radius", "platform_radius")):
-        if getattr(p, inner) >= getattr(p, outer):
-            remedy = f"make it larger than {inner} = {getattr(p, inner)}"
-            raise SceneError(outer, str(getattr(p, outer)), remedy)
-    if 0.5 * p.platform_gap >= p.damper_half_width:
-        raise SceneError("platform_gap", str(p.platform_gap), "make it smaller than the wedge is wide")
-    if p.damper_half_width + 0.5 * p.shank_thickness >= 0.95 * p.half_pitch * p.platform_radius:
+    def impossible(self) -> Iterator[tuple[bool, str, str]]:
+        """As `SectorParameters.impossible`."""
+        half, room = self.damper_half_width, 0.95 * self.half_pitch * self.platform_radius
+        yield 0.5 * self.platform_gap >= half, "platform_gap", "make it smaller than the wedge is wide"
         remedy = "make it smaller, or use fewer blades, so that the wedge has room beside the shank"
-        raise SceneError("damper_half_width", str(p.damper_half_width), remedy)
-    if p.roof_rise >= 0.9 * p.platform_thickness:
-        remedy = f"make it larger than the roof is high, {p.roof_rise:.3g} m"
-        raise SceneError("platform_thickness", str(p.platform_thickness), remedy)
-    if p.platform_radius - p.damper_height <= p.rim_radius:
-        raise SceneError("damper_height", str(p.damper_height), "make it smaller, so that the wedge is above the disk")
+        yield half + 0.5 * self.shank_thickness >= room, "damper_half_width", remedy
+        remedy = f"make it larger than the roof is high, {self.roof_rise:.3g} m"
+        yield self.roof_rise >= 0.9 * self.platform_thickness, "platform_thickness", remedy
+        high = self.platform_radius - self.damper_height <= self.rim_radius
+        yield high, "damper_height", "make it smaller, so that the wedge is above the disk"
 
+    @property
+    def _around(self) -> tuple[float, float, float]:
+        """Half of the shank, outer side of the wedge and edge of the platform as angles about the axis, rad.
 
-def _around(parameters: Parameters) -> tuple[float, float, float]:
-    """Half of the shank, outer side of the wedge and edge of the platform as angles about the axis, rad.
+        The latter two are measured from the middle between two blades.
+        """
+        lengths = 0.5 * self.shank_thickness, self.damper_half_width, 0.5 * self.platform_gap
+        shank, side, edge = (length / self.platform_radius for length in lengths)
+        return shank, side, edge
 
-    The latter two are measured from the middle between two blades.
-    """
-    p = parameters
-    lengths = 0.5 * p.shank_thickness, p.damper_half_width, 0.5 * p.platform_gap
-    shank, side, edge = (length / p.platform_radius for length in lengths)
-    return shank, side, edge
+    @property
+    def _axial(self) -> FloatArray:
+        return self.width * np.linspace(-0.5, 0.5, 4 * self.mesh)
 
+    def _blade_body(self) -> list[FloatArray]:
+        """Disk, shank, platform and blade."""
+        m, half, axial, (shank, side, edge) = self.mesh, self.half_pitch, self._axial, self._around
+        top = self.platform_radius + self.platform_thickness
+        disk = graded([self.bore_radius, self.rim_radius], [4 * m])
+        between = graded([self.rim_radius, self.platform_radius], [2 * m])
+        blade = graded([top, top + self.blade_length], [8 * m])
+        stations = [-half + edge, -half + side, -shank, shank, half - side, half - edge]
+        platform = graded(stations, [m, m, 1, m, m])
+        rise = np.clip(np.abs(platform) - (half - side), 0.0, None) / (side - edge) * self.roof_rise
+        underside = self.platform_radius + rise
+        share = np.linspace(0.0, 1.0, m + 1)[:, None]
+        along = (blade - top) / self.blade_length
+        thickness = shank + along * (0.5 * self.tip_thickness / blade[-1] - shank)
+        return [
+            block_of(disk[:, None], graded([-half, -shank, shank, half], [m, 1, m]), axial),
+            block_of(between[:, None], np.array([-shank, shank]), axial),
+            block_of(underside + share * (top - underside), platform, axial),
+            block_of(blade[:, None], np.outer(thickness, [-1.0, 1.0]), axial, self.tip_angle * along),
+        ]
 
-def _axial(parameters: Parameters) -> FloatArray:
-    return parameters.width * np.linspace(-0.5, 0.5, 4 * parameters.mesh)
-
-
-def _blade_body(parameters: Parameters) -> list[FloatArray]:
-    """Disk, shank, platform and blade."""
-    p, m = parameters, parameters.mesh
-    half, axial, (shank, side, edge) = p.half_pitch, _axial(p), _around(p)
-    top = p.platform_radius + p.platform_thickness
-    disk = graded([p.bore_radius, p.rim_radius], [4 * m])
-    between = graded([p.rim_radius, p.platform_radius], [2 * m])
-    blade = graded([top, top + p.blade_length], [8 * m])
-    stations = [-half + edge, -half + side, -shank, shank, half - side, half - edge]
-    platform = graded(stations, [m, m, 1, m, m])
-    rise = np.clip(np.abs(platform) - (half - side), 0.0, None) / (side - edge) * p.roof_rise
-    underside = p.platform_radius + rise
-    share = np.linspace(0.0, 1.0, m + 1)[:, None]
-    along = (blade - top) / p.blade_length
-    thickness = shank + along * (0.5 * p.tip_thickness / blade[-1] - shank)
-    return [
-        block_of(disk[:, None], graded([-half, -shank, shank, half], [m, 1, m]), axial),
-        block_of(between[:, None], np.array([-shank, shank]), axial),
-        block_of(underside + share * (top - underside), platform, axial),
-        block_of(blade[:, None], np.outer(thickness, [-1.0, 1.0]), axial, p.tip_angle * along),
-    ]
-
-
-def _wedge(parameters: Parameters) -> FloatArray:
-    """The wedge: its roof begins and ends at its sides, and is flat below the gap."""
-    p, m = parameters, parameters.mesh
-    _, side, edge = _around(p)
-    stations = graded([-side, -edge, edge, side], [m, 1, m])
-    roof = p.platform_radius + p.roof_rise * np.clip((side - np.abs(stations)) / (side - edge), 0.0, 1.0)
-    bottom = p.platform_radius - p.damper_height
-    share = np.linspace(0.0, 1.0, m + 1)[:, None]
-    return block_of(bottom + share * (roof - bottom), p.half_pitch + stations, _axial(p))
-
-
-build, describe_mesh, natural_frequencies = functions_of(define_sector)
+    def _wedge(self) -> FloatArray:
+        """The wedge: its roof begins and ends at its sides, and is flat below the gap."""
+        m, (_, side, edge) = self.mesh, self._around
+        stations = graded([-side, -edge, edge, side], [m, 1, m])
+        rise = self.roof_rise * np.clip((side - np.abs(stations)) / (side - edge), 0.0, 1.0)
+        roof, bottom = self.platform_radius + rise, self.platform_radius - self.damper_height
+        share = np.linspace(0.0, 1.0, m + 1)[:, None]
+        return block_of(bottom + share * (roof - bottom), self.half_pitch + stations, self._axial)

@@ -8,25 +8,22 @@ the tip rests (`u_N = x`); closed, `u_N = gap`, and the force is `wall_stiffness
 from __future__ import annotations
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from solver.model import ReducedModel
 from solver.model_from_matrices import build_model
-from studies.contact_compliance import ContactStiffness
+from studies.scene import Scene
 
 
-class Parameters(BaseModel):
+class Parameters(Scene):
     """The defaults resonate at 0.159 Hz without the wall.
 
     With 0.02 N the response has two branches, with and without impacts, from 0.175 to 0.248 Hz.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
     friction_coefficient: float = Field(
         0.0, ge=0, description="Coulomb friction coefficient, 1; without influence: the pair has no tangent"
     )
-    contact_stiffness: ContactStiffness = None
     mass: float = Field(1.0, gt=0, description="mass, kg")
     damping: float = Field(0.05, ge=0, description="viscous damping of the mount, N s/m")
     stiffness: float = Field(1.0, gt=0, description="stiffness of the mount, N/m")
@@ -36,24 +33,18 @@ class Parameters(BaseModel):
     )
     area: float = Field(1e-4, gt=0, description="contact area, m2")
 
-
-def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
-    """Reduced model in (closing displacement, displacement of the mass); the latter is the response.
-
-    `n_harmonics` has no influence: all harmonics see the same structure.
-    """
-    del n_harmonics
-    p = parameters
-    wall = p.wall_stiffness
-    return build_model(
-        np.diag([0.0, p.mass]),
-        np.diag([0.0, p.damping]),
-        [[wall, -wall], [-wall, wall + p.stiffness]],
-        [[0, -1, -1]],
-        p.area,
-        load_harmonic=[0.0, 1.0],
-        response=[[0.0, 1.0]],
-        gap=p.gap,
-        surface=("wall",),
-        response_names=("mass",),
-    )
+    def reduced_model(self) -> ReducedModel:
+        """In (closing displacement, displacement of the mass), the response."""
+        wall = self.wall_stiffness
+        return build_model(
+            np.diag([0.0, self.mass]),
+            np.diag([0.0, self.damping]),
+            [[wall, -wall], [-wall, wall + self.stiffness]],
+            [[0, -1, -1]],
+            self.area,
+            load_harmonic=[0.0, 1.0],
+            response=[[0.0, 1.0]],
+            gap=self.gap,
+            surface=("wall",),
+            response_names=("mass",),
+        )

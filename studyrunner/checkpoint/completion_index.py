@@ -5,7 +5,6 @@ The record of a result is one element of an array of numpy with all values of th
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
@@ -13,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.outcome import Outcome
+from solver.outcome import COMPLETE, Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
-from studyrunner.kinds.task import Identity, PointResult, Result, StartResult, Task, TaskPlan, digest, unpack_start
+from studyrunner.kinds.task import Identity, PointResult, Result, StartResult, Task, TaskPlan, digest
 from studyrunner.scene.scene import SceneFacts, record_fields
 from studyrunner.study.study import Study
 
@@ -25,39 +24,23 @@ MOST_CRASHES = 3
 tasks are tried one after the other, so that another task is seldom to blame."""
 
 
-def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
-    """Data type of the record of a point: all values of a result."""
-    return np.dtype(record_fields(study, facts))
-
-
-@functools.lru_cache(maxsize=1)
-def _empty_record(kind: np.dtype[np.void]) -> bytes:
-    """Record of a point without result: NaN, or 0 in whole numbers. Bytes: numpy copies a record field by field."""
-    records = np.zeros(1, dtype=kind)
-    for name in kind.names or ():
-        if kind[name].base.kind == "f":
-            records[name] = math.nan
-    return records.tobytes()
-
-
-def _record_of(kind: np.dtype[np.void], result: PointResult) -> NDArray[np.uint8]:
-    """Bytes of the record of a point. Pairs that its scene does not have are NaN, or 0 in whole numbers."""
-    records = np.frombuffer(bytearray(_empty_record(kind)), kind)
-    for name, values in result.values.items():
-        own = tuple(slice(size) for size in np.shape(values))
-        records[name][0:1][(slice(None), *own)] = values
-    return records.view(np.uint8)
-
-
 class CompletionIndex:
     """Results and start states of a plan, in a file that may contain those of earlier runs and of other studies.
 
-    plan: its tasks have keys. kind: data type of a record, as `record_type` gives it.
+    plan: its tasks have keys. kind: data type of the record of a point, which holds all values of a result.
     """
 
-    def __init__(self, plan: TaskPlan, identity: Identity, store: Store, kind: np.dtype[np.void]) -> None:
+    def __init__(self, study: Study, plan: TaskPlan, facts: SceneFacts, scenes: Sequence[str], store: Store) -> None:
+        """facts: of all scenes, see `merge_facts`. scenes: hash of the model of each."""
         self.store = store
-        self.kind = kind
+        self.kind = np.dtype(record_fields(study, facts))
+        empty = np.zeros(1, dtype=self.kind)
+        for name in self.kind.names or ():
+            if self.kind[name].base.kind == "f":
+                empty[name] = math.nan
+        # numpy copies a record field by field, and bytes at once
+        self._empty = empty.tobytes()
+        identity = Identity(tuple(scenes), digest(repr(self.kind.descr)))
         self._names: dict[str, tuple[str, ...]] = {}
 
         def with_key(task: Task) -> Task:
@@ -82,11 +65,11 @@ class CompletionIndex:
         return not self._missing(task)
 
     def read_results(self, names: Sequence[str]) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
-        """Records (n,) of the results with these hashes, and whether each exists; else the record is empty.
+        """Records (n,) of the results with these hashes, and whether each exists; else NaN, or 0 in whole numbers.
 
         Raises StorageError where the disk fails.
         """
-        contents = np.frombuffer(bytearray(_empty_record(self.kind) * len(names)), np.uint8).reshape(len(names), -1)
+        contents = np.frombuffer(bytearray(self._empty * len(names)), np.uint8).reshape(len(names), -1)
         there, first = np.zeros(len(names), np.bool_), dict[str, int]()
         for place, name in enumerate(names):
             before = first.setdefault(name, place)
@@ -103,7 +86,7 @@ class CompletionIndex:
         left = sum(len(task.points(place)) for task in self.plan.results for place in self._missing(task))
         return self.plan.n_points - left
 
-    def left(self, task: Task, needed: Collection[int] | None = None) -> Task | None:
+    def _left(self, task: Task, needed: Collection[int] | None = None) -> Task | None:
         """What is left of a task, with its progress; None for nothing. needed: places; None for all."""
         left = {place for place in self._missing(task) if needed is None or place in needed} - task.known
         if not left:
@@ -112,13 +95,13 @@ class CompletionIndex:
 
     def sweeps_left(self) -> list[Task]:
         """Sweeps with start states that are needed and not known."""
-        left = (self.left(sweep, self._needed(sweep)) for sweep in self.plan.sweeps)
+        left = (self._left(sweep, self._needed(sweep)) for sweep in self.plan.sweeps)
         return [sweep for sweep in left if sweep is not None]
 
     def waiting_for(self, start: tuple[int, int] | None) -> list[Task]:
         """Unfinished tasks that begin from a start state; None: from none. start: number of the sweep and place."""
         tasks = self.plan.results if start is None else self.plan.waiting.get(start, ())
-        left = (self.left(task) for task in tasks if start is not None or task.waits_for is None)
+        left = (self._left(task) for task in tasks if start is not None or task.waits_for is None)
         return [task for task in left if task is not None]
 
     def known_starts(self) -> Iterator[tuple[Task, StartResult]]:
@@ -127,7 +110,14 @@ class CompletionIndex:
             needed = self._needed(sweep)
             for place, name in enumerate(self._names[sweep.key]):
                 if place in needed and (start := self.store.read(STARTS, name)) is not None:
-                    yield sweep, unpack_start(place, start)
+                    yield sweep, StartResult.unpack(place, start)
+
+    def _needed(self, sweep: Task) -> frozenset[int]:
+        """Places of a sweep from which a task is still to begin."""
+        waiting = self.plan.waiting
+        return frozenset(
+            place for place in sweep.order if not all(map(self.is_finished, waiting.get((sweep.number, place), ())))
+        )
 
     def add(self, task: Task, result: Result) -> None:
         """Adds a result. What progress there was is forgotten with the last one, but for a history without time."""
@@ -136,13 +126,21 @@ class CompletionIndex:
         if isinstance(result, StartResult):
             self.store.put(STARTS, name, result.pack())
         else:
-            self.store.put(RESULTS, name, Packed("", (_record_of(self.kind, result),)))
+            self.store.put(RESULTS, name, Packed("", (self._record(result),)))
             progress = result.progress
         if progress is not None:
             self.keep(task, progress)
         elif self.is_finished(task):
             self.store.forget(PROGRESS, task.key)
         self.store.note_life(task.key)
+
+    def _record(self, result: PointResult) -> NDArray[np.uint8]:
+        """Bytes of the record of a point. Pairs that its scene does not have are NaN, or 0 in whole numbers."""
+        records = np.frombuffer(bytearray(self._empty), self.kind)
+        for name, values in result.values.items():
+            own = tuple(slice(size) for size in np.shape(values))
+            records[name][0:1][(slice(None), *own)] = values
+        return records.view(np.uint8)
 
     def keep(self, task: Task, progress: object) -> None:
         """Adds the progress of a task."""
@@ -151,13 +149,13 @@ class CompletionIndex:
         self.store.put(PROGRESS, task.key, progress)
         self.store.note_life(task.key)
 
-    def forget_failed(self, complete: Collection[int]) -> None:
-        """Forgets failed points. complete: outcomes of points that did not fail."""
+    def forget_failed(self) -> None:
+        """Forgets points that were not computed to the end, and start states without a state."""
         without_state: set[tuple[int, int] | None] = set()
         for sweep in self.plan.sweeps:
             for place, name in enumerate(self._names[sweep.key]):
                 start = self.store.read(STARTS, name)
-                if start is not None and unpack_start(place, start).n_unknowns == 0:
+                if start is not None and StartResult.unpack(place, start).n_unknowns == 0:
                     without_state.add((sweep.number, place))
                     self.store.forget(STARTS, name)
                     self.store.forget(PROGRESS, sweep.key)
@@ -165,8 +163,17 @@ class CompletionIndex:
             names = self._names[task.key]
             records, there = self.read_results(names)
             for name, record, is_there in zip(names, records, there, strict=True):
-                if is_there and (record["outcome"] not in complete or task.waits_for in without_state):
+                if is_there and (record["outcome"] not in COMPLETE or task.waits_for in without_state):
                     self.store.forget(RESULTS, name)
+
+    def forget_all(self) -> None:
+        """Forgets all points of this study. Results of other studies stay."""
+        for key, names in self._names.items():
+            for name in names:
+                self.store.forget(RESULTS, name)
+                self.store.forget(STARTS, name)
+            self.store.forget(PROGRESS, key)
+            self.store.note_life(key)
 
     def is_suspect(self, task: Task) -> bool:
         """Whether a run has crashed or was killed while this task was under way and had given nothing."""
@@ -187,20 +194,3 @@ class CompletionIndex:
                     self.add(task, task.failed(place, Outcome.CRASHED, message))
         for key in given_up:
             self.store.note_life(key)
-
-    def forget_all(self) -> None:
-        """Forgets all points of this study. Results of other studies stay."""
-        for key, names in self._names.items():
-            for name in names:
-                self.store.forget(RESULTS, name)
-                self.store.forget(STARTS, name)
-            self.store.forget(PROGRESS, key)
-            self.store.note_life(key)
-        self.store.flush()
-
-    def _needed(self, sweep: Task) -> frozenset[int]:
-        """Places of a sweep from which a task is still to begin."""
-        waiting = self.plan.waiting
-        return frozenset(
-            place for place in sweep.order if not all(map(self.is_finished, waiting.get((sweep.number, place), ())))
-        )

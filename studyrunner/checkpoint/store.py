@@ -15,9 +15,9 @@ import socket
 import sqlite3
 import time
 import zlib
+from collections import defaultdict
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from solver.packing import Packed
 from studyrunner.system.files import sync_folder
 from studyrunner.system.process import uninterrupted
-from studyrunner.user_error import StorageError
+from studyrunner.user_error import StorageError, UserError, Verbatim
 
 STARTS, PROGRESS, RESULTS, COMPUTED = "start", "progress", "result", "computed"
 """Kinds of entries: start states; progress of tasks; results of points; what is computed once for a study."""
@@ -43,9 +43,11 @@ _HEAD_BYTES = 8
 _LEVEL = 1  # of zlib: the rank that compresses hands out the tasks as well
 _SECONDS_TO_DIE = 5.0  # after which all ranks of a run that was killed have noticed
 _PAUSE = 0.1
-_RUN = "run"  # kind of the only entry about the file itself
+_UNDER_WAY, _CRASHES = "under way", "crashes"  # kinds of entries by the key of a task; the second are numbers
+_STUDY, _OPEN = "study", "open"  # keys of the entries about the file itself: words on its study, and on the run
+_FILE = "file"  # kind of these entries
 _SCHEMA = "CREATE TABLE entries (kind TEXT NOT NULL, key TEXT NOT NULL, blob BLOB NOT NULL, PRIMARY KEY (kind, key))"
-_MARKS = {"application_id": int.from_bytes(b"wear", "big"), "user_version": 4}
+_MARKS = {"application_id": int.from_bytes(b"wear", "big"), "user_version": 5}
 _PRAGMAS = ("trusted_schema=OFF", "temp_store=MEMORY", "locking_mode=EXCLUSIVE", "synchronous=FULL")
 _DAMAGES = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_FORMAT)
 _FAULTS = {
@@ -54,10 +56,6 @@ _FAULTS = {
     sqlite3.SQLITE_READONLY: errno.EACCES,
     sqlite3.SQLITE_CANTOPEN: errno.EACCES,
 }
-
-
-class StoreInUseError(Exception):
-    """Another run works with the file, or the file system has no locks; the text says which run."""
 
 
 class _OtherFileError(Exception):
@@ -91,7 +89,7 @@ def from_blob(blob: bytes) -> Packed:
 
 
 class Store:
-    """The open file of a run. Raises StoreInUseError and StorageError.
+    """The open file of a run. Raises UserError where another run uses the file, and StorageError.
 
     path: of the file.
     notes: lines for the user on what was found.
@@ -102,9 +100,9 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.notes: list[str] = []
-        self._waiting: dict[tuple[str, str], bytes | None] = {}
-        self._n_bytes = 0  # that wait
         self._next_write = 0.0
+        self._n_bytes = 0  # in the open transaction
+        self._keys: dict[str, set[str]] = defaultdict(set)
         with _storage_errors(path):
             try:
                 self._database = _open_locked(path)
@@ -116,54 +114,44 @@ class Store:
                 self.notes.append(f"{path.name} {why}: it is kept as {aside.name}, and the study begins anew")
                 self._database = _open_locked(path)
             self._file = path.stat().st_ino
-            self._keys: dict[str, set[str]] = {kind: set() for kind in (STARTS, PROGRESS, RESULTS, COMPUTED, _RUN)}
             for kind, key in self._database.execute("SELECT kind, key FROM entries"):
-                self._keys.setdefault(kind, set()).add(key)
-        before = _run_in(self._database)
-        self.ended_hard = bool(before.get("open"))
-        self.crashes: dict[str, int] = dict(before.get("crashes", {}))
-        for key in before.get("under_way", ()) if self.ended_hard else ():
+                self._keys[kind].add(key)
+        self.ended_hard = _OPEN in self._keys[_FILE]
+        counts = _words(self._database, _CRASHES)
+        self.crashes = {key: int(number) for key, number in counts.items() if number.isdecimal()}
+        for key in tuple(self._keys[_UNDER_WAY]):
             self.crashes[key] = self.crashes.get(key, 0) + 1
-        self._study: str | None = before.get("study")
-        self._under_way: set[str] = set()
-        self._is_open, self._is_noted = True, False
+            self._write(_CRASHES, key, str(self.crashes[key]).encode())
+            self.forget(_UNDER_WAY, key)
+        self._write(_FILE, _OPEN, f"process {os.getpid()} on {socket.gethostname()}".encode())
         self.flush()
 
     def note_study(self, study: str) -> None:
         """Writes which study the file belongs to, in words."""
-        self._study = study
-        self._is_noted = False
+        self._write(_FILE, _STUDY, study.encode())
         self.flush()
 
     def note_begin(self, key: str) -> None:
         """Notes that a rank is about to do a task. After a run that has ended hard this is on the disk at once."""
-        self._under_way.add(key)
-        self._is_noted = False
+        self._write(_UNDER_WAY, key, b"")
         if self.ended_hard:
             self.flush()
 
     def note_life(self, key: str) -> None:
         """Notes that a task has given something: it has not ended the run, nor the runs before."""
-        if key in self._under_way or key in self.crashes:
-            self._under_way.discard(key)
-            self.crashes.pop(key, None)
-            self._is_noted = False
+        self.crashes.pop(key, None)
+        self.forget(_UNDER_WAY, key)
+        self.forget(_CRASHES, key)
 
     def put(self, kind: str, key: str, packed: Packed) -> None:
         """Adds an entry, in place of an earlier one; nothing where an entry that only saves time is too large.
 
         Raises StorageError.
         """
-        if packed.n_bytes > LARGEST:
-            if kind in (PROGRESS, COMPUTED):
-                return
+        if packed.n_bytes <= LARGEST:
+            self._write(kind, key, to_blob(packed))
+        elif kind not in (PROGRESS, COMPUTED):
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
-        blob = to_blob(packed)
-        self._waiting[kind, key] = blob
-        self._keys[kind].add(key)
-        self._n_bytes += len(blob)
-        if self._n_bytes > _BYTES_A_TRANSACTION:
-            self.flush()
 
     def keys(self, kind: str) -> Collection[str]:
         """Keys of all entries of a kind, on the disk or on their way."""
@@ -173,11 +161,9 @@ class Store:
         """An entry; None where there is none, or a damaged one, which is forgotten. Raises StorageError."""
         if key not in self._keys[kind]:
             return None
-        blob = self._waiting.get((kind, key))
-        if blob is None:
-            with _storage_errors(self.path):
-                query = "SELECT blob FROM entries WHERE kind=? AND key=?"
-                (blob,) = self._database.execute(query, [kind, key]).fetchone() or (b"",)
+        with _storage_errors(self.path):
+            query = "SELECT blob FROM entries WHERE kind=? AND key=?"
+            (blob,) = self._database.execute(query, [kind, key]).fetchone() or (b"",)
         with contextlib.suppress(zlib.error, ValueError, TypeError):
             return from_blob(blob)
         self.forget(kind, key)
@@ -195,77 +181,72 @@ class Store:
         """Removes an entry with the next transaction."""
         if key in self._keys[kind]:
             self._keys[kind].discard(key)
-            self._waiting[kind, key] = None
+            self._execute("DELETE FROM entries WHERE kind=? AND key=?", kind, key)
+
+    def _write(self, kind: str, key: str, blob: bytes) -> None:
+        self._execute("INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", kind, key, blob)
+        self._keys[kind].add(key)
+        self._n_bytes += len(blob)
+        if self._n_bytes > _BYTES_A_TRANSACTION:
+            self.flush()
+
+    def _execute(self, statement: str, *values: object) -> None:
+        """Changes the file in the transaction that the next `flush` ends."""
+        with uninterrupted(), _storage_errors(self.path):
+            self._database.execute(statement, values)
 
     def tick(self) -> None:
-        """Called many times a second: writes what waits, when it has waited long enough. Raises StorageError."""
-        if (self._waiting or not self._is_noted) and time.monotonic() > self._next_write:
+        """Called many times a second: ends a transaction that is open for long enough. Raises StorageError."""
+        if time.monotonic() > self._next_write:
             self.flush()
 
     def flush(self) -> None:
-        """Writes what waits, in one transaction. Raises StorageError; what waits then still waits."""
-        if not self._waiting and self._is_noted:
+        """Ends the transaction: everything is on the disk when this returns. Raises StorageError."""
+        if not self._database.in_transaction:
             return
-        if not self._is_noted:
-            self._waiting[_RUN, ""] = self._describe_run()
         began = time.monotonic()
         with uninterrupted(), _storage_errors(self.path):
             if self.path.stat().st_ino != self._file:
                 raise FileNotFoundError(None, "another file has taken its place")
-            with self._database as database:
-                for (kind, key), blob in self._waiting.items():
-                    if blob is None:
-                        database.execute("DELETE FROM entries WHERE kind=? AND key=?", [kind, key])
-                    else:
-                        database.execute("INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", [kind, key, blob])
-            self._waiting, self._n_bytes, self._is_noted = {}, 0, True
+            self._database.commit()
+            self._n_bytes = 0
         now = time.monotonic()
         self._next_write = now + max(SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
 
     def close(self) -> None:
         """Writes what waits, as far as there is room, and closes the file. A file without a study is removed."""
-        self._is_open, self._is_noted = False, False
         # an error was said before, or there is nothing that waits for an answer
         with contextlib.suppress(StorageError):
+            for key in tuple(self._keys[_UNDER_WAY]):
+                self.forget(_UNDER_WAY, key)
+            self.forget(_FILE, _OPEN)
             self.flush()
         with contextlib.suppress(sqlite3.Error):
             self._database.close()
-        if not self._study and not any(keys for kind, keys in self._keys.items() if kind != _RUN):
+        if not any(self._keys.values()):
             # the run has ended before it began: the scene or the disk is at fault
             with contextlib.suppress(OSError):
                 self.path.unlink()
 
-    def _describe_run(self) -> bytes:
-        run = {
-            "study": self._study,
-            "run": f"process {os.getpid()} on {socket.gethostname()}",
-            "open": self._is_open,
-            "under_way": sorted(self._under_way),
-            "crashes": self.crashes,
-        }
-        return json.dumps(run).encode()
-
 
 def read_study(path: Path) -> str | None:
     """The study that a file belongs to, without its lock; None where the file does not say so."""
-    found = _read_run(path).get("study")
-    return found if isinstance(found, str) else None
+    return _words_in(path).get(_STUDY)
 
 
-def _read_run(path: Path) -> dict[str, Any]:
+def _words_in(path: Path) -> dict[str, str]:
     """What a file that another run may use says of itself; nothing where it is none of this version."""
     address = f"file:{quote(os.fsencode(path))}?mode=ro&immutable=1"
     with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(address, uri=True)) as database:
-        return _run_in(database)
+        return _words(database, _FILE)
     return {}
 
 
-def _run_in(database: sqlite3.Connection) -> dict[str, Any]:
-    """What the file says of its last run; nothing where it does not say so."""
+def _words(database: sqlite3.Connection, kind: str) -> dict[str, str]:
+    """Entries of a kind that are words, by key; nothing where the file has none."""
     with contextlib.suppress(sqlite3.Error, ValueError, TypeError):
-        (blob,) = database.execute("SELECT blob FROM entries WHERE kind=? AND key=''", [_RUN]).fetchone()
-        found = json.loads(blob)
-        return found if isinstance(found, dict) else {}
+        rows = database.execute("SELECT key, blob FROM entries WHERE kind=?", [kind])
+        return {key: bytes(blob).decode() for key, blob in rows}
     return {}
 
 
@@ -280,6 +261,8 @@ def _open_locked(path: Path) -> sqlite3.Connection:
             database.execute("BEGIN EXCLUSIVE")
             _check(database)
             database.commit()
+            sync_folder(path.parent)
+            return database
         except BaseException as error:
             database.close()
             if not isinstance(error, sqlite3.Error):
@@ -288,11 +271,10 @@ def _open_locked(path: Path) -> sqlite3.Connection:
                 raise _OtherFileError from error
             if _code(error) != sqlite3.SQLITE_BUSY:
                 raise
-        else:
-            sync_folder(path.parent)
-            return database
         if time.monotonic() > latest:
-            raise StoreInUseError(str(_read_run(path).get("run", "no run that is known")))
+            run = Verbatim(f"by {_words_in(path).get(_OPEN, 'no run that is known')}")
+            remedy = "wait for its end, or give another result file with -o; where no run is at work the disk has no"
+            raise UserError(str(path), "in use", run, f"{remedy} locks")
         time.sleep(_PAUSE)
 
 

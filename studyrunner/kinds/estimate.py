@@ -27,9 +27,9 @@ _MISSIONS_A_DOUBLING = 2.0
 """Missions that are computed for each doubling of their number, by the history and again by its reference solution: 6
 of 20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a slider."""
 
-_WAYS, _WAYS_OF_ONE_PAIR = 0.5, 0.25
+_WAYS = 0.5
 """Iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150 to 190
-of 320 to 380; of one pair that slips 2 of 14 missions with 20 missions, 12 of 84 with a million)."""
+of 320 to 380; one pair that slips: 2 of 14 missions with 20 missions, 12 of 84 with a million)."""
 
 AUTOMATIC_HARMONICS = 5
 """Harmonics of a state on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
@@ -80,10 +80,10 @@ def missions_computed(missions: float) -> int:
     return math.ceil(min(missions, 2.0 + _MISSIONS_A_DOUBLING * math.log2(max(missions, 1.0))))
 
 
-def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float, *, one_pair: bool) -> float:
+def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float) -> float:
     """Newton iterations of a mission history.
 
-    blocks: how each begins, and the octaves of a passage, 0 for steady vibration. one_pair: whether the joint has one.
+    blocks: how each begins, and the octaves of a passage, 0 for steady vibration.
     """
     each = 0.0
     for begin, octaves in blocks:
@@ -92,7 +92,7 @@ def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float,
         elif begin == "continue":
             each += 2 * _OF_BLOCK
         else:
-            each += _OF_BLOCK + iterations_of_sweep(begin, 1) * (_WAYS_OF_ONE_PAIR if one_pair else _WAYS)
+            each += _OF_BLOCK + _WAYS * iterations_of_sweep(begin, 1)
     return 2 * missions_computed(missions) * each
 
 

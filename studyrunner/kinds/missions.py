@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass, replace
-from typing import TYPE_CHECKING, cast
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -21,35 +21,28 @@ from studyrunner.kinds.task import (
     Index,
     Joint,
     Keep,
-    LastProgress,
     PointResult,
     Task,
     TaskPlan,
-    described,
+    deepest,
+    describe_target,
     digest,
+    first_harmonic,
     grid,
     joint_of,
     n_unknowns_of,
+    named,
     number_points,
-    raise_fault,
     settings_at,
 )
-from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import Realisation
 from studyrunner.study.study import Study
-from studyrunner.units import show_count
+from studyrunner.variables import OF_A_MISSION
 
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
     from solver.model import ReducedModel
-
-_OF_ONE_PAIR = 3
-"""Relative displacements of one contact pair, at most."""
-
-_MOST = 0.95
-"""Largest share of a history that is said to be done before all of it is: the number of steps is an estimate."""
 
 _NO_JOINT = Joint(0, None)
 
@@ -68,6 +61,12 @@ class PlannedBlock:
     excitation_amplitude: float
     cycles: float
     begin: Begin
+
+    @property
+    def octaves(self) -> float:
+        """Of a passage; 0 for steady vibration."""
+        of = self.frequency
+        return abs(math.log2(of.stop / of.start)) if isinstance(of, Passage) else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,17 +94,11 @@ class Mission(Task):
         """One place."""
         return (0,)
 
-    @property
-    def cost_keys(self) -> CostKeys:
-        """By unknowns and wear coefficient."""
-        return (("mission", ("mission", self.n_unknowns)), (("mission", self.wear_coefficient),))
-
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hash of the history: of all blocks with their scenes."""
-        blocks = [(identity.joint(block.joint), astuple(replace(block, joint=_NO_JOINT))) for block in self.blocks]
-        until = None if self.until is None else astuple(self.until)
-        wear = (self.wear_coefficient, asdict(self.law), self.first, described(self.settings))
-        return (digest("mission", blocks, wear, self.missions, until, identity.record),)
+        blocks = [(identity.joint(block.joint), replace(block, joint=_NO_JOINT)) for block in self.blocks]
+        wear = (self.wear_coefficient, self.law, self.first, self.settings)
+        return (digest("mission", blocks, wear, self.missions, self.until, identity.record),)
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """The history."""
@@ -125,22 +118,22 @@ class Mission(Task):
             )
             for block in self.blocks
         )
-        reached, n_computed = LastProgress(self, keep), itertools.count(1)
+        n_computed = itertools.count(1)
         # as many again for the reference solution
         n_planned = 2 * max(1, missions_computed(self.missions[-1]))
 
         def note(progress: Packed) -> None:
-            reached(progress)
-            keep(min(next(n_computed) / n_planned, _MOST))
+            keep(progress)
+            keep(f"{next(n_computed)} of about {n_planned} missions that are computed")
 
         kept = {int(number) for number in self.missions}
         # with those before, for the wear of one
         read = tuple(sorted({0, 1} | kept | {max(number - 1, 0) for number in kept}))
         first = cast("Direction", self.first)
-        mission = of_solver.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
-        history = integrate_missions(mission, note, self.resume)
-        raise_fault(history.outcome, history.message)
-        yield PointResult(self.points(0), _values(self, history), progress=reached.after(history.outcome))
+        asked = of_solver.MissionRequest(
+            blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first
+        )
+        yield PointResult(self.points(0), _values(self, integrate_missions(asked, note, self.resume)))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""
@@ -148,7 +141,7 @@ class Mission(Task):
 
 
 def build_tasks(
-    study: Study, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet
+    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
 ) -> TaskPlan:
     """Tasks of a study of missions. Points with equal blocks share a task.
 
@@ -158,8 +151,22 @@ def build_tasks(
     axes = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
     for part, numbers, of_blocks in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         for at in grid(part.study, *axes):
-            blocks = tuple(_blocks(part.study, at, numbers, of_blocks))
-            task = _task(study, part, at, blocks, [n_displacements[block.joint.scene] for block in blocks])
+            blocks, settings = tuple(_blocks(part.study, at, numbers, of_blocks)), settings_at(study, at)
+            n_unknowns = n_unknowns_of(max(n_displacements[number] for number in numbers), settings.harmonics)
+            ways = [(block.begin, block.octaves) for block in blocks]
+            task = Mission(
+                number=0,
+                settings=settings,
+                cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1])),
+                n_unknowns=n_unknowns,
+                blocks=blocks,
+                law=part.study.wear.as_law,
+                wear_coefficient=part.study.axes.wear_coefficient[at["wear_coefficient"]],
+                first=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",
+                missions=study.output_counts,
+                variables=tuple(study.recorded),
+                until=study.until,
+            )
             points.setdefault(task, []).append((*(at[name] for name in study.own_axes), *part.place))
     return number_points({task: [tuple(indices)] for task, indices in points.items()}, study)
 
@@ -183,62 +190,30 @@ def _blocks(
         yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))
 
 
-def _task(
-    study: Study,
-    part: Realisation,
-    at: Mapping[str, int],
-    blocks: tuple[PlannedBlock, ...],
-    n_displacements: Sequence[int],
-) -> Mission:
-    """The task of a point, without its number and its points. n_displacements: of each block."""
-    settings = settings_at(study, at)
-    n_unknowns = max(n_unknowns_of(number, settings.harmonics) for number in n_displacements)
-    ways = [
-        (block.begin, abs(math.log2(block.frequency.stop / block.frequency.start)))
-        if isinstance(block.frequency, Passage)
-        else (block.begin, 0.0)
-        for block in blocks
-    ]
-    one_pair = n_displacements[0] <= _OF_ONE_PAIR
-    return Mission(
-        number=0,
-        settings=settings,
-        cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1], one_pair=one_pair)),
-        blocks=blocks,
-        law=part.study.wear.as_law,
-        wear_coefficient=part.study.axes.wear_coefficient[at["wear_coefficient"]],
-        first=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",
-        missions=study.output_counts,
-        variables=tuple(study.recorded),
-        until=study.until,
-        n_unknowns=n_unknowns,
-    )
-
-
-def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
+def _values(task: Mission, history: MissionHistory) -> dict[str, Any]:
     """Variables of the result, at the numbers of missions that the task asks for."""
     counts = np.array(task.missions)
     rows, ends = (np.searchsorted(history.missions, each) for each in (counts, np.clip(counts, 1.0, None)))
     in_mission = history.block_volume[ends] - history.block_volume[ends - 1]
     rate, worn = in_mission.sum(axis=1), history.worn_volume[rows]
     share = np.divide(in_mission, rate[:, None], out=np.full_like(in_mission, np.nan), where=rate[:, None] > 0.0)
-    depth, depth_error = history.wear_depth[rows], history.wear_depth_error[rows]
-    deepest = np.nan_to_num(depth).argmax(axis=1)[:, None]
     reached = np.flatnonzero(np.isfinite(worn))
     last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
     is_state = np.isfinite(history.worn_volume).any() and np.isfinite(history.response_begin).any()
-    of_task: Mapping[str, object] = {
+    depth, depth_error = history.wear_depth[rows], history.wear_depth_error[rows]
+    whole, target = history.last_mission >= task.missions[-1], ""
+    if history.outcome.complete:
+        target = describe_target(task.until, history.missions_to_target, "mission", whole=whole)
+    own: Mapping[str, object] = {
+        **deepest(depth, depth_error),
+        **first_harmonic(history.response_end[rows]),
         "worn_volume": worn,
         "wear_rate": np.where(np.isfinite(worn), rate, np.nan),
         "wear_depth": depth,
-        "wear_depth_max": depth.max(axis=1, initial=0.0),
-        "wear_depth_max_error": np.take_along_axis(depth_error, deepest, axis=1)[:, 0],
         "wear_depth_last": last,
         "block_worn_volume": history.block_volume[rows],
         "block_worn_volume_error": history.block_volume_error[rows],
         "block_share": share,
-        "response_amplitude": np.abs(history.response_end[rows]),
-        "response_phase": np.angle(history.response_end[rows]),
         "response_amplitude_begin": np.abs(history.response_begin[rows]),
         "response_peak": history.response_peak_end[rows],
         "response_peak_begin": history.response_peak_begin[rows],
@@ -246,30 +221,13 @@ def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
         "excitation_frequency": history.excitation_frequency[:, 1],
         "excitation_frequency_begin": history.excitation_frequency[:, 0],
         "block_cycles": np.array([block.cycles for block in task.blocks]),
-        "sweep_rate": history.sweep_rate,
         "worn_volume_error": history.worn_volume_error[rows],
         "wear_depth_error": depth_error,
-    }
-    return {
-        **{name: of_task[name] for name in task.variables},
         "outcome": int(history.outcome),
-        "missions_to_target": history.missions_to_target,
-        "missions_to_target_error": history.missions_to_target_error,
-        "newton_iterations": history.newton_iterations,
-        "run_time": history.run_time,
         # a mission is computed for the vibration at 0
         "error_estimate": history.error_estimate if counts[-1] > 0.0 else 0.0,
         "last_mission": min(history.last_mission, float(counts[-1])) if is_state else math.nan,
         "largest_wear_depth": float(last.max(initial=0.0)) if reached.size else math.nan,
-        "message": "; ".join(filter(None, (history.message, _of_target(task, history)))),
+        "message": "; ".join(filter(None, (history.message, target))),
     }
-
-
-def _of_target(task: Mission, history: MissionHistory) -> str:
-    if task.until is None or not history.outcome.complete:
-        return ""
-    if math.isnan(history.missions_to_target):
-        return f"{task.until.quantity} stays below {task.until.value:g}"
-    if history.last_mission < task.missions[-1]:
-        return f"at its target at mission {show_count(round(history.missions_to_target))}: later ones are not computed"
-    return ""
+    return named((*task.variables, *OF_A_MISSION), own, history)

@@ -15,20 +15,20 @@ from studyrunner.kinds.task import (
     Keep,
     PointResult,
     TaskPlan,
-    described,
     digest,
+    first_harmonic,
     grid,
     joint_of,
     n_unknowns_of,
+    named,
     number_points,
-    raise_fault,
     settings_at,
     up_or_down,
 )
-from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.study import Study
+from studyrunner.variables import OF_A_MODE_POINT
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -50,14 +50,9 @@ class Mode(JointTask):
         """Indices of the amplitudes in the order in which they are computed."""
         return up_or_down(len(self.amplitudes), self.direction)
 
-    @property
-    def cost_keys(self) -> CostKeys:
-        """All modes, this one."""
-        return (("mode", ("mode", self.number)),)
-
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
-        own = (identity.joint(self.joint), self.mode, self.direction, described(self.settings), identity.record)
+        own = (identity.joint(self.joint), self.mode, self.direction, self.settings, identity.record)
         return tuple(digest("mode", *own, amplitude) for amplitude in self.amplitudes)
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
@@ -70,18 +65,15 @@ class Mode(JointTask):
         direction = cast("Literal['up', 'down']", self.direction)
         friction = self.joint.friction_coefficient
         for place, found in follow_mode(model, friction, amplitudes, self.mode, direction, self.settings):
-            raise_fault(found.outcome, found.message)
-            of_point = {
+            own = {
+                **first_harmonic(found.response),
                 "natural_frequency": found.frequency,
                 "natural_frequency_error": found.frequency_error,
                 "damping_ratio_error": found.damping_error,
-                "response_amplitude": np.abs(found.response),
-                "response_phase": np.angle(found.response),
+                "outcome": int(found.outcome),
             }
-            values = {name: of_point[name] if name in of_point else getattr(found, name) for name in self.variables}
-            kept = {name: getattr(found, name) for name in ("newton_iterations", "run_time", "message")}
-            kept["outcome"] = int(found.outcome)
-            yield PointResult(self.points(wanted[place]), values | kept, wanted[place])
+            values = named((*self.variables, *OF_A_MODE_POINT), own, found)
+            yield PointResult(self.points(wanted[place]), values, wanted[place])
 
     def describe(self, place: int) -> str:
         """Where along the amplitude."""
@@ -89,7 +81,7 @@ class Mode(JointTask):
 
 
 def build_tasks(
-    study: Study, n_displacements: Sequence[int], contacts: Sequence[ContactChange], scenes: SceneSet
+    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[ContactChange]
 ) -> TaskPlan:
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
     amplitudes = study.axes.modal_amplitude or ()

@@ -1,8 +1,7 @@
 """What a rank computes at a time, what it gives back, and all tasks of a study.
 
 A task gives one result or several, one after the other, each at a place of its own. There are four kinds: `Sweep` and
-`History` (`wear`), `Mode` (`modes`), `Mission` (`missions`). What hands tasks out, saves and shows them uses this base
-alone.
+`History` (`wear`), `Mode` (`modes`), `Mission` (`missions`).
 """
 
 from __future__ import annotations
@@ -18,16 +17,17 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.settings import Automatic, SolverSettings
+from solver.settings import Automatic, SolverSettings, WearTarget
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.system.machine import MachineFaultError, package_digest, tells_of_machine
+from studyrunner.system.machine import package_digest
+from studyrunner.units import show_count
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 Index = tuple[int, ...]
 """Index of a point along the dimensions of the study."""
 
-Keep = Callable[[Packed | str | float], None]
-"""Takes the progress of a task: data to continue from, words, or the share that is done, 0 to 1."""
+Keep = Callable[[Packed | str], None]
+"""Takes the progress of a task: data to continue from, or words."""
 
 EQUAL_POINTS = "all values are those of another point"
 """Reason for a result that points share, whatever the kind of study."""
@@ -84,11 +84,11 @@ class StartResult:
         """Everything except the place, for a file."""
         return Packed(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
 
-
-def unpack_start(place: int, packed: Packed) -> StartResult:
-    """The start state from the output of `StartResult.pack`."""
-    moves, n_unknowns, text = json.loads(packed.text)
-    return StartResult(place, Packed(text, packed.arrays), moves, n_unknowns)
+    @classmethod
+    def unpack(cls, place: int, packed: Packed) -> StartResult:
+        """The start state from the output of `pack`."""
+        moves, n_unknowns, text = json.loads(packed.text)
+        return cls(place, Packed(text, packed.arrays), moves, n_unknowns)
 
 
 @dataclass(frozen=True)
@@ -104,11 +104,6 @@ class PointResult:
     values: Mapping[str, Any]
     place: int = 0
     progress: Packed | None = None
-
-    @property
-    def outcome(self) -> int:
-        """Outcome of the computation, as a number of the result file."""
-        return int(self.values["outcome"])
 
 
 Result = StartResult | PointResult
@@ -191,9 +186,9 @@ class Task(ABC):
         return self
 
     @property
-    @abstractmethod
     def cost_keys(self) -> CostKeys:
         """Groups of similar tasks, see `CostModel`."""
+        return ((type(self).__name__,),)
 
     @property
     def group(self) -> str:
@@ -234,9 +229,13 @@ class JointTask(Task):
 
 
 def digest(*values: object) -> str:
-    """Hash of values; numbers enter with all bits."""
+    """Hash of values, frozen dataclasses among them; numbers enter with all bits.
+
+    A time limit does not enter: it decides whether there is a result, not the values of the result.
+    """
     # by hand: `joblib.hash` hashes pickled bytes, which change with the versions of Python and numpy
-    return hashlib.sha256(json.dumps(values, allow_nan=True).encode()).hexdigest()[:32]
+    text = json.dumps(values, default=lambda each: {**asdict(each), "time_limit": None})
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:
@@ -258,37 +257,38 @@ def settings_at(study: Study, at: Mapping[str, int]) -> SolverSettings:
     return SolverSettings(**{key: getattr(study.solver, key)[at[key]] for key in SOLVER_AXES}, time_limit=limit)
 
 
-def described(settings: SolverSettings) -> list[tuple[str, object]]:
-    """Settings for a hash; a time limit decides whether there is a result, not the values of the result."""
-    return [item for item in asdict(settings).items() if item[0] != "time_limit"]
-
-
 def n_unknowns_of(n_displacements: int, harmonics: int | Automatic) -> int:
     """Unknowns of a state with this number of harmonics, or with that which automatic ones take on average."""
     return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)
 
 
-def raise_fault(outcome: Outcome, message: str) -> None:
-    """The solver takes whatever breaks it off for an end: raises MachineFaultError where that was not its own."""
-    if outcome is Outcome.EXCEPTION and tells_of_machine(message):
-        raise MachineFaultError(message)
+def first_harmonic(response: NDArray[np.complex128]) -> dict[str, NDArray[np.float64]]:
+    """Variables of the first harmonic of the response, in the shape of the response."""
+    return {"response_amplitude": np.abs(response), "response_phase": np.angle(response)}
 
 
-class LastProgress:
-    """Passes the progress of a task on to `keep`, and has the last of it; None where there is none."""
+def deepest(depth: NDArray[np.float64], error: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Variables of the deepest pair at each count, m, from depths (n_counts, n_contact) and their errors."""
+    pair = np.nan_to_num(depth).argmax(axis=1)[:, None]
+    of_deepest = np.take_along_axis(error, pair, axis=1)[:, 0]
+    return {"wear_depth_max": depth.max(axis=1, initial=0.0), "wear_depth_max_error": of_deepest}
 
-    def __init__(self, task: Task, keep: Keep) -> None:
-        self.last = task.resume
-        self._keep = keep
 
-    def __call__(self, progress: Packed | str | float) -> None:
-        """Takes progress as `Keep` does."""
-        self.last = progress if isinstance(progress, Packed) else self.last
-        self._keep(progress)
+def describe_target(until: WearTarget | None, reached: float, counted: str, *, whole: bool) -> str:
+    """That the target of a history was not reached, or that what comes after it is not computed; else empty.
 
-    def after(self, outcome: Outcome) -> Packed | None:
-        """From where a history goes on with more time; None where it has not run out of it."""
-        return self.last if outcome is Outcome.TIME_LIMIT else None
+    reached: count at which it was reached, else NaN. counted: what that counts. whole: whether all counts are computed.
+    """
+    if until is None or (whole and not math.isnan(reached)):
+        return ""
+    if math.isnan(reached):
+        return f"{until.quantity} stays below {until.value:g}"
+    return f"at its target at {counted} {show_count(round(reached))}: later {counted}s are not computed"
+
+
+def named(names: Sequence[str], own: Mapping[str, Any], source: object) -> dict[str, Any]:
+    """Variables by name: those of `own`, the others as the attributes of what the solver has returned."""
+    return {name: own[name] if name in own else getattr(source, name) for name in names}
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, astuple, dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, cast
 
@@ -16,37 +16,84 @@ from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
-from studyrunner.kinds.sharing import Integrated
 from studyrunner.kinds.task import (
     Identity,
     Index,
     JointTask,
     Keep,
-    LastProgress,
     PointResult,
     StartResult,
-    described,
     digest,
-    raise_fault,
     up_or_down,
 )
 from studyrunner.mpi.dispatch import CostKeys
+from studyrunner.system.machine import MachineFaultError, tells_of_machine
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.results.history import StartState
-    from solver.wear.integrate import WearRequest
-
-AT_REST = "history at rest"
-"""Most general group of histories in which nothing wears, see `CostModel`."""
+    from solver.wear.problem import WearRequest
 
 COST_AT_REST = 0.01
 """Estimated time of a history in which nothing wears, over the time of a history with steps."""
+
+OWN_STEPS = ("adaptive", "final")
+"""Schemes that choose their steps: for another wear coefficient the same ones at other counts."""
 
 _NEIGHBOURS = 4  # frequencies whose histories take about as long
 _ROUND_OFF = 1e-10
 
 _digest_once = lru_cache(maxsize=16)(digest)
+
+
+@dataclass(frozen=True)
+class ScaledHistory:
+    """A history that is read from an integrated history with scaled slow time, and the points that have this history.
+
+    wear_coefficient: 1/Pa; its ratio to that of the integrated history scales the slow time.
+    step: cycles; the step of the first point where the step does not matter. points: along the dimensions of the study.
+    """
+
+    wear_coefficient: float
+    step: float
+    points: tuple[Index, ...]
+
+
+@dataclass(frozen=True)
+class Integrated:
+    """A history that is integrated, and the histories of other points that are read from it.
+
+    scheme, largest_depth: as for `steps_of` of the solver. histories: one result each. The first is integrated; it
+    needs the most cycles. unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles.
+    """
+
+    scheme: str
+    largest_depth: float | None
+    histories: tuple[ScaledHistory, ...]
+    unworn: bool
+
+    @property
+    def wear_coefficient(self) -> float:
+        """Of the integrated history, 1/Pa."""
+        return self.histories[0].wear_coefficient
+
+    @property
+    def step(self) -> float:
+        """Of the integrated history, cycles."""
+        return self.histories[0].step
+
+    def counts(self, cycles: Sequence[float], scaled: ScaledHistory) -> tuple[float, ...]:
+        """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
+        if scaled == self.histories[0] and not self.unworn:
+            # also where both wear coefficients are 0
+            return tuple(cycles)
+        ratio = 0.0 if self.unworn else scaled.wear_coefficient / self.wear_coefficient
+        return tuple(ratio * cycle for cycle in cycles)
+
+    def wear(self, scaled: ScaledHistory) -> tuple[float, float | None]:
+        """Wear coefficient of a history, and its step where the step matters."""
+        own_steps = self.unworn or self.scheme in OWN_STEPS or self.largest_depth is not None
+        return scaled.wear_coefficient, None if own_steps else scaled.step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +109,7 @@ class _FromRest(JointTask):
 
     def name_of_start(self, identity: Identity, frequency: float) -> str:
         """Hash of a start state, whatever the other frequencies: the steps of a sweep follow from the joint."""
-        followed = None if self.follow is None else astuple(self.follow)
-        loading = (self.excitation_amplitude, self.direction, tuple(described(self.settings)), followed)
+        loading = (self.excitation_amplitude, self.direction, self.settings, self.follow)
         return digest("start", _digest_once("line", identity.joint(self.joint), *loading), frequency)
 
 
@@ -82,11 +128,6 @@ class Sweep(_FromRest):
     def order(self) -> tuple[int, ...]:
         """Indices of the frequencies in the order of the sweep."""
         return up_or_down(len(self.frequencies), self.direction)
-
-    @property
-    def cost_keys(self) -> CostKeys:
-        """All sweeps, this sweep."""
-        return (("sweep", ("sweep", self.number)),)
 
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the start states."""
@@ -119,7 +160,8 @@ class Sweep(_FromRest):
             keep=keep,
             resume=self.resume,
         ):
-            raise_fault(start.outcome, start.message)
+            if start.outcome is Outcome.EXCEPTION and tells_of_machine(start.message):
+                raise MachineFaultError(start.message)
             n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
             yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 
@@ -190,7 +232,7 @@ class History(_FromRest):
     @property
     def cost_keys(self) -> CostKeys:
         """By motion, unknowns and start state, and by wear coefficient, steps and schemes."""
-        kind = "history" if self.moves else AT_REST
+        kind = "history" if self.moves else "history at rest"
         near, here = (kind, self.sweep, "near", self.position // _NEIGHBOURS), (kind, self.sweep, self.position)
         steps = tuple((each.step, each.scheme) for each in self.integrated)
         wear = (kind, self.wear_coefficient, steps)
@@ -207,12 +249,11 @@ class History(_FromRest):
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the histories: of their start state, and of all that is done with it."""
         start = self.name_of_start(identity, self.frequency)
-        ends = tuple(None if each is None else astuple(each) for each in (self.until, self.to_the_end))
-        kept = _digest_once(identity.record, self.cycles, self.loops, ends)
+        kept = _digest_once(identity.record, self.cycles, self.loops, self.until, self.to_the_end)
         found = []
         for each, number in self.results:
             scheme = "" if each.unworn else each.scheme
-            own = (*each.wear(each.histories[0]), scheme, each.unworn, each.largest_depth, asdict(self.law))
+            own = (*each.wear(each.histories[0]), scheme, each.unworn, each.largest_depth, self.law)
             found.append(digest("history", start, kept, own, number > 0, each.wear(each.histories[number])))
         return tuple(found)
 
@@ -223,24 +264,18 @@ class History(_FromRest):
 
         if self.start is None:
             raise TypeError(f"task without a start state: {self}")
-        reached, progress = LastProgress(self, keep), None
         needed: dict[Integrated, list[int]] = {}
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
         model, friction = self.joint.model(models), self.joint.friction_coefficient
         asked, start = [self._asked(each) for each in needed], unpack(self.start)
-        histories = integrate_together(model, friction, self.settings, start, asked, reached, self.resume)
+        histories = integrate_together(model, friction, self.settings, start, asked, keep, self.resume)
         for (each, places), history in zip(needed.items(), histories, strict=True):
-            raise_fault(history.outcome, history.message)
-            # one that its time limit has ended goes on from there when it gets more
-            progress = progress or reached.after(history.outcome)
             for place in places:
-                result = build_result(self, each, history, self.results[place][1])
-                yield replace(result, place=place, progress=progress)
+                yield replace(build_result(self, each, history, self.results[place][1]), place=place)
 
     def _asked(self, integrated: Integrated) -> WearRequest:
-        from solver.wear.integrate import WearRequest
-        from solver.wear.step import steps_of
+        from solver.wear.problem import WearRequest, steps_of
 
         counts: NDArray[np.float64] | ToTheEnd
         if self.to_the_end is not None and not integrated.unworn:

@@ -1,21 +1,25 @@
-"""Study of wear -> sweeps, and histories from their start states."""
+"""Study of wear -> sweeps, and histories from their start states; which points share a history, and why.
+
+The rates of all wear laws are proportional to the wear coefficient: dW/dt = k_w f(W), Eq. (7). With s k_w in place of
+k_w the same states follow each other, each at the cycle count t / s. Where the scheme chooses its steps, a task
+integrates the history of the largest k_w; the others are read from this one at the counts s t.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Hashable, Iterator, Sequence
 from typing import NamedTuple
 
+from solver.contact.wear_law import WearLaw
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
-from studyrunner.kinds.sharing import EQUAL, Integrated, describe_left_out, share_histories
-from studyrunner.kinds.task import Index, Joint, TaskPlan, grid, joint_of, n_unknowns_of, settings_at
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.task import EQUAL_POINTS, Index, Joint, TaskPlan, grid, joint_of, n_unknowns_of, settings_at
+from studyrunner.kinds.wear import OWN_STEPS, History, Integrated, ScaledHistory, Sweep
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import Realisation
 from studyrunner.study.study import Study
 
 _OF_HISTORY = ("wear_coefficient", "step", "scheme")
@@ -23,6 +27,16 @@ _OF_HISTORY = ("wear_coefficient", "step", "scheme")
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
+
+_REASONS = {
+    "cycles": "only the unworn states are asked for, the same for every step and scheme",
+    "unworn": "wear_coefficient = 0 wears nothing, whatever the step and the scheme",
+    "largest_depth": "slow_time.largest_depth sets the steps of the explicit scheme, whatever the step axis says",
+    "adaptive": "the adaptive scheme chooses its steps, for another wear_coefficient the same ones at other counts",
+    "final": 'the scheme "final" takes no step of a given length: the same state for every wear_coefficient',
+    "equal": EQUAL_POINTS,
+}
+"""Why points share a history."""
 
 
 class _Case(NamedTuple):
@@ -34,136 +48,147 @@ class _Case(NamedTuple):
     settings: SolverSettings
 
 
-class _Start(NamedTuple):
-    """Points of one part of a study that start from one state. at: their indices along the axes but `_OF_HISTORY`."""
+class _Point(NamedTuple):
+    """A point of the study. at: its index along the dimensions of the study."""
 
-    part: Realisation
-    at: Mapping[str, int]
+    wear_coefficient: float
+    step: float
+    scheme: str
+    at: Index
+
+
+_Starts = dict[float, dict[WearLaw, list[_Point]]]
+"""Points by frequency and wear law, in the order of the study."""
 
 
 def build_tasks(
-    study: Study, n_displacements: Sequence[int], contacts: Sequence[ContactChange], scenes: SceneSet
+    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[ContactChange]
 ) -> TaskPlan:
     """Tasks of a study of wear.
 
-    Points whose history is the same for a reason that the study itself shows share a task, see `sharing`. Points with a
-    solution of their own never do. The order and the numbers of the tasks depend on the study alone.
+    Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
+    their own never do. The order and the numbers of the tasks depend on the study alone.
     """
-    planner = _Planner(study, n_displacements)
-    for case, at in _cases(study, contacts, scenes).items():
-        ascending = sorted(at)
+    sweeps, histories, causes = list[Sweep](), list[History](), Counter[str]()
+    for case, starts in _cases(study, contacts, scenes).items():
+        ascending = sorted(starts)
+        n_unknowns = n_unknowns_of(n_displacements[case.joint.scene], case.settings.harmonics)
         for frequencies in [[one] for one in ascending] if case.direction == "ramp" else [ascending]:
-            planner.add_sweep(case, {frequency: at[frequency] for frequency in frequencies})
-    left_out = describe_left_out(planner.causes)
-    return TaskPlan(tuple(planner.histories), left_out, study.n_points, tuple(planner.sweeps))
+            sweep = Sweep(
+                number=len(sweeps),
+                frequencies=tuple(frequencies),
+                cost=seconds_of(n_unknowns, iterations_of_sweep(case.direction, len(frequencies))),
+                n_unknowns=n_unknowns,
+                follow=study.follow,
+                **case._asdict(),
+            )
+            sweeps.append(sweep)
+            for position, frequency in enumerate(frequencies):
+                for law, points in starts[frequency].items():
+                    shared = _share_histories(study, points, causes)
+                    for integrated in _together(study, shared):
+                        histories.append(_history(study, len(histories), case, sweep, position, law, integrated))
+    left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
+    return TaskPlan(tuple(histories), left_out, study.n_points, tuple(sweeps))
 
 
-def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) -> dict[_Case, dict[float, list[_Start]]]:
-    """Points that one sweep reaches, by frequency, in the order of the study."""
-    cases: dict[_Case, dict[float, list[_Start]]] = {}
+def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) -> dict[_Case, _Starts]:
+    """Points that one sweep reaches."""
+    cases: dict[_Case, _Starts] = {}
     lines = [(at, settings_at(study, at)) for at in grid(study, "excitation_amplitude", "sweep")]
     for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
-        axes, joint = part.study.axes, joint_of(part.study, scene, contact)
+        axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
+        choices = list(itertools.product(*(range(len(getattr(axes, name))) for name in _OF_HISTORY)))
         for at, settings in lines:
-            amplitude = axes.excitation_amplitude[at["excitation_amplitude"]]
-            case = _Case(joint, amplitude, axes.sweep[at["sweep"]], settings)
+            amplitude, direction = axes.excitation_amplitude[at["excitation_amplitude"]], axes.sweep[at["sweep"]]
+            starts = cases.setdefault(_Case(joint, amplitude, direction, settings), {})
             for place, frequency in enumerate(axes.frequency):
-                start = _Start(part, {**at, "frequency": place})
-                cases.setdefault(case, {}).setdefault(frequency, []).append(start)
+                points = starts.setdefault(frequency, {}).setdefault(law, [])
+                for choice in choices:
+                    wear, step, scheme = choice
+                    places = {**at, "frequency": place, **dict(zip(_OF_HISTORY, choice, strict=True))}
+                    index = (*(places[name] for name in study.own_axes), *part.place)
+                    points.append(_Point(axes.wear_coefficient[wear], axes.step[step], axes.scheme[scheme], index))
     return cases
 
 
-class _Planner:
-    """Builds the tasks of a study one after the other. causes: numbers of points that share a history, by reason."""
+def _share_histories(study: Study, points: Sequence[_Point], causes: Counter[str]) -> Iterator[Integrated]:
+    """The histories to integrate from a start state; with `shortcuts = false` only equal points share one.
 
-    def __init__(self, study: Study, n_displacements: Sequence[int]) -> None:
-        self._study = study
-        self._n_displacements = n_displacements
-        self._shared: dict[object, tuple[tuple[Integrated, ...], Counter[str]]] = {}
-        self.causes: Counter[str] = Counter()
-        self.sweeps: list[Sweep] = []
-        self.histories: list[History] = []
-
-    def add_sweep(self, case: _Case, at: Mapping[float, Sequence[_Start]]) -> None:
-        """A sweep and its histories. at: by frequency."""
-        n_unknowns = n_unknowns_of(self._n_displacements[case.joint.scene], case.settings.harmonics)
-        sweep = Sweep(
-            number=len(self.sweeps),
-            frequencies=tuple(at),
-            cost=seconds_of(n_unknowns, iterations_of_sweep(case.direction, len(at))),
-            n_unknowns=n_unknowns,
-            follow=self._study.follow,
-            **case._asdict(),
+    causes: numbers of points that are not computed alone, by reason; those of these points are added.
+    """
+    groups: dict[tuple[str, Hashable], list[_Point]] = {}
+    for point in points:
+        groups.setdefault(_group(study, point), []).append(point)
+    for (cause, _), alike in groups.items():
+        by_wear: dict[float, list[_Point]] = {}
+        for point in sorted(alike, key=lambda point: -point.wear_coefficient):
+            by_wear.setdefault(point.wear_coefficient, []).append(point)
+        first = next(iter(by_wear.values()))[0]
+        yield Integrated(
+            first.scheme,
+            study.slow_time.largest_depth if first.scheme == "explicit" else None,
+            tuple(
+                ScaledHistory(wear_coefficient, same[0].step, tuple(point.at for point in same))
+                for wear_coefficient, same in by_wear.items()
+            ),
+            unworn=cause in ("cycles", "unworn"),
         )
-        self.sweeps.append(sweep)
-        for position, starts in enumerate(at.values()):
-            by_law: dict[object, list[_Start]] = {}
-            for start in starts:
-                by_law.setdefault(start.part.study.wear.as_law, []).append(start)
-            for same in by_law.values():
-                self._add_histories(sweep, position, same)
+        n_different = len({point[:3] for point in alike})
+        causes.update({cause: n_different - 1, "equal": len(alike) - n_different})
 
-    def _add_histories(self, sweep: Sweep, position: int, starts: Sequence[_Start]) -> None:
-        owners: dict[float, list[tuple[_Start, int]]] = {}
-        for start in starts:
-            for place, value in enumerate(start.part.study.axes.wear_coefficient):
-                owners.setdefault(value, []).append((start, place))
-        study = starts[0].part.study
-        axes = study.axes.model_copy(update={"wear_coefficient": tuple(owners)})
-        study = study.model_copy(update={"axes": axes})
-        key = (study.wear.as_law, tuple(owners))
-        if key not in self._shared:
-            # the same from each start state
-            self._shared[key] = share_histories(study)
-        found, causes = self._shared[key]
-        of_value = list(owners.values())
-        self.causes += causes
-        n_equal = sum(len(each) - 1 for each in of_value)
-        self.causes[EQUAL] += n_equal * len(study.axes.step) * len(study.axes.scheme)
-        together: dict[object, list[Integrated]] = {}
-        for each in found:
-            alone = each.unworn or not study.solver.shortcuts
-            together.setdefault(each if alone else each.wear_coefficient, []).append(self._placed(each, of_value))
-        for integrated in together.values():
-            for begin in range(0, len(integrated), MOST_TOGETHER):
-                self._add_history(study, sweep, position, tuple(integrated[begin : begin + MOST_TOGETHER]))
 
-    def _placed(self, integrated: Integrated, of_value: Sequence[Sequence[tuple[_Start, int]]]) -> Integrated:
-        """With the points of the study in place of choices. of_value: starts and places by wear coefficient."""
+def _group(study: Study, point: _Point) -> tuple[str, Hashable]:
+    """Reason for which a point may share a history, and what points that do have in common."""
+    if study.solver.shortcuts:
+        if study.output_counts[-1] == 0.0:
+            return "cycles", point.wear_coefficient
+        if point.wear_coefficient == 0.0:
+            return "unworn", 0.0
+        if point.scheme in OWN_STEPS:
+            return point.scheme, None
+        if point.scheme == "explicit" and study.slow_time.largest_depth is not None:
+            # the last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories
+            return "largest_depth", point.wear_coefficient
+    return "alone", point[:3]
 
-        def point(start: _Start, *choice: int) -> Index:
-            places = {**start.at, **dict(zip(_OF_HISTORY, choice, strict=True))}
-            return (*(places[name] for name in self._study.own_axes), *start.part.place)
 
-        histories = []
-        for each in integrated.histories:
-            owners = ((start, (wear, *rest)) for first, *rest in each.points for start, wear in of_value[first])
-            histories.append(replace(each, points=tuple(point(start, *choice) for start, choice in owners)))
-        return replace(integrated, histories=tuple(histories))
+def _together(study: Study, shared: Iterator[Integrated]) -> Iterator[tuple[Integrated, ...]]:
+    """The histories by task."""
+    groups: dict[object, list[Integrated]] = {}
+    for each in shared:
+        alone = each.unworn or not study.solver.shortcuts
+        groups.setdefault(each if alone else each.wear_coefficient, []).append(each)
+    for group in groups.values():
+        for begin in range(0, len(group), MOST_TOGETHER):
+            yield tuple(group[begin : begin + MOST_TOGETHER])
 
-    def _add_history(self, study: Study, sweep: Sweep, position: int, integrated: tuple[Integrated, ...]) -> None:
-        cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
-        end = ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None
-        steps = [(each.scheme, each.step) for each in integrated]
-        self.histories.append(
-            History(
-                number=len(self.histories),
-                joint=sweep.joint,
-                law=study.wear.as_law,
-                sweep=sweep.number,
-                position=position,
-                frequency=sweep.frequencies[position],
-                excitation_amplitude=sweep.excitation_amplitude,
-                direction=sweep.direction,
-                settings=sweep.settings,
-                integrated=integrated,
-                cycles=study.output_counts,
-                variables=tuple(self._study.recorded),
-                loops=study.outputs.loops,
-                cost=seconds_of(sweep.n_unknowns, iterations_of_histories(steps, cycles)),
-                n_unknowns=sweep.n_unknowns,
-                until=study.until,
-                follow=study.follow,
-                to_the_end=end,
-            )
-        )
+
+def _history(
+    study: Study,
+    number: int,
+    case: _Case,
+    sweep: Sweep,
+    position: int,
+    law: WearLaw,
+    integrated: tuple[Integrated, ...],
+) -> History:
+    cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
+    steps = [(each.scheme, each.step) for each in integrated]
+    return History(
+        number=number,
+        law=law,
+        sweep=sweep.number,
+        position=position,
+        frequency=sweep.frequencies[position],
+        integrated=integrated,
+        cycles=study.output_counts,
+        variables=tuple(study.recorded),
+        loops=study.outputs.loops,
+        cost=seconds_of(sweep.n_unknowns, iterations_of_histories(steps, cycles)),
+        n_unknowns=sweep.n_unknowns,
+        until=study.until,
+        follow=study.follow,
+        to_the_end=ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
+        **case._asdict(),
+    )

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,13 +27,9 @@ Task = Any
 CostKeys = Sequence[tuple[Hashable, ...]]
 """Groups of similar tasks that a task belongs to: sequences of keys, each from a general group to a special one."""
 
-Measurement = Sequence[tuple[Hashable, float, float]]
-"""What is learnt from one task: keys of groups, each with the measured and the expected time, s. The expected time of a
-key contains the corrections of all other sequences of keys."""
-
 WATCH_SECONDS = 1.0
-"""Shortest time between two looks at the running tasks, s. Without these looks 256 ranks are 0.81 busy for 0.97
-(`tests.benchmarks.scheduling usual`)."""
+"""Shortest time between two looks at the running tasks, s. Without these looks 256 ranks are 0.81 busy for 0.97, and
+without corrections 0.80 (`tests.benchmarks.scheduling usual`)."""
 
 _WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
 _AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
@@ -46,104 +42,53 @@ class CostModel:
     """Corrects estimated times by the measured times of similar tasks.
 
     The correction is a product of factors, one for each sequence of keys. The factor of a key is the sum of the
-    measured times over the sum of the expected times. The factor of the key before counts as one more measurement, so
-    that a few unusual times do not decide. Before the first key the factor is 1.
+    measured times over the sum of the expected times, which contain the corrections of all other sequences. The factor
+    of the key before counts as one more measurement, so that a few unusual times do not decide.
     """
 
-    def __init__(self) -> None:
-        self._sums: dict[Hashable, tuple[float, float, int]] = {}
-        # Factors asked for since the last measurement: most of thousands of waiting tasks share their keys.
+    def __init__(self, sums: Mapping[Hashable, tuple[float, float, int]] | None = None) -> None:
+        """sums: measured and expected times, s, and their number, by key."""
+        self.sums = dict(sums or {})
+        # asked for since the last measurement: most of thousands of waiting tasks share their keys
         self._factors: dict[tuple[Hashable, ...], float] = {}
 
-    def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:
+    def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> None:
         """Adds the times of a task, s; the estimated time is positive."""
         factors = [self._factor(keys) for keys in cost_keys]
         expected = estimated * math.prod(factors)
-        found = [
-            (key, measured, expected / each) for keys, each in zip(cost_keys, factors, strict=True) for key in keys
-        ]
-        self._add(found, 1)
-        return found
-
-    def forget(self, measurement: Measurement) -> None:
-        """Takes back a measurement."""
-        self._add(measurement, -1)
+        for keys, factor in zip(cost_keys, factors, strict=True):
+            for key in keys:
+                before = self.sums.get(key, (0.0, 0.0, 0))
+                self.sums[key] = before[0] + measured, before[1] + expected / factor, before[2] + 1
+        self._factors.clear()
 
     def correction(self, cost_keys: CostKeys) -> float:
         """Factor by which an estimated time is multiplied, positive."""
         return math.prod(self._factor(keys) for keys in cost_keys)
 
-    def measured(self, key: Hashable) -> float:
-        """Sum of the measured times, s, of all tasks with a key."""
-        return self._sums.get(key, (0.0, 0.0, 0))[0]
-
     def _factor(self, keys: tuple[Hashable, ...]) -> float:
         if keys not in self._factors:
             found = 1.0
             for key in keys:
-                measured, expected, n = self._sums.get(key, (0.0, 0.0, 0))
+                measured, expected, n = self.sums.get(key, (0.0, 0.0, 0))
                 if n > 0:
                     mean = expected / n
                     found = (measured + found * mean) / (expected + mean)
             self._factors[keys] = max(found, _LEAST)
         return self._factors[keys]
 
-    def _add(self, measurement: Measurement, sign: int) -> None:
-        self._factors.clear()
-        for key, measured, expected in measurement:
-            before = self._sums.get(key, (0.0, 0.0, 0))
-            self._sums[key] = (before[0] + sign * measured, before[1] + sign * expected, before[2] + sign)
-
-
-@dataclass(frozen=True)
-class Assignment:
-    """A task on its way to a rank."""
-
-    number: int
-    task: Task
-
 
 @dataclass
 class _Running:
-    """A task that a rank has: results still to come, and when the last one came or the task was given.
-
-    measurement: what the cost model has learnt from a task that takes longer than expected.
-    """
+    """A task that a rank has: results still to come, and when the last one came or the task was given."""
 
     task: Task
     n_left: int
     began: float
-    measurement: Measurement = ()
 
 
-class _Waiting:
-    """Waiting tasks; the one with the longest expected time comes first, of equal ones the earliest."""
-
-    def __init__(self, costs: CostModel) -> None:
-        self._costs = costs
-        # with the keys, which are not computed twice
-        self._tasks: dict[int, tuple[Task, CostKeys]] = {}
-        self._order: list[tuple[float, int]] = []
-
-    def __len__(self) -> int:
-        return len(self._tasks)
-
-    def add(self, number: int, task: Task) -> None:
-        self._tasks[number] = task, task.cost_keys
-        heapq.heappush(self._order, self._entry(number))
-
-    def pop(self) -> tuple[int, Task]:
-        number = heapq.heappop(self._order)[1]
-        return number, self._tasks.pop(number)[0]
-
-    def reorder(self) -> None:
-        """Puts all tasks in the order of the times that are expected now."""
-        self._order = [self._entry(number) for number in self._tasks]
-        heapq.heapify(self._order)
-
-    def _entry(self, number: int) -> tuple[float, int]:
-        task, cost_keys = self._tasks[number]
-        return -task.cost * self._costs.correction(cost_keys), number
+_Waiting = list[tuple[float, int, Task, CostKeys]]
+"""A heap: the task with the longest expected time first, of equal ones the earliest."""
 
 
 class Dispatcher:
@@ -155,14 +100,12 @@ class Dispatcher:
     """
 
     def __init__(self, n_ranks: int, costs: CostModel, clock: Callable[[], float]) -> None:
-        self._n_ranks = n_ranks
-        self._costs = costs
-        self._clock = clock
+        self._n_ranks, self._costs, self._clock = n_ranks, costs, clock
         self._n_known = 0
         self._began = clock()
         self._next_watch = self._began + WATCH_SECONDS
-        self._first = _Waiting(costs)
-        self._others = _Waiting(costs)
+        self._first: _Waiting = []
+        self._others: _Waiting = []
         self._given: dict[int, _Running] = {}
         # ranks without a task: the last is the next to get one
         self._free = dict.fromkeys(reversed(range(n_ranks)))
@@ -170,7 +113,7 @@ class Dispatcher:
     @property
     def done(self) -> bool:
         """Whether no task waits and no task runs."""
-        return not self._given and self._n_waiting == 0
+        return not (self._given or self._first or self._others)
 
     @property
     def wants_more(self) -> bool:
@@ -180,27 +123,26 @@ class Dispatcher:
     def add(self, tasks: Iterable[Task]) -> None:
         """Adds tasks that have become possible."""
         for task in tasks:
-            (self._first if task.gives_starts else self._others).add(self._n_known, task)
+            keys = task.cost_keys
+            entry = (-task.cost * self._costs.correction(keys), self._n_known, task, keys)
+            heapq.heappush(self._first if task.gives_starts else self._others, entry)
             self._n_known += 1
 
-    def assign(self) -> Iterator[tuple[int, Assignment]]:
-        """Ranks that get a task now, and the tasks."""
-        while self._free and self._n_waiting:
+    def assign(self) -> Iterator[tuple[int, int, Task]]:
+        """Ranks that get a task now, with the number of the task and the task."""
+        while self._free and (self._first or self._others):
             rank, _ = self._free.popitem()
             is_first = self._first and (self.wants_more or not self._others)
-            number, task = (self._first if is_first else self._others).pop()
+            _, number, task, _ = heapq.heappop(self._first if is_first else self._others)
             self._given[number] = _Running(task, task.n_results, self._clock())
-            yield rank, Assignment(number, task)
+            yield rank, number, task
 
     def deliver(self, rank: int, number: int, seconds: float) -> Task:
         """Notes a result, which took so many seconds; returns its task."""
         given = self._given[number]
         task = given.task
-        self._costs.forget(given.measurement)
-        given.measurement = ()
         self._costs.learn(task.cost_keys, task.cost / task.n_results, seconds)
-        given.n_left -= 1
-        given.began = self._clock()
+        given.n_left, given.began = given.n_left - 1, self._clock()
         if given.n_left == 0:
             del self._given[number]
             self._free[rank] = None
@@ -217,23 +159,21 @@ class Dispatcher:
         return sorted(busy, key=lambda entry: -entry[2])
 
     def watch(self) -> None:
-        """Called many times a second: now and then learns from tasks that take longer than expected, and orders anew.
+        """Called many times a second: now and then orders the waiting tasks anew.
 
-        A history that takes a hundred times as long as most corrects the cost model long before its end, in time for
+        A running history that takes a hundred times as long as most counts as measured long before its end, in time for
         the order of similar tasks.
         """
         now = self._clock()
-        if now < self._next_watch or not self._n_waiting:
+        if now < self._next_watch or not self._others:
             return
         self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
+        costs = CostModel(self._costs.sums)
         for given in self._given.values():
-            task = given.task
-            at_least = _AS_LONG_AGAIN * (now - given.began)
-            if not task.gives_starts and at_least > task.cost * self._costs.correction(task.cost_keys):
-                self._costs.forget(given.measurement)
-                given.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
-        self._others.reorder()
-
-    @property
-    def _n_waiting(self) -> int:
-        return len(self._first) + len(self._others)
+            task, at_least = given.task, _AS_LONG_AGAIN * (now - given.began)
+            if not task.gives_starts and at_least > task.cost * costs.correction(task.cost_keys):
+                costs.learn(task.cost_keys, task.cost, at_least)
+        self._others = [
+            (-task.cost * costs.correction(keys), number, task, keys) for _, number, task, keys in self._others
+        ]
+        heapq.heapify(self._others)

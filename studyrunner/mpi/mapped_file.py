@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 from studyrunner.mpi.ranks import RankInterrupted, Ranks, wait_for_message
-from studyrunner.system.files import create
 
 _ALIGNED = 64  # bytes: no array shares a line of the cache with another one
 
@@ -42,7 +41,7 @@ def write_mapped(thing: object, path: Path) -> MappedFile:
     buffers: list[pickle.PickleBuffer] = []
     head = pickle.dumps(thing, protocol=5, buffer_callback=buffers.append)
     places, end = [], 0
-    with create(path) as file:
+    with path.open("xb") as file:
         try:
             for buffer in buffers:
                 begin = -(-end // _ALIGNED) * _ALIGNED
@@ -85,21 +84,19 @@ def ranks_that_see(ranks: Ranks, path: Path) -> frozenset[int]:
 
     Raises KeyboardInterrupt where a rank was interrupted.
     """
-    question, seeing = WhetherSeen(path, secrets.token_bytes()), set[int]()
     if ranks.size == 1:
         return frozenset()
+    question = WhetherSeen(path, secrets.token_bytes())
     try:
-        with create(path) as file:
+        with path.open("xb") as file:
             file.write(question.mark)
         for rank in range(1, ranks.size):
             ranks.send(question, rank)
-        for _ in range(1, ranks.size):
-            rank, is_seen = wait_for_message(ranks)
-            if isinstance(is_seen, RankInterrupted):
-                raise KeyboardInterrupt
-            seeing |= {rank} if is_seen else set()
+        answers = [wait_for_message(ranks) for _ in range(1, ranks.size)]
     except OSError:
         return frozenset()
     finally:
         path.unlink(missing_ok=True)
-    return frozenset(seeing)
+    if any(isinstance(is_seen, RankInterrupted) for _, is_seen in answers):
+        raise KeyboardInterrupt
+    return frozenset(rank for rank, is_seen in answers if is_seen)

@@ -42,6 +42,10 @@ class LauncherError(Exception):
     """The launcher started processes that cannot work together: each would compute the whole study."""
 
 
+class RankInterrupted:
+    """Message of a rank that was ended from outside; all ranks end."""
+
+
 def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
     """Number of this process according to the launcher, 0 without launcher."""
     return _largest(environment, _RANKS)
@@ -76,7 +80,7 @@ class Ranks:
         raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
 
     def flush(self) -> None:
-        """Waits until all messages are received, or need this process no more; called before a rank goes on computing.
+        """Waits until all messages are received; called before a rank goes on computing.
 
         The receiver has to look for messages: a large message moves only while its sender is in the MPI library.
         """
@@ -98,8 +102,6 @@ class MpiRanks(Ranks):
     software: of each rank, as `describe_software` gives it.
     """
 
-    software: list[tuple[str, str]]
-
     def __init__(self) -> None:
         import mpi4py
 
@@ -114,13 +116,11 @@ class MpiRanks(Ranks):
             # start_ranks says the same with the remedy.
             warnings.filterwarnings("ignore", "suspicious MPI execution environment", RuntimeWarning)
             MPI.Init_thread(MPI.THREAD_FUNNELED)
-        self._mpi = MPI
-        self._world = MPI.COMM_WORLD
+        self._mpi, self._world = MPI, MPI.COMM_WORLD
         self._sent: list[MPI.Request] = []
         self._many = _MANY_SENT
-        self.rank = self._world.Get_rank()
-        self.size = self._world.Get_size()
-        self.software = self._world.allgather(describe_software())
+        self.rank, self.size = self._world.Get_rank(), self._world.Get_size()
+        self.software: list[tuple[str, str]] = self._world.allgather(describe_software())
         if library == "MPICH":
             # all ranks have mapped the memory: they have exchanged messages
             _unlink_shared_memory()
@@ -135,10 +135,8 @@ class MpiRanks(Ranks):
             self._sent.append(self._world.isend(message, dest=rank))
 
     def flush(self) -> None:  # noqa: D102
-        self._forget_sent()
-        while self._sent:
+        while self._forget_sent():
             time.sleep(POLL_SECONDS)
-            self._forget_sent()
 
     def receive(self) -> tuple[int, object] | None:  # noqa: D102
         with uninterrupted():
@@ -157,18 +155,19 @@ class MpiRanks(Ranks):
         time.sleep(_SECONDS_TO_PRINT)
         self._world.Abort(status)
 
-    def _forget_sent(self) -> None:
+    def _forget_sent(self) -> bool:
+        """Whether there are messages that are still on their way."""
         self._sent = [request for request in self._sent if not request.Test()]
+        return bool(self._sent)
 
 
 def _unlink_shared_memory() -> None:
     """Removes the names of the memory that MPICH shares: the memory then ends with its processes, however they end."""
-    # systems other than Linux have no such list; another rank may be faster, and a name that stays is no harm
+    # systems other than Linux have no such list
     with contextlib.suppress(OSError):
         for line in Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace").splitlines():
             if _SHARED in line:
-                with contextlib.suppress(OSError):
-                    Path(line[line.index(_SHARED) :]).unlink()
+                Path(line[line.index(_SHARED) :]).unlink(missing_ok=True)
 
 
 def start_ranks() -> Ranks:
@@ -185,26 +184,21 @@ def start_ranks() -> Ranks:
         if announced <= 1:
             return Ranks()
         raise LauncherError(f"{announced} processes were started that cannot talk ({error}): {_REMEDY}") from error
-    if announced > ranks.size:
-        ranks.close()
-        raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
     host, own = ranks.software[0]
-    for rank, (other_host, other) in enumerate(ranks.software):
-        if other != own:
-            ranks.close()
-            said = f"rank {rank} on {other_host} runs other versions of this program, of Python or of numpy than"
-            raise LauncherError(f"{said} rank 0 on {host}: install the same software for all ranks")
-    return ranks
+    other = next(((rank, name) for rank, (name, software) in enumerate(ranks.software) if software != own), None)
+    if announced <= ranks.size and other is None:
+        return ranks
+    ranks.close()
+    if other is None:
+        raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
+    said = f"rank {other[0]} on {other[1]} runs other versions of this program, of Python or of numpy than"
+    raise LauncherError(f"{said} rank 0 on {host}: install the same software for all ranks")
 
 
 def describe_software() -> tuple[str, str]:
     """Name of this machine, and a hash of what this process runs."""
     packages = map(package_digest, ("solver", "studies", "studyrunner"))
     return platform.node(), " ".join((platform.machine(), *packages))
-
-
-class RankInterrupted:
-    """Message of a rank that was ended from outside; all ranks end."""
 
 
 def wait_for_message(ranks: Ranks) -> tuple[int, object]:

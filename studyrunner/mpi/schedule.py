@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from studyrunner.mpi.dispatch import Assignment, CostModel, Dispatcher, Task
+from studyrunner.mpi.dispatch import CostModel, Dispatcher, Task
 from studyrunner.mpi.mapped_file import WhetherSeen
 from studyrunner.mpi.ranks import POLL_SECONDS, RankInterrupted, Ranks, wait_for_message
 from studyrunner.system.machine import MachineFaultError
@@ -29,12 +29,7 @@ SECONDS_TO_PROGRESS = 3.0
 report waits for others (`checkpoint.store`) a kill loses no step that was finished more than 5 s before, where steps
 are short and the disk is fast enough."""
 
-SECONDS_TO_SHARE = 1.0
-"""Shortest time between two reports of the share of a task that is done, s."""
-
-_MANY_RANKS = 100
-"""With more ranks each rank reports less often, as rank 0 writes all reports to the disk."""
-
+_MANY_RANKS = 100  # with more, each reports less often, as rank 0 writes all reports to the disk
 _LOOKS_A_TICK = 100
 _AT_ONCE = 64
 
@@ -42,6 +37,14 @@ Result = Any
 
 Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
 """Does a task: gives the results one by one and may hand the progress to the given function."""
+
+
+@dataclass(frozen=True)
+class _Assignment:
+    """A task on its way to a rank."""
+
+    number: int
+    task: Task
 
 
 @dataclass(frozen=True)
@@ -55,14 +58,20 @@ class _Delivery:
 
 @dataclass(frozen=True)
 class _Progress:
-    """Progress of a task: data to continue from, words, or the share that is done."""
+    """Progress of a task: data to continue from, or words."""
 
     number: int
     progress: object
 
 
 class Office:
-    """What rank 0 does with tasks, results and messages. All of it is called in the main thread."""
+    """What rank 0 does with tasks, results and messages. All of it is called in the main thread.
+
+    costs: learns the run times of the tasks.
+    """
+
+    def __init__(self) -> None:
+        self.costs = CostModel()
 
     def begin(self) -> Iterable[Task]:
         """Tasks that are possible at the beginning; taken one by one, when ranks can use more."""
@@ -83,13 +92,13 @@ class Office:
         """Called many times a second. running: returns the running tasks, as `Dispatcher.running`."""
 
 
-def serve_tasks(ranks: Ranks, office: Office, run: Run, costs: CostModel | None = None) -> None:
-    """Rank 0: has all tasks done and computes some of them. costs: learns the run times of tasks.
+def serve_tasks(ranks: Ranks, office: Office, run: Run) -> None:
+    """Rank 0: has all tasks done and computes some of them.
 
     An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here, and
     MachineFaultError or KeyboardInterrupt where another rank has said so.
     """
-    server = _Server(ranks, office, run, costs or CostModel())
+    server = _Server(ranks, office, run)
     try:
         with uninterrupted():
             server.hand_out()
@@ -112,30 +121,26 @@ def follow_rank_0(ranks: Ranks, run: Run) -> None:
     while (message := wait_for_message(ranks)[1]) is not None:
         if isinstance(message, WhetherSeen):
             send(message.answer())
-        elif isinstance(message, Assignment):
-            _work(message, run, send, _seconds_to_progress(ranks), raise_ending)
+        elif isinstance(message, _Assignment):
+            _work(message, run, send, ranks.size, raise_ending)
         else:
             raise TypeError(f"rank 0 sent {message!r} instead of a task")
 
 
 def _work(
-    assignment: Assignment,
-    run: Run,
-    send: Callable[[object], None],
-    seconds_to_progress: float,
-    check: Callable[[], None],
+    assignment: _Assignment, run: Run, send: Callable[[object], None], n_ranks: int, check: Callable[[], None]
 ) -> None:
     """Sends the results of a task, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
     task, n_given, began = assignment.task, 0, time.perf_counter()
-    sent = dict.fromkeys((True, False), began)
+    pause = SECONDS_TO_PROGRESS * max(1.0, n_ranks / _MANY_RANKS)
+    sent, begin = dict[type, float](), began  # data and words have times of their own
 
     def keep(progress: object) -> None:
         check()
-        is_share, now = isinstance(progress, float), time.perf_counter()
         # a task that has given all its results has no progress
-        if n_given < task.n_results and now > sent[is_share] + (SECONDS_TO_SHARE if is_share else seconds_to_progress):
+        if n_given < task.n_results and time.perf_counter() > sent.get(type(progress), begin) + pause:
             send(_Progress(assignment.number, progress))
-            sent[is_share] = time.perf_counter()
+            sent[type(progress)] = time.perf_counter()
 
     for result in run(task, keep):
         n_given += 1
@@ -150,14 +155,14 @@ def _work(
 class _LocalWorker:
     """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
 
-    def __init__(self, run: Run, seconds_to_progress: float) -> None:
-        self._tasks: queue.SimpleQueue[Assignment | None] = queue.SimpleQueue()
+    def __init__(self, run: Run, n_ranks: int) -> None:
+        self._tasks: queue.SimpleQueue[_Assignment | None] = queue.SimpleQueue()
         self._sent: deque[object] = deque()
         self.given_up = False
         self.assign = self._tasks.put
         # A daemon: an exception in the main thread ends the process although a task still runs.
-        arguments = (run, seconds_to_progress)
-        self._thread = threading.Thread(target=self._compute, args=arguments, name="tasks of rank 0", daemon=True)
+        name = "tasks of rank 0"
+        self._thread = threading.Thread(target=self._compute, args=(run, n_ranks), name=name, daemon=True)
         self._thread.start()
 
     def receive(self) -> object:
@@ -174,10 +179,10 @@ class _LocalWorker:
             self._thread.join()
         self.receive()
 
-    def _compute(self, run: Run, seconds_to_progress: float) -> None:
+    def _compute(self, run: Run, n_ranks: int) -> None:
         try:
             while (assignment := self._tasks.get()) is not None:
-                _work(assignment, run, self._send, seconds_to_progress, self._check)
+                _work(assignment, run, self._send, n_ranks, self._check)
         except BaseException as error:  # handed to the main thread, which raises it
             self._sent.append(error)
 
@@ -191,24 +196,20 @@ class _LocalWorker:
 
 
 class _Server:
-    def __init__(self, ranks: Ranks, office: Office, run: Run, costs: CostModel) -> None:
-        self._ranks = ranks
-        self._office = office
+    def __init__(self, ranks: Ranks, office: Office, run: Run) -> None:
+        self._ranks, self._office = ranks, office
         self._waiting = iter(office.begin())
-        self.dispatcher = Dispatcher(ranks.size, costs, time.monotonic)
-        self.local = _LocalWorker(run, _seconds_to_progress(ranks))
+        self.dispatcher = Dispatcher(ranks.size, office.costs, time.monotonic)
+        self.local = _LocalWorker(run, ranks.size)
 
     def look(self) -> None:
         """Receives what there is; waits a moment where there is nothing."""
-        quiet = False
         for _ in range(_LOOKS_A_TICK):
             received, message = self._ranks.receive(), self.local.receive()
-            if received is not None:
-                self._accept(*received)
-            if message is not None:
-                self._accept(0, message)
-            quiet = received is None and message is None
-            if quiet:
+            for sender, content in (received or (0, None), (0, message)):
+                if content is not None:
+                    self._accept(sender, content)
+            if quiet := received is None and message is None:
                 break
         self.dispatcher.watch()
         self._office.tick(self.dispatcher.running)
@@ -220,8 +221,8 @@ class _Server:
         """Sends tasks to the ranks that have none."""
         while self.dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
             self.dispatcher.add(more)
-        for rank, assigned in self.dispatcher.assign():
-            assignment = Assignment(assigned.number, self._office.prepare(rank, assigned.task))
+        for rank, number, task in self.dispatcher.assign():
+            assignment = _Assignment(number, self._office.prepare(rank, task))
             if rank == 0:
                 self.local.assign(assignment)
             else:
@@ -230,18 +231,14 @@ class _Server:
     def _accept(self, rank: int, message: object) -> None:
         if isinstance(message, _Progress):
             self._office.keep(self.dispatcher.task(message.number), message.progress)
+        elif isinstance(message, _Delivery):
+            task = self.dispatcher.deliver(rank, message.number, message.seconds)
+            self.dispatcher.add(self._office.take(task, message.result))
+            self.hand_out()
         elif isinstance(message, RankInterrupted):
             begin_ending()
             raise KeyboardInterrupt
         elif isinstance(message, MachineFaultError):
             raise message
-        elif isinstance(message, _Delivery):
-            task = self.dispatcher.deliver(rank, message.number, message.seconds)
-            self.dispatcher.add(self._office.take(task, message.result))
-            self.hand_out()
         else:
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
-
-
-def _seconds_to_progress(ranks: Ranks) -> float:
-    return SECONDS_TO_PROGRESS * max(1.0, ranks.size / _MANY_RANKS)

@@ -28,8 +28,8 @@ from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
 _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
 
 
-def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, object]:
-    """Attributes of a variable of the file. of_modes: whether it is a file of nonlinear modes."""
+def attributes(name: str, entry: Variable) -> dict[str, object]:
+    """Attributes of a variable of the file."""
     content = "coordinate" if name in COORDINATES else entry.content
     found: dict[str, object] = {"units": entry.units, "long_name": entry.long_name, "coverage_content_type": content}
     comment = entry.comment
@@ -43,7 +43,7 @@ def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, 
     if name == "outcome":
         found["flag_values"] = np.array(list(Outcome), dtype=entry.dtype)
         found["flag_meanings"] = " ".join(flag.meaning for flag in Outcome)
-        found["sentences"] = "\n".join(flag.sentence_of_mode if of_modes else flag.sentence for flag in Outcome)
+        found["sentences"] = "\n".join(flag.sentence for flag in Outcome)
     return found
 
 

@@ -16,7 +16,7 @@ from studies.scene_file import has_mesh
 from studyrunner.checkpoint.store import read_study
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.study.text import read_toml
-from studyrunner.system.files import create, new_partial, sync
+from studyrunner.system.files import new_partial, sync
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
         remedy = _obstacle(option, path, target, inputs)
         if not remedy:
             trial = new_partial(target)
-            with create(trial) as file:
+            with trial.open("xb") as file:
                 try:
                     file.write(_TRIAL)
                     sync(file)

@@ -153,7 +153,7 @@ def _create_all(
         dimensions = (*study.dimensions, *entry.dimensions)
         # a chunk of loops holds a single pair: then pairs without loops take no room
         own = (1 if name in LOOPS and each == "contact" else sizes[each] for each in entry.dimensions)
-        variable = _create(file, name, entry, dimensions, (*slab, *own), not study.kind.counted)
+        variable = _create(file, name, entry, dimensions, (*slab, *own))
         named = [each.name for each in drawn if set(each.dimensions) <= set(dimensions)]
         named = of_pairs * ("contact" in entry.dimensions) + named
         if named and not entry.is_text:
@@ -164,7 +164,7 @@ def _create_all(
 
 
 def _create(
-    file: netCDF4.Dataset, name: str, entry: Variable, dimensions: Sequence[str], chunks: Sequence[int], of_modes: bool
+    file: netCDF4.Dataset, name: str, entry: Variable, dimensions: Sequence[str], chunks: Sequence[int]
 ) -> netCDF4.Variable[Any]:
     """A compressed variable with its attributes; texts of any length cannot be compressed."""
     if entry.is_text:
@@ -174,7 +174,7 @@ def _create(
         variable = file.createVariable(name, entry.dtype, dimensions, fill_value=fill, chunksizes=chunks, **_PACKED)
         # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
         variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
-    variable.setncatts(attributes(name, entry, of_modes))
+    variable.setncatts(attributes(name, entry))
     return variable
 
 
@@ -186,7 +186,7 @@ def _write_array(file: netCDF4.Dataset, shape: Sequence[int], slab: Sequence[int
             file.createDimension(dimension, size)
     if array.over_axes:
         own = values.shape[len(shape) :]
-        variable = _create(file, array.name, array.entry, array.dimensions, (*slab, *own), of_modes=False)
+        variable = _create(file, array.name, array.entry, array.dimensions, (*slab, *own))
         variable[...] = np.broadcast_to(values, (*shape, *own))
         return
     is_text = values.dtype.kind == "U"

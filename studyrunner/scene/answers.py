@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.scene_answers import ExactAnswer, WearQuestion, stuck_frequencies
+from studies.scene import ExactAnswer, WearQuestion, as_scene, stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import changed_keys, scene_answer, scene_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build, has_frequencies
+from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build
 from studyrunner.scene.scene_set import SceneSet, axes_of_difference
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.realisation import realise
@@ -67,7 +66,8 @@ def _mesh(study: Study) -> Iterator[SmallArray]:
 
 def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
     scene = study.scene
-    found = scene_frequencies(scene.model, scene.parameters) if has_frequencies(study) else stuck_frequencies(model)
+    bundled = scene.is_bundled and as_scene(scene.parameters)
+    found = bundled.natural_frequencies(model) if bundled else stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()
     labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
     yield SmallArray("natural_frequency", entry.dimensions, found.frequencies, entry)
@@ -144,15 +144,19 @@ _WITHOUT_INFLUENCE = ("step", "scheme", "sweep")
 
 
 def _changed(study: Study) -> frozenset[str]:
-    """Keys of a part of a study that differ from their defaults and may change the exact answer.
+    """Keys of a part of a study that differ from their defaults and may change the exact answer, as "wear.law".
 
-    Without the parameters of the scene, which `scene_answer` looks at. [slow_time], [solver] and [outputs] say how a
-    point is computed and shown. What depends on another key has a closed form that knows the key, or none.
+    Without the parameters of the scene, which knows them. [slow_time], [solver] and [outputs] say how a point is
+    computed and shown. What depends on another key has a closed form that knows the key, or none.
     """
-    tables = {"scene": ("model", "parameters"), "axes": _WITHOUT_INFLUENCE, "wear": ()}
-    changed = {key for name in tables for key in changed_keys(getattr(study, name), name)}
-    others = {name for name in ("scatter", "loading", "mission") if getattr(study, name)}
-    return frozenset(changed | others) - {f"{name}.{key}" for name, keys in tables.items() for key in keys}
+    changed = {name for name in ("scatter", "loading", "mission") if getattr(study, name)}
+    for name, without in (("scene", ("model", "parameters")), ("axes", _WITHOUT_INFLUENCE), ("wear", ())):
+        table = getattr(study, name)
+        for key, entry in type(table).model_fields.items():
+            default = entry.get_default(call_default_factory=True)
+            if not entry.exclude and key not in without and (entry.is_required() or getattr(table, key) != default):
+                changed.add(f"{name}.{key}")
+    return frozenset(changed)
 
 
 def _answers(study: Study) -> dict[str, np.ndarray]:
@@ -162,7 +166,7 @@ def _answers(study: Study) -> dict[str, np.ndarray]:
 
     def answer(frequency: float, amplitude: float) -> ExactAnswer:
         asked = WearQuestion(frequency, amplitude, given, counts, study.wear.as_law, depth, changed)
-        return scene_answer(study.scene.model, study.scene.parameters, asked)
+        return as_scene(study.scene.parameters).exact_answer(asked)
 
     answers = [[answer(one, other) for other in axes.excitation_amplitude] for one in axes.frequency]
     others = (1,) * (len(study.own_axes) - 3)
@@ -198,9 +202,8 @@ def check_study_model(study: Study, picture: Path, progress: Callable[[str], Non
         raise UserError("command line", "--check", study.source, remedy)
     # what reads and reduces it is loaded where there is one
     from studies.fe_models.from_files.check import describe_model
-    from studies.fe_models.from_files.model import load_model
+    from studies.fe_models.from_files.model import checked, describe_origin, load_model, reduce_model
     from studies.fe_models.from_files.picture import draw_pairs
-    from studies.fe_models.from_files.scene import checked, describe_origin, reduce_model
 
     parameters = checked(study.scene.parameters)
     with scene_errors(study.source, None), np.errstate(all="ignore"):

@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
 from solver.packing import Packed, pack_model, unpack_model
-from studies.contact_compliance import make_compliant
 from studies.fe_models.model_files import file_digest
-from studies.scene_answers import stuck_frequencies
+from studies.scene import as_scene, make_compliant, stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene, scene_has, scene_mesh
+from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.sections import AUTO
@@ -36,7 +35,7 @@ from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from studies.scene_answers import SurfaceMesh
+    from studies.scene import SurfaceMesh
     from studyrunner.checkpoint.store import Store
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
@@ -149,7 +148,7 @@ def model_key(study: Study) -> str:
 def scene_parameters_of(study: Study) -> dict[str, object]:
     """Parameters that the model of a scene depends on: mostly without one friction coefficient for all pairs."""
     given: dict[str, object] = study.scene.parameters.model_dump(mode="json")
-    depends = study.scene.is_bundled and scene_has(study.scene.model, "FRICTION_IN_MODEL")
+    depends = study.scene.is_bundled and as_scene(study.scene.parameters).FRICTION_IN_MODEL
     if not depends and not isinstance(given["friction_coefficient"], dict):
         del given["friction_coefficient"]
     return given
@@ -159,7 +158,7 @@ def describe_origin(study: Study) -> dict[str, str]:
     """Attributes on the files of a finite-element model; none for other scenes. Raises OSError, SceneError."""
     # imported where they are used: most studies have no such model
     if study.scene.files is not None:
-        from studies.fe_models.from_files.scene import describe_origin as describe_files
+        from studies.fe_models.from_files.model import describe_origin as describe_files
 
         return describe_files(study.scene.files, study.scene.parameters)
     if study.scene.path is None:
@@ -174,7 +173,7 @@ def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
     try:
         if scene.files is None:
             return build_scene(scene.model, scene.parameters, n_harmonics)
-        from studies.fe_models.from_files.scene import build
+        from studies.fe_models.from_files.model import build
 
         return build(scene.files, scene.parameters, n_harmonics, progress)
     except SceneError:
@@ -212,7 +211,7 @@ def _check_outputs(study: Study, model: ReducedModel) -> None:
         remedy = f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
         key = "outputs.loops" if loops else "slow_time.outputs"
         raise UserError(study.source, key, list(loops) if loops else len(study.output_counts), remedy)
-    if "natural_frequency" in study.scene_variables and not has_frequencies(study):
+    if "natural_frequency" in study.scene_variables:
         with scene_errors(study.source, None):
             stuck_frequencies(model)
 
@@ -238,23 +237,17 @@ def values_of_point(study: Study, facts: SceneFacts) -> int:
     return sum(math.prod(shape) for _, _, shape in record_fields(study, facts))
 
 
-def has_frequencies(study: Study) -> bool:
-    """Whether the scene knows more natural frequencies than those of its reduced model."""
-    rigid = dict(study.scene.parameters)["contact_stiffness"] is None
-    return study.scene.is_bundled and rigid and scene_has(study.scene.model, "natural_frequencies")
-
-
 def build_mesh(study: Study) -> SurfaceMesh | None:
     """Mesh of the study's scene, None where it has none. Raises SceneError."""
     scene = study.scene
     if "mesh" not in scene.offers:
         return None
     if scene.files is not None:
-        from studies.fe_models.from_files.scene import describe_model_mesh
+        from studies.fe_models.from_files.model import describe_model_mesh
 
         return describe_model_mesh(scene.files, scene.parameters)
     if scene.path is None:
-        return scene_mesh(scene.model, scene.parameters)
+        return as_scene(scene.parameters).describe_mesh()
     from studies.scene_file import read_mesh
 
     return read_mesh(scene.path, scene.group)

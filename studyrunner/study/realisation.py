@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
-from studies.scenes import scene_with_room
-from studies.scenes.half_space import ExpectedWear
+from studies.scene import ExpectedWear, as_scene
 from studyrunner.scatter import OF_PAIRS, Drawn, Scattered, ScatteredPairs, drawn
 from studyrunner.study.mission import MissionBlock
 from studyrunner.study.study import NUMBERS, Study
@@ -176,7 +175,7 @@ def with_room_for_wear(study: Study) -> Study:
     # what a result file holds was built with the parameters that stand beside it
     if own_scenes or not scene.is_bundled or scene.path is not None:
         return study
-    return _with_parameters_of_scene(study, scene_with_room(scene.model, scene.parameters, expected_wear(study)))
+    return _with_parameters_of_scene(study, as_scene(scene.parameters).with_room_for_wear(expected_wear(study)))
 
 
 def _with_parameters_of_scene(study: Study, parameters: BaseModel) -> Study:

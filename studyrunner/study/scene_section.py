@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
 
-from studies.contact_compliance import ContactStiffness
 from studies.fe_models.model_files import ModelFiles
+from studies.scene import ContactStiffness, as_scene
 from studies.scene_error import SceneError
-from studies.scenes import scene_has, scene_parameters
+from studies.scenes import scene_parameters
 from studyrunner.study.mistakes import Mistakes, check_table, close_name, scene_errors
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.sections import ELSEWHERE
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 WORN_AXIS = "worn_cycle"
 """Name of the axis of several worn states."""
-
-_OFFERED = {"mesh": "describe_mesh", "exact": "exact_answer"}
 
 
 def _names_model(model: str) -> bool:
@@ -176,7 +174,7 @@ def _find_scene(model: str, parameters: BaseModel, given: Mapping[str, Any], ori
     if not (is_file or _names_model(model)):
         # only what was kept on request takes the place of what a bundled scene builds
         kept = _in_file(origin.path, SCENE_GROUP, origin) if origin.keeps_scene and before and not changed else {}
-        return {**kept, "offers": tuple(name for name, function in _OFFERED.items() if scene_has(model, function))}
+        return {**kept, "offers": as_scene(parameters).OFFERS}
     if before is not None:
         # one friction coefficient of all pairs is not part of the reduced scene
         free = is_file or isinstance(dict(parameters)["friction_coefficient"], float)

@@ -1,9 +1,4 @@
-"""Files as a run writes them: no link is followed, and what is written is put on the disk.
-
-A folder of results may hold anything: what somebody has put there, a link for one, is neither written through nor read.
-
-By hand: `tempfile` and `os.replace` are used, but neither of them refuses links or puts the folder on the disk.
-"""
+"""Files as a run writes them: under a name that no other has, and put on the disk before they get their own name."""
 
 from __future__ import annotations
 
@@ -18,12 +13,6 @@ from typing import IO
 
 _BYTES_OF_TRIAL = 2**22  # a disk is full for a library that writes a part of a result, not for a few bytes
 _NO_SYNC = (errno.EINVAL, errno.ENOTSUP)
-
-
-def create(path: Path) -> IO[bytes]:
-    """A new file for writing. Raises FileExistsError where anything has this name, a link to nowhere included."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-    return os.fdopen(os.open(path, flags, 0o666), "wb")
 
 
 def sync(file: IO[bytes]) -> None:
@@ -67,7 +56,7 @@ def replacing(path: Path) -> Iterator[Path]:
     Where the block raises, or what follows it, `path` is as it was. Raises OSError.
     """
     partial = new_partial(path)
-    create(partial).close()
+    partial.touch(exist_ok=False)
     try:
         yield partial
         with partial.open("rb+") as file:

@@ -46,10 +46,7 @@ def take_endings() -> None:
 
 
 def begin_ending() -> None:
-    """The process comes to its end now: a signal does not disturb this any more.
-
-    A launcher sends its signal to all ranks, and rank 0 may hear of it from another rank first.
-    """
+    """The process comes to its end now: a signal, which may come from the launcher and from a rank, is too late."""
     global _begun
     _begun = True
 
@@ -60,20 +57,16 @@ def is_ending(error: BaseException) -> bool:
 
 
 def raise_ending() -> None:
-    """Raises KeyboardInterrupt where a signal has come that nothing was done about.
-
-    For use between steps that may have lost the exception.
-    """
+    """Raises KeyboardInterrupt where a signal has come that nothing was done about; between steps that may lose it."""
     if _ending_waits():
         raise KeyboardInterrupt
 
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """A block that is done as a whole: a signal during the block raises KeyboardInterrupt after the block.
+    """A block of the main thread that is done as a whole: a signal during it raises KeyboardInterrupt after it.
 
-    For steps of the main thread that an exception between two instructions would leave half done: a message whose
-    memory is freed before it is sent, or a lock that is never released.
+    An exception would leave it half done: a message whose memory is freed before it is sent, a lock that is kept.
     """
     global _n_uninterrupted
     _n_uninterrupted += 1

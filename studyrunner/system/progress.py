@@ -8,15 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
+from studyrunner.system.process import raise_ending
+
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-FIRST_LINE = 2.0
-"""Seconds to the first plain line."""
+FIRST_LINE, LONGEST_SILENCE = 2.0, 30.0
+"""Seconds to the first plain line, and between two of them at most."""
 
-LONGEST_SILENCE = 30.0
-"""Seconds between two plain lines, at most."""
-
+_SECONDS_WITHOUT_A_WORD = 3.0
 _GROWTH = 0.5  # of the time since the start: later lines are rarer
 _SECONDS_A_PICTURE = 0.1
 _MOST_NAMED = 3
@@ -43,14 +43,9 @@ class ProgressDisplay:
     """What the user sees while a study runs. Only rank 0 has one. quiet: nothing is shown."""
 
     def __init__(self, *, quiet: bool = False) -> None:
-        self._began = time.monotonic()
-        self._quiet = quiet
-        self._next = FIRST_LINE  # seconds
-        self._share = 0.0
+        self._began, self._quiet, self._share = time.monotonic(), quiet, 0.0
         self._bar = _new_bar() if sys.stderr.isatty() and not quiet else None
-        if self._bar is not None:
-            self._next = 0.0
-            self._bar_task = self._bar.add_task("", total=1.0)
+        self._next = FIRST_LINE if self._bar is None else 0.0  # seconds
 
     def __enter__(self) -> Self:
         if self._bar is not None:
@@ -68,18 +63,21 @@ class ProgressDisplay:
         elif not self._quiet:
             print(f"[{format_seconds(self.seconds):>7}] {text}", file=sys.stderr, flush=True)
 
-    def tick(self, look: Callable[[], Standing]) -> None:
-        """Called many times a second: shows how far the tasks are where that is due, and only then looks.
+    def step(self, text: str) -> None:
+        """Shows a line on a step before the tasks, where these steps take long: a wrong scene is one line, no more."""
+        raise_ending()
+        if self.seconds > _SECONDS_WITHOUT_A_WORD:
+            self.say(text)
 
-        On a terminal the bar moves; elsewhere a plain line is printed, often at first, then every half minute.
-        """
+    def tick(self, look: Callable[[], Standing]) -> None:
+        """Called many times a second: shows how far the tasks are where that is due, and only then looks."""
         elapsed = self.seconds
         if elapsed < self._next or self._quiet:
             return
         text = self._describe(look())
         if self._bar is not None:
             self._next = elapsed + _SECONDS_A_PICTURE
-            self._bar.update(self._bar_task, completed=self._share, description=text)
+            self._bar.update(self._bar.task_ids[0], completed=self._share, description=text)
         else:
             self._next = elapsed + min(max(FIRST_LINE, _GROWTH * elapsed), LONGEST_SILENCE)
             self.say(text)
@@ -111,7 +109,9 @@ def _new_bar() -> Progress | None:
     console = Console(stderr=True)
     # the text comes last: it is cut where the terminal is narrow
     columns = (SpinnerColumn(), BarColumn(20), TaskProgressColumn(), TextColumn("{task.description}", markup=False))
-    return Progress(*columns, console=console, transient=True) if console.is_terminal else None
+    bar = Progress(*columns, console=console, transient=True)
+    bar.add_task("", total=1.0)
+    return bar if console.is_terminal else None
 
 
 def format_seconds(seconds: float) -> str:

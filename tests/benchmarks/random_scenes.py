@@ -23,7 +23,7 @@ import numpy as np
 from solver import march_wear as march_from_rest
 from solver.outcome import COMPLETE, Outcome
 from solver.settings import SolverSettings
-from solver.wear.course import CERTIFIED
+from solver.wear.slow_time import CERTIFIED
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.random_decks import EXPECTED, random_deck, run_deck
 from tests.random_scenes import SALT, RandomScene, log_uniform, random_scene

@@ -19,12 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import StartResult, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.study.study_file import read_study
 from tests.benchmarks.frame import Table, arguments
 from tests.benchmarks.simulation import Overheads, replay
+from tests.studyrunner.fakes import plan_of
 
 N_DISPLACEMENTS = 144
 SHIFT = 0.2  # Hz, at most, from sweep to sweep
@@ -125,7 +125,7 @@ def main() -> None:
     given = arguments(__doc__, tuple(STUDIES), ranks=[2, 16, 64, 256, 1024, 4096])
     for name in given.chosen:
         study, overrides = STUDIES[name]
-        plan = build_tasks(read_study(study, overrides), N_DISPLACEMENTS)
+        plan = plan_of(read_study(study, overrides), N_DISPLACEMENTS)
         costs = (ScatterCosts if study == "scatter" else DovetailCosts)(plan)
         table = Table(name, "time, s", "efficiency", "possible")
         for n_ranks in given.ranks:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
-from studyrunner.mpi.dispatch import Assignment, Dispatcher
+from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.task_runs import TaskProgress
 
 
@@ -95,7 +95,7 @@ def replay(
     dispatcher: Dispatcher = Dispatcher(n_ranks, progress.costs, lambda: clock)
     ticket = itertools.count()
     arrivals: list[tuple[float, int, int, int, float, Result]] = []
-    queues: list[list[tuple[float, Assignment]]] = [[] for _ in range(n_ranks)]
+    queues: list[list[tuple[float, int, Task]]] = [[] for _ in range(n_ranks)]
     free_at, computing = [0.0] * n_ranks, [False] * n_ranks
     work = longest_way = 0.0
     ways: dict[tuple[int, int], float] = {}
@@ -104,9 +104,8 @@ def replay(
     def begin(rank: int) -> None:
         """The rank takes the next task that it has been sent; what it will send is known at once."""
         nonlocal work, longest_way
-        sent, assignment = queues[rank].pop(0)
+        sent, number, task = queues[rank].pop(0)
         computing[rank] = True
-        task = assignment.task
         now = max(sent + overheads.latency, free_at[rank])
         results: list[tuple[Result, float]] = []
         if isinstance(task, Sweep):
@@ -121,14 +120,14 @@ def replay(
         for result, seconds in results:
             now += seconds
             work += seconds
-            heapq.heappush(arrivals, (now + overheads.latency, next(ticket), rank, assignment.number, seconds, result))
+            heapq.heappush(arrivals, (now + overheads.latency, next(ticket), rank, number, seconds, result))
         free_at[rank] = now
 
     def hand_out() -> None:
         nonlocal clock
-        for rank, assignment in dispatcher.assign():
+        for rank, number, task in dispatcher.assign():
             clock += overheads.assignment
-            queues[rank].append((clock, assignment))
+            queues[rank].append((clock, number, task))
             if not computing[rank]:
                 begin(rank)
 

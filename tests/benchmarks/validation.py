@@ -15,15 +15,9 @@ from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from studies import build_scene
+from studies.scenes.cylinder_on_flat import line_half_width, line_stick_width, line_worn_depth
 from studies.scenes.half_space import composite_modulus
-from studies.scenes.hertz import (
-    line_half_width,
-    line_stick_width,
-    line_worn_depth,
-    point_radius,
-    point_stick_radius,
-    point_worn_depth,
-)
+from studies.scenes.sphere_on_flat import point_radius, point_stick_radius, point_worn_depth
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.studies.half_space_twin import limit_depth, pressed
 

@@ -15,8 +15,8 @@ from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear import integrate
 from solver.wear.jump import creeps, free_slide
+from solver.wear.problem import WearProblem
 from studies import build_scene
 from tests.references import vibro_impact_orbit
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear
@@ -113,7 +113,7 @@ def test_a_hold_moves_no_state_and_takes_up_what_drives_it():
     hold = free_slide(joint, at)
     axial = hold.direction.reshape(-1, 3)
     np.testing.assert_allclose(np.abs(axial[:, 1]), 0.25, rtol=1e-6)
-    held = case.held(hold).joint(joint.omega, joint.excitation_amplitude).structure
+    held = replace(case, hold=hold).joint(joint.omega, joint.excitation_amplitude).structure
     motion = joint.to_relative(at.displacement_h)
     elastic = at.residual - joint.to_relative(at.force_h)
     np.testing.assert_allclose(held.apply(motion) - held.force_h(), elastic, atol=1e-6)
@@ -196,7 +196,7 @@ def from_every_stop(model, friction, start, wear, step, scheme, end, settings):
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("adaptive", 1.0)])
 def test_a_history_goes_on_to_the_same_numbers(scheme, step, monkeypatch):
-    monkeypatch.setattr(integrate, "ITERATIONS_PER_SAVE", 8)
+    monkeypatch.setattr(WearProblem, "iterations_per_save", 8)
     model, settings = dovetail(7), SolverSettings(rtol=3e-2)
     (start,) = branch_states(model, 0.5, 0.5, [2 * np.pi * 213.0], settings)
     whole, own, n_stages = from_every_stop(model, 0.5, start, 1.1e-11, step, scheme, 8e3, settings)
@@ -208,6 +208,6 @@ def test_a_history_goes_on_to_the_same_numbers(scheme, step, monkeypatch):
 
 @pytest.mark.slow
 def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
-    monkeypatch.setattr(integrate, "ITERATIONS_PER_SAVE", 30)
+    monkeypatch.setattr(WearProblem, "iterations_per_save", 30)
     whole, own, _ = from_every_stop(worn_wall(), 1e-3, wall_start(), 1e-7, 1.0, "adaptive", 1000.0, IMPACT)
     assert min(own) < whole.jump_cycle < max(own)

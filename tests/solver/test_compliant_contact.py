@@ -52,18 +52,6 @@ def test_a_spring_that_presses_gives_way_to_rough_surfaces():
 
 
 @pytest.mark.slow
-def test_a_wall_and_its_contact_are_two_springs_in_series():
-    """The same bilinear spring: a wall of 100 N/m, and one of 200 N/m behind a contact of 200 N/m."""
-    one = build_scene("vibro_impact")
-    both = build_scene("vibro_impact", wall_stiffness=200.0, contact_stiffness=200.0 / 1e-4)
-    found, expected = (
-        frequency_response(model, [0.18, 0.19, 0.2], 0.02, friction_coefficient=0.0) for model in (both, one)
-    )
-    assert found.outcome == expected.outcome
-    assert found.response == pytest.approx(expected.response, rel=1e-7)
-
-
-@pytest.mark.slow
 def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series():
     """Den Hartog's slider: along the support the contact is rigid beside the mount, across it twice as stiff."""
     springs = {"normal_stiffness": 5e10, "contact_stiffness": 1e15}

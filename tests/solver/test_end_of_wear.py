@@ -13,7 +13,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from studies import build_scene
-from studies.scenes.den_hartog import DenHartogSlider, WearingSlider
+from studies.scenes.sdof_slider import DenHartogSlider, WearingSlider
 from tests.solver.models import assert_same, march_wear
 from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
 from tests.studies.half_space_twin import limit_depth
@@ -145,7 +145,7 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
 
 
 def test_one_that_was_interrupted_is_the_same_to_the_last_bit(monkeypatch):
-    monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 30)
+    monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 30)
     kept: list[Packed] = []
     whole = worn(ToTheEnd(9), keep=kept.append)
     assert kept

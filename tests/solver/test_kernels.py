@@ -1,21 +1,13 @@
-"""Contact kernels and the law of a joint: against twins, closed forms and themselves without compilation.
+"""Contact kernels and the law of a joint against plain twins and closed forms; `test_balance` has their derivatives."""
 
-`test_balance` has their derivatives.
-"""
-
-import os
-import subprocess
-import sys
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, mean_normal_force, mean_normal_tangent
-from solver.contact.elastic_pairs import march_period, march_tangent, new_period
-from solver.contact.sliding_masses import Masses, march_masses, mass_tangent
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, mean_normal_force
+from solver.contact.elastic_pairs import march_period, new_period
+from solver.contact.sliding_masses import Masses, march_masses
 from solver.model import FloatArray, IntArray
 from solver.settings import Resolution, SolverSettings
 from solver.structure.fourier import FourierBasis, build_basis, to_complex
@@ -189,14 +181,9 @@ def test_a_mass_moves_as_in_a_plain_twin_with_tiny_steps(seed, line):
     predicted_h[0, 0], predicted_h[2, :] = 15.0, predicted_h[2] if line < 0 else 0.0
     predicted_h[1:, 0] *= 0.1
     fine = one_mass(predicted_h, n_steps, line)
-    predicted, step, mass, drag = (
-        predicted_h @ fine.basis.synthesis,
-        fine.masses.step,
-        fine.mass[0],
-        fine.masses.drag[0],
-    )
+    predicted, step = predicted_h @ fine.basis.synthesis, fine.masses.step
     normal = np.maximum(predicted[0], 0.0)
-    force, moved = mass_period(predicted[1:], FRICTION * normal, mass, drag, step)
+    force, moved = mass_period(predicted[1:], FRICTION * normal, fine.mass[0], fine.masses.drag[0], step)
     expected, speed = force @ fine.basis.analysis, np.hypot(*moved)
     assert 0.0 < (speed == 0.0).mean() < 0.9, "sticks and slips"
     period, force_h = one_mass(predicted_h, n_steps // 8, line).run()
@@ -214,42 +201,6 @@ def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero():
     assert (found.status_t == STICK).all()
     for exactly_zero in (found.start, found.state_t, found.slip_work, found.change):
         assert not exactly_zero.any()
-
-
-# --- without compilation ---
-
-
-def kernel_results():
-    """Results of all kernels, by name."""
-    (predicted_t, start), masses = pairs_case(3, BASIS.n_samples, seed=20), several_masses(21)
-    periods = run_pairs(predicted_t, start, 1e-9, 6), masses.run()[0]
-    out, mass_out = ((np.zeros((n, 21, 21)), np.zeros((n, 21))) for n in (3, 6))
-    march_tangent(np.arange(3), periods[0], BASIS.synthesis, BASIS.analysis, out)
-    mean_normal_tangent(np.arange(2), predicted_t, BASIS.synthesis, BASIS.analysis, out[0])
-    series = MASS_BASIS.synthesis, MASS_BASIS.step_mean, MASS_BASIS.analysis
-    mass_tangent(np.arange(6), periods[1], masses.masses, *series, mass_out)
-    results = {f"{name} {kind}": value for kind in (0, 1) for name, value in periods[kind]._asdict().items()}
-    tangents = dict(zip(("force", "work", "mass force", "mass work"), (*out, *mass_out), strict=True))
-    results |= tangents | {"mean_normal": mean_normal_force(predicted_t)}
-    return {name: np.asarray(values, float) for name, values in results.items()}
-
-
-def save_results(path):
-    np.savez(path, disabled=np.array(bool(numba.config.DISABLE_JIT)), **kernel_results())
-
-
-@pytest.mark.slow
-def test_kernels_give_the_same_numbers_without_compilation(tmp_path):
-    path, root = tmp_path / "plain.npz", Path(__file__).parents[2]
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(root)}
-    code = "import sys; from tests.solver.test_kernels import save_results; save_results(sys.argv[1])"
-    subprocess.run([sys.executable, "-c", code, str(path)], check=True, env=environment, cwd=root, timeout=1200)
-    with np.load(path) as plain:
-        assert bool(plain["disabled"])
-        compiled = kernel_results()
-        assert set(plain.files) == {*compiled, "disabled"}
-        for name, values in compiled.items():
-            assert values == pytest.approx(plain[name], rel=1e-12, abs=1e-12 * max(np.abs(values).max(), 1e-300)), name
 
 
 # --- elastic pairs and masses in one joint ---
@@ -276,7 +227,7 @@ def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
     assert np.flatnonzero(joint.penalty.inertial).tolist() == FREE
     # pairs stick, slip and open
     random = np.random.default_rng(2)
-    predicted = random.normal(size=(6, 3, 2 * joint.basis.n_harmonics + 1)) * PRELOAD * 0.6
+    predicted = random.normal(size=(6, 3, len(joint.basis.synthesis))) * PRELOAD * 0.6
     predicted[:, 1:, 0] *= 0.1
     predicted.reshape(18, -1)[np.setdiff1d(np.arange(18), joint.component_index)] = 0.0
     predicted[~joint.contact.has_normal, 0, 1:] = 0.0

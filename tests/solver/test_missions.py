@@ -15,12 +15,12 @@ from solver.harmonic_balance.state import Failure
 from solver.missions import history as integrating
 from solver.missions.block_run import BlockCase, BlockRun, run_block
 from solver.missions.history import integrate_missions, unworn_course
-from solver.missions.mission import Mission
-from solver.missions.step import Step, attempt_step
+from solver.missions.mission import MissionRequest
+from solver.missions.step import MissionStep, attempt_step
 from solver.packing import Packed
 from solver.settings import WearTarget
 from solver.wear.slow_time import Guide
-from studies.scenes.den_hartog import DenHartogSlider
+from studies.scenes.sdof_slider import DenHartogSlider
 from studies.scenes.sdof_slider import Parameters as SliderParameters
 from tests.solver.models import assert_same, scene
 
@@ -126,7 +126,7 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, mo
 
 def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
-    mission, pairs = Mission((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
+    mission, pairs = MissionRequest((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
     first, own = (run_block(BlockCase(mission, 0, at * pairs)) for at in (0.0, depth))
     return own, run_block(BlockCase(mission, 0, depth * pairs, begun=first.begun))
 
@@ -148,7 +148,7 @@ def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
 @pytest.mark.slow
 @pytest.mark.parametrize("begin", ["up", "continue"])
 def test_an_interrupted_mission_with_such_states_goes_on_to_the_last_bit(begin):
-    mission, kept = Mission(two_blocks(begin), WEAR, (0, 6), SETTINGS), list[Packed]()
+    mission, kept = MissionRequest(two_blocks(begin), WEAR, (0, 6), SETTINGS), list[Packed]()
     whole = integrate_missions(mission, keep=kept.append)
     for place in (0, len(kept) // 2, len(kept) - 2):
         assert_same(integrate_missions(mission, resume=kept[place]), whole)
@@ -166,7 +166,7 @@ def exact_run(case):
     """The wear of `dW/dn = r - L W` through a block; the reference solution wears a little more."""
     flow = np.zeros((3, 3))
     flow[:2, :2], flow[:2, 2] = -LOSS[case.place], RATES[case.place] * (1.0 if case.guide is None else 1.001)
-    change = expm(case.block.steady[1] * flow) - np.eye(3)
+    change = expm(case.block.cycles * flow) - np.eye(3)
     growth = change[:2] @ np.append(case.depth, 1.0)
     response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
     slope = change[:2, :2] if case.with_slope else None
@@ -192,7 +192,7 @@ def known_blocks(missions, cycles=1.0, **more):
     contact = replace(one.contact, area=np.array([1e-4, 2e-4]), surface=("one", "other"))
     model = replace(one, contact=contact)
     blocks = (Block(model, 1.0, 1.0, 0.5, cycles), Block(model, 2.0, 1.0, 0.5, 2.0 * cycles))
-    return Mission(blocks, 1.0, missions, SETTINGS, **more)
+    return MissionRequest(blocks, 1.0, missions, SETTINGS, **more)
 
 
 def exactly_known(missions, cycles=1.0, **more):
@@ -236,7 +236,7 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
 
     def step(before, length):
         taken = attempt_step(tuple(before), length, mission.area, run, 1.0)
-        assert isinstance(taken, Step)
+        assert isinstance(taken, MissionStep)
         return taken
 
     while nodes[-1].count < 48:

@@ -106,7 +106,7 @@ def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs():
 def energies(problem, state):
     """Energy fed in by the negative damping, and dissipated by damping and contact, J in a period."""
     model, omega, at = problem.model, state.omega, state.evaluation
-    joint = problem.joint_of(state.values)
+    joint = problem.joint_of(state)
     relative, _ = relative_indices(model.contact)
     moved = to_complex(joint.to_relative(at.displacement_h))
     force = to_complex(joint.to_relative(at.force_h))

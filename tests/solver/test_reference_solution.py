@@ -19,10 +19,9 @@ from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings
-from solver.wear import integrate
+from solver.wear import problem
 from solver.wear.history import integrate_together
-from solver.wear.integrate import WearRequest
-from solver.wear.step import Adaptive, Given, WearLine
+from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import exact_depths_of_motion
 
@@ -68,12 +67,12 @@ def test_the_error_of_the_slider_holds_the_exact_answer(scheme, step):
 
 @pytest.mark.slow
 def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch):
-    whole, own = usual(), integrate.full_check
+    whole, own = usual(), problem.full_check
 
-    def give_up(work, state, **more):
-        return own(work, state, **more) if state.cycle <= 12_000.0 else Failure(Outcome.CERTIFICATE_FAILED)
+    def give_up(work, state, *more, **named):
+        return own(work, state, *more, **named) if state.cycle <= 12_000.0 else Failure(Outcome.CERTIFICATE_FAILED)
 
-    monkeypatch.setattr(integrate, "full_check", give_up)
+    monkeypatch.setattr(problem, "full_check", give_up)
     ended = worn()
     assert ended.outcome is Outcome.CERTIFICATE_FAILED
     assert ended.last_cycle == 12_000.0
@@ -99,13 +98,13 @@ def test_where_euler_steps_let_a_pair_stick_again_the_error_says_so():
 @pytest.mark.slow
 def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     """Of the volume at all counts beyond its end; the history itself and its errors before are the same."""
-    whole, own = usual(), WearLine.step
+    whole, own = usual(), WearProblem.step
 
-    def go_astray(line, state):
-        lost = isinstance(line.steps, Adaptive) and state.cycle >= 12_000.0
-        return Failure(Outcome.MARCH_FAILED) if lost else own(line, state)
+    def go_astray(of, state):
+        lost = isinstance(of.steps, Adaptive) and state.cycle >= 12_000.0
+        return Failure(Outcome.MARCH_FAILED) if lost else own(of, state)
 
-    monkeypatch.setattr(WearLine, "step", go_astray)
+    monkeypatch.setattr(WearProblem, "step", go_astray)
     history = worn()
     assert np.array_equal(history.worn_volume, whole.worn_volume)
     known = np.isfinite(history.worn_volume_error)
@@ -212,7 +211,7 @@ def test_given_steps_are_wrong_by_what_they_differ_and_by_what_the_adaptive_hist
 @pytest.mark.slow
 def test_histories_that_are_integrated_together_are_those_alone(monkeypatch):
     """To the last bit, interrupted or not; the adaptive history, which all of them need, is integrated once."""
-    monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 20)
+    monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 20)
     model, found = start()
     asked = [WearRequest(WEAR, rule, CYCLES) for rule in (Given(4000.0), Adaptive(1e-2), Given(2000.0, "explicit"))]
     saved: list[Packed] = []

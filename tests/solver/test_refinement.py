@@ -8,9 +8,8 @@ import pytest
 
 from solver.accuracy import refinement
 from solver.accuracy.certificate import certify
-from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import ResolvedState
+from solver.accuracy.resolved_state import Estimate, ResolvedState
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.run import Run
@@ -137,10 +136,8 @@ def slider(settings, resolution=None):
 
 def refined_of(level):
     """What the refinement of a state says, and its state."""
-    joint, run = level.joint, Run(level.case.settings.tolerance)
-    found = refine(level.case, joint.omega, joint.excitation_amplitude, level.point, run)
-    own = found.case.joint(joint.omega, joint.excitation_amplitude)
-    return found, ResolvedState(found.case, own, found.point)
+    found = refine(level.case, level.joint, level.point, Run(level.case.settings.tolerance))
+    return found, found
 
 
 def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics():

@@ -117,7 +117,7 @@ def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequen
 @pytest.mark.slow
 @pytest.mark.parametrize("word", ["resonance", "peak"])
 def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
-    monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 8)
+    monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 8)
     model, follow, settings = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN), SolverSettings()
     ((_, start),) = follow_branch(model, 0.5, 10.0, follow, "up", settings)
     kept: list[Packed] = []

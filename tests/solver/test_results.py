@@ -10,14 +10,15 @@ import pytest
 from solver import march_wear as march_model
 from solver.accuracy.certificate import certify
 from solver.outcome import Outcome
+from solver.results.history import first_cut_off, judge
 from solver.results.state_report import LOOP_PHASES, periodic_state, report_state
-from solver.results.verdict import first_cut_off, judge
 from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from solver.structure.joint import build_case
 from studies import build_scene
+from studies.scenes.cylinder_on_flat import line_half_width
 from studies.scenes.half_space import composite_modulus
-from studies.scenes.hertz import line_half_width, point_radius
+from studies.scenes.sphere_on_flat import point_radius
 from tests.solver.models import OMEGA, branch_states, dovetail, first_point, march_wear, random_model, scene
 from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
 from tests.studyrunner.histories import history

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from solver import build_model
-from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import left_out
+from solver.accuracy.resolved_state import Estimate
 from solver.continuation.first_state import solve_static_state
 from solver.continuation.natural import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.harmonic_balance.dlft import Balance
@@ -17,26 +17,23 @@ from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
-from solver.wear import step as control
+from solver.wear import problem as control
 from solver.wear.check import needs_new_choice
-from solver.wear.rate_slope import moved_fraction, rate_slope
-from solver.wear.step import Adaptive, Given, Step, WearLine
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.problem import Adaptive, Given
+from solver.wear.step import moved_fraction, rate_slope
+from solver.wear.wearing_joint import WearingJoint, WearState
 from tests.solver.models import branch_states, dovetail, march_wear, scene
-from tests.solver.worn_slider import AREA, END, begun
+from tests.solver.worn_slider import AREA, problem
 
 
-def steps_of(rule, n_steps, end=np.inf):
-    """The unworn state and those behind each of the first steps, and the steps."""
-    work, state = begun()
-    line = WearLine(work, rule, end)
-    states, steps = [line.begin(state)], []
+def states_of(steps, n_steps):
+    """The unworn state and those behind each of the first steps."""
+    of = problem(steps)
+    states = [of.begin(of.setup.begin())]
     for _ in range(n_steps):
-        step = line.step(states[-1])
-        assert isinstance(step, Step)
-        steps.append(step)
-        states.append(step.state)
-    return states, steps
+        states.append(of.step(states[-1]))
+        assert isinstance(states[-1], WearState)
+    return states
 
 
 def read(states):
@@ -46,7 +43,7 @@ def read(states):
 
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
 def test_a_given_step_follows_its_own_equation(scheme):
-    states, steps = steps_of(Given(4000.0, scheme), 3, END)
+    states = states_of(Given(4000.0, scheme), 3)
     count, depth, rate = read(states)
     assert count.tolist() == [0.0, 4000.0, 8000.0, 12000.0]
     # W + h g(W) if explicit, W_new = W + h g(W_new) if implicit
@@ -54,24 +51,24 @@ def test_a_given_step_follows_its_own_equation(scheme):
     assert np.diff(depth) == pytest.approx(4000.0 * taken, rel=1e-9)
     # the difference to the trapezoidal rule
     expected = 0.5 * 4000.0 * np.abs(np.diff(rate)) * AREA
-    assert [step.error for step in steps] == pytest.approx(expected, rel=1e-9)
+    assert [state.error for state in states[1:]] == pytest.approx(expected, rel=1e-9)
 
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
     # Eq. (22): one pair, so each step wears just that depth
-    states, _ = steps_of(Given(np.inf, "explicit", 2e-6), 4, END)
+    states = states_of(Given(np.inf, "explicit", 2e-6), 4)
     assert np.diff(read(states)[1]) == pytest.approx(np.full(4, 2e-6), rel=1e-9)
 
 
 def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     rtol = 1e-2
-    states, steps = steps_of(Adaptive(rtol), 12)
+    states = states_of(Adaptive(rtol), 12)
     at, depth, _ = read(states)
     lengths = np.diff(at)
     worn = np.maximum(np.diff(depth), depth[1:] * lengths / at[1:]) * AREA
-    assert ([step.error for step in steps] <= control.STEP_ERROR_FRACTION * rtol * worn).all()
+    assert ([state.error for state in states[1:]] <= control.STEP_ERROR_FRACTION * rtol * worn).all()
     assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
-    assert (steps_of(Adaptive(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
+    assert states_of(Adaptive(1e-4), 12)[-1].cycle < 0.5 * at[-1]
 
 
 def failing(monkeypatch, fails):
@@ -87,22 +84,22 @@ def failing(monkeypatch, fails):
 
 
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
-    first = steps_of(Adaptive(1e-2), 0)[0][0].length
+    first = states_of(Adaptive(1e-2), 0)[0].length
     with monkeypatch.context() as patch:
         tried = failing(patch, lambda tried: len(tried) == 1)
-        states, _ = steps_of(Adaptive(1e-2), 1)
+        states = states_of(Adaptive(1e-2), 1)
     assert tried[:2] == [("adaptive", first), ("adaptive", SMALLEST_STEP_RATIO * first)]
     assert states[1].cycle == tried[-1][1]
     failing(monkeypatch, lambda tried: tried[-1][0] == "adaptive")
-    length, depth, rate = read(steps_of(Adaptive(1e-2), 1)[0])[:, 1]
+    length, depth, rate = read(states_of(Adaptive(1e-2), 1))[:, 1]
     assert length == pytest.approx(control.SHORTEST_SLOW_STEP * first, rel=2e-3)
     assert depth == pytest.approx(length * rate, rel=1e-6)
 
 
 @pytest.mark.parametrize(("found_from", "end", "doublings"), [(3.0, np.inf, 2), (3.0, 3.5, None), (40.0, np.inf, None)])
 def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeypatch, found_from, end, doublings):
-    work, state = begun()
-    first = WearLine(work, Adaptive(1e-2), np.inf).begin(state)
+    of = problem(Adaptive(1e-2))
+    first = of.begin(of.setup.begin())
     shortest = control.SHORTEST_SLOW_STEP * first.length
 
     def fails(tried):
@@ -112,19 +109,20 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
 
     tried = failing(monkeypatch, fails)
     monkeypatch.setattr(control, "jump", lambda *_: Failure(Outcome.MARCH_FAILED))
-    step = WearLine(work, Adaptive(1e-2), end * shortest).step(first)
+    of.limit = end * shortest
+    found = of.step(first)
     if doublings is None:
-        assert step == Failure(Outcome.MARCH_FAILED)
+        assert found == Failure(Outcome.MARCH_FAILED)
     else:
-        assert isinstance(step, Step)
+        assert isinstance(found, WearState)
         assert tried[-2:] == [("adaptive", 2.0 * shortest), ("adaptive", 4.0 * shortest)]
-        assert step.state.cycle == 2.0**doublings * shortest
-        assert step.error > 0.0
+        assert found.cycle == 2.0**doublings * shortest
+        assert found.error > 0.0
 
 
 def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multiples_again(monkeypatch):
     tried = failing(monkeypatch, lambda tried: len(tried) == 1)
-    states, _ = steps_of(Given(4000.0), 6, END)
+    states = states_of(Given(4000.0), 6)
     assert [length for _, length in tried] == [4000.0, 1000.0, 2000.0, 1000.0, 2000.0, 2000.0, 4000.0]
     assert read(states)[0][[3, 5, 6]].tolist() == [4000.0, 8000.0, 12_000.0]
 
@@ -132,7 +130,7 @@ def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multi
 def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     # no error is refused, so that steps grow as they may
     monkeypatch.setattr(control, "STEP_ERROR_FRACTION", 1e9)
-    states, _ = steps_of(Adaptive(1e-2), 3)
+    states = states_of(Adaptive(1e-2), 3)
     count, depth, rate = read(states)
     h = np.diff(count)
     assert depth[1] == pytest.approx(h[0] * rate[1], rel=1e-9)
@@ -157,7 +155,8 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
 )
 def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(harmonics, share, error, anew):
     """share: what was left out of the force when harmonics were chosen, over what is now."""
-    work, state = begun()
+    work = problem(Adaptive(1e-2)).setup
+    state = work.begin()
     work.case = replace(work.case, settings=SolverSettings(harmonics, 64, rtol=1e-2))
     now = left_out(state.resolution.orders, state.point.evaluation)
     assert 1e-4 < now < 0.5

@@ -13,10 +13,9 @@ from solver.results.history import StartState
 from solver.results.state_report import LOOP_PHASES
 from solver.settings import Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import build_case
-from solver.wear import course as course_module
-from solver.wear.course import CERTIFIED, Course, Node
-from solver.wear.integrate import Integrations, WearRequest
-from solver.wear.step import Adaptive
+from solver.wear import slow_time
+from solver.wear.problem import Adaptive, WearProblem, WearRequest
+from solver.wear.slow_time import CERTIFIED, Course, Integrator, Node
 from tests.solver.models import branch_states, march_wear, random_model, scene
 from tests.solver.worn_slider import (
     AREA,
@@ -150,7 +149,8 @@ def steps_and_volume(scene_name: str, start: StartState, settings: SolverSetting
     """Number of steps and worn volume, m3, of an adaptive history without its reference solution."""
     model = scene(scene_name, 13, **({"mesh": 1} if scene_name == "dovetail_sector" else {}))
     case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    ended = Integrations(case, start).history(WearRequest(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles])))
+    asked = WearRequest(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles]))
+    ended = Integrator(np.inf).integrate(WearProblem(case, start, asked))
     depth = ended.course.read(np.array([cycles]))["wear_depth"]
     return len(ended.course.ends), float((depth @ model.contact.area)[0])
 
@@ -256,7 +256,7 @@ def test_a_cubic_never_falls_however_steep_its_ends_are():
 def test_of_many_steps_those_that_go_far_and_those_that_are_read_are_kept(monkeypatch):
     asked = [5.0, 15.0, 1005.0]
     whole = taken(None, n_steps=200)
-    monkeypatch.setattr(course_module, "KEPT_STEPS", 20)
+    monkeypatch.setattr(slow_time, "MOST_NODES", 20)
     course = taken(asked, n_steps=200)
     assert len(course.nodes) <= 26
     assert course.counts[[0, -1]].tolist() == [0.0, 2000.0]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -13,7 +14,7 @@ from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, march_wear, scene
 
@@ -49,12 +50,11 @@ def march(
     return march_wear(model, FRICTION, start, wear, step, scheme, cycles, replace(COARSE, rtol=rtol), **asked)
 
 
-def begun() -> tuple[WearingJoint, WearState]:
-    """The wearing slider and its unworn state."""
+def problem(steps: Given | Adaptive, end: float = END, **asked: Any) -> WearProblem:
+    """The wearing slider up to a cycle count; asked: as of `WearRequest`."""
     model, start = slider_start()
     case = build_case(model, FRICTION, start.penalty_omega, COARSE, start.resolution)
-    work = WearingJoint(case, start, WEAR)
-    return work, work.begin()
+    return WearProblem(case, start, WearRequest(WEAR, steps, np.array([0.0, end]), **asked))
 
 
 def exact_depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray:

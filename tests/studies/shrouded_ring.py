@@ -43,7 +43,7 @@ def whole_ring(model: MeshModel, joint: JointDefinition) -> tuple[MeshModel, Joi
             second = surfaces.surface_of_nodes(ring, f"second {j}", own[(j + each.sector) % n][each.second.nodes])
             contacts.append(replace(each, first=first, second=second, sector=0, label=f"{each.name}{j}"))
     tips = {f"tip{j}": SetMotion(own[j][joint.load.nodes], axis.pitch(j) @ joint.load.direction) for j in range(n)}
-    return MeshModel(ring), JointDefinition(tuple(contacts), held, tips["tip0"], tips, along=axis.axis)
+    return MeshModel(ring), JointDefinition(tuple(contacts), held, tips["tip0"], tips)
 
 
 def reduced_ring(model: MeshModel, joint: JointDefinition, nodal_diameter: int, n_modes: int, damping: float):

@@ -6,7 +6,7 @@ from scipy import linalg
 
 from solver.model import needed_nodal_diameters
 from studies.finite_element.solid_mesh import SolidMesh, assemble_mass, centrifugal_load
-from studies.scenes.dovetail_sector import Parameters, build, define_sector
+from studies.scenes.dovetail_sector import Parameters
 from tests.studies.static_contact import solve_static_contact
 
 # Glued, nodal diameter 0, Hz, of 20-node elements.
@@ -17,7 +17,7 @@ N_RELATIVE = 3 * N_PAIRS
 
 @pytest.fixture(scope="module")
 def at_rest():
-    return build(Parameters(stress_stiffening=False), 5)
+    return Parameters(stress_stiffening=False).build(5)
 
 
 def frequencies(linear, n_relative=N_RELATIVE):
@@ -55,7 +55,7 @@ def test_axial_sliding_is_the_only_motion_that_closed_flanks_leave_free(at_rest)
 
 
 def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
-    model, _ = define_sector(Parameters(stress_stiffening=False))
+    model, _ = Parameters(stress_stiffening=False).define_sector()
     # the blade with the nodes of the disk, which move nothing
     blade = tuple(group for group in model.mesh.groups if group.part == "blade")
     mass = assemble_mass(SolidMesh(model.coordinates, model.numbers, blade))
@@ -68,7 +68,7 @@ def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
 
 def test_stiffening_grows_with_the_square_of_speed_and_softening_shows():
     speeds = (1e-3, 2000.0, 4000.0)
-    models = (build(Parameters(mesh=1, rotation_speed=rpm), 0) for rpm in speeds)
+    models = (Parameters(mesh=1, rotation_speed=rpm).build(0) for rpm in speeds)
     squares = [frequencies(model.linear[0], 48)[0] ** 2 for model in models]
     assert (squares[2] - squares[0]) / (squares[1] - squares[0]) == pytest.approx(4.0, rel=0.02)
 
@@ -76,7 +76,7 @@ def test_stiffening_grows_with_the_square_of_speed_and_softening_shows():
 @pytest.mark.parametrize(("nodal_diameter", "n_sectors"), [(1, 47), (23, 47), (23, 46)])
 def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter, n_sectors):
     """Half the number of the sectors is a real one, as 0 is."""
-    model = build(Parameters(mesh=1, nodal_diameter=nodal_diameter, n_sectors=n_sectors), 5)
+    model = Parameters(mesh=1, nodal_diameter=nodal_diameter, n_sectors=n_sectors).build(5)
     assert tuple(model.linear) == needed_nodal_diameters(nodal_diameter, n_sectors, 5)
     assert n_sectors == 47 or tuple(model.linear) == (0, 23)
     assert (model.n_sectors, model.nodal_diameter) == (n_sectors, nodal_diameter)
@@ -95,7 +95,7 @@ def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter, n_sect
 
 
 def test_same_parameters_give_the_same_bits():
-    one, two = (build(Parameters(mesh=1, nodal_diameter=3), 3) for _ in range(2))
+    one, two = (Parameters(mesh=1, nodal_diameter=3).build(3) for _ in range(2))
     for k in one.linear:
         for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
             assert np.array_equal(getattr(one.linear[k], name), getattr(two.linear[k], name))

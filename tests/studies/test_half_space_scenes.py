@@ -10,26 +10,22 @@ from solver import march_wear
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from studies import build_scene
-from studies.scenes import scene_parameters, scene_with_room
-from studies.scenes.half_space import (
-    ExpectedWear,
-    Scar,
-    composite_modulus,
-    patch_compliance,
-    round_up,
-    strip_compliance,
-)
-from studies.scenes.hertz import (
+from studies.scene import ExpectedWear
+from studies.scenes import scene_parameters
+from studies.scenes.cylinder_on_flat import (
     line_half_width,
     line_stick_under_stroke,
     line_stick_width,
     line_worn_depth,
     line_worn_edge,
-    point_radius,
-    point_stick_radius,
-    point_stick_under_stroke,
-    point_worn_depth,
 )
+from studies.scenes.half_space import (
+    composite_modulus,
+    patch_compliance,
+    round_up,
+    strip_compliance,
+)
+from studies.scenes.sphere_on_flat import point_radius, point_stick_radius, point_stick_under_stroke, point_worn_depth
 from tests.studies.half_space_twin import compliances, limit_depth, pressed, solve_pressed
 
 MU, E, NU = 0.6, 200e9, 0.3
@@ -223,12 +219,12 @@ def worn_by_uniform_slip(name, **values):
 )
 def test_the_scar_of_gross_slip_is_as_wide_as_its_volume_and_depth_say(name, contact, values):
     line = name == "cylinder_on_flat"
-    scar = Scar(values["R"], contact, *((3, 1.5) if line else (4, 4.0 / math.pi)))
+    scar = scene_parameters(name)(**values).scar
     rows = worn_by_uniform_slip(name, **values)
     width = values["half_width"] / (values["strips"] / 2 if line else values["patches"])
     for half_width, volume, depth in rows[1:]:
-        by_volume = scar.half_width(volume / (0.01 if line else 1.0), math.inf)
-        for needed in (by_volume, scar.half_width(math.inf, depth)):
+        by_volume = scar(volume / (0.01 if line else 1.0), math.inf)
+        for needed in (by_volume, scar(math.inf, depth)):
             # the margin holds, and is none of twice the width
             assert half_width - 0.5 * width < needed < 1.25 * half_width + width
     assert rows[-1, 0] > 2.5 * contact
@@ -252,7 +248,7 @@ def test_a_stroke_slides_where_the_approach_under_the_load_says():
 
 def room(name, expected, **values):
     """Half-width, m, that a scene chooses for the wear that is expected."""
-    return dict(scene_with_room(name, scene_parameters(name)(**values), expected))["half_width"]
+    return scene_parameters(name)(**values).with_room_for_wear(expected).half_width
 
 
 def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears():

@@ -16,7 +16,7 @@ from solver.structure.joint import build_case
 from solver.structure.penalty import Penalty
 from studies.finite_element.reduced_joint import glued_frequencies, prepare_model
 from studies.scene_error import SceneError
-from studies.scenes import shrouded_sector, underplatform_damper
+from studies.scenes import underplatform_damper
 from tests.studies.shrouded_ring import reduced_ring, stubby, whole_ring
 
 N = 6
@@ -24,7 +24,7 @@ STUBBY = stubby(N)
 DAMPED = underplatform_damper.Parameters(
     n_sectors=N, tip_angle=0, rim_radius=0.15, platform_radius=0.165, blade_length=0.08, retention_stiffness=0
 )
-SECTORS = [shrouded_sector.define_sector(STUBBY), underplatform_damper.define_sector(DAMPED)]
+SECTORS = [STUBBY.define_sector(), DAMPED.define_sector()]
 
 
 def apart(model, joint):
@@ -47,38 +47,37 @@ def test_stuck_frequencies_of_all_waves_are_those_of_the_ring(sector):
 
 
 @pytest.mark.parametrize(
-    ("scene", "usual", "changes"),
+    ("usual", "changes"),
     [
-        (shrouded_sector, STUBBY, {"nodal_diameter": 4, "blade_thickness": 0.2, "rim_radius": 0.1}),
+        (STUBBY, {"nodal_diameter": 4, "blade_thickness": 0.2, "rim_radius": 0.1}),
         (
-            underplatform_damper,
             DAMPED,
             {"nodal_diameter": 4, "rim_radius": 0.1, "platform_gap": 0.02, "damper_half_width": 0.1}
             | {"platform_thickness": 0.002, "damper_height": 0.02},
         ),
     ],
 )
-def test_impossible_sectors_are_refused(scene, usual, changes):
+def test_impossible_sectors_are_refused(usual, changes):
     for key, value in changes.items():
         with pytest.raises(SceneError) as caught:
-            scene.define_sector(usual.model_copy(update={key: value}))
+            usual.model_copy(update={key: value}).define_sector()
         assert caught.value.key == key
 
 
 def wedge_force(parameters):
     """Centrifugal force of the wedge, N: of its elements, which are parallelepipeds but for the curvature."""
-    model, _ = underplatform_damper.define_sector(parameters)
+    model, _ = parameters.define_sector()
     corners = model.mesh.coordinates[model.mesh.groups[-1].nodes]
     volume = np.array([ConvexHull(each).volume for each in corners])
     radius = np.linalg.norm(volume @ corners.mean(axis=1)[:, :2]) / volume.sum()
-    return parameters.damper_density * volume.sum() * radius * parameters.angular_speed**2
+    return parameters.damper_density * volume.sum() * radius * model.rotation.omega_squared
 
 
 @pytest.mark.parametrize("friction", [1e-6, 0.3])
 def test_a_wedge_is_pressed_by_its_centrifugal_force(friction):
     """Between what the platforms carry while the wedge slides in and out; both alike."""
     parameters = underplatform_damper.Parameters()
-    model, settings = underplatform_damper.build(parameters, 1), SolverSettings(harmonics=1, samples=16)
+    model, settings = parameters.build(1), SolverSettings(harmonics=1, samples=16)
     ((_, start),) = follow_branch(model, friction, 1e-6, np.array([100.0]), "ramp", settings)
     normal = start.state.contact_force_h[:, 0, 0]
     sides = normal.reshape(2, -1).sum(axis=1)
@@ -105,7 +104,7 @@ def test_a_wave_of_the_sector_is_one_of_the_ring():
     """
     diameter, folded, settings = N - 1, 1, SolverSettings(harmonics=3, samples=96)
     parameters = STUBBY.model_copy(update={"interference": 5e-4, "nodal_diameter": folded, "stuck_modes": 60})
-    model = replace(shrouded_sector.build(parameters, 3), nodal_diameter=diameter)
+    model = replace(parameters.build(3), nodal_diameter=diameter)
     assert set(model.linear) == set(needed_nodal_diameters(diameter, N, 3)) | {folded}
     first = frequencies_of_sector(*SECTORS[0])[folded][0]
     ((_, start),) = follow_branch(model, 0.3, 30.0, np.array([0.98 * first]), "up", settings)
@@ -118,7 +117,7 @@ def test_a_wave_of_the_sector_is_one_of_the_ring():
         return np.concatenate(parts)
 
     damping = parameters.loss_factor / (2.0 * np.pi * first)
-    ring = reduced_ring(*shrouded_sector.define_sector(parameters), diameter, 360, damping)
+    ring = reduced_ring(*parameters.define_sector(), diameter, 360, damping)
     penalty = Penalty(*(np.tile(getattr(sector.penalty, each.name), N) for each in fields(Penalty)))
     case = replace(build_case(ring, 0.3, start.penalty_omega, settings), penalty=penalty)
     history = np.tile(state.start_history, (N, 1))

@@ -9,10 +9,9 @@ from scipy.integrate import solve_ivp
 
 from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
 from solver.model import LinearModel
-from studies.scene_answers import WearQuestion, stuck_frequencies
-from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_mesh, scene_parameters
-from studies.scenes.den_hartog import DenHartogSlider
-from studies.scenes.dovetail_sector import define_sector
+from studies.scene import WearQuestion, stuck_frequencies
+from studies.scenes import build_scene, scene_parameters
+from studies.scenes.sdof_slider import DenHartogSlider
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit
 
 WEAR = np.array([1.1e-11, 0.0, 1.1e-12])
@@ -21,7 +20,7 @@ CYCLES = np.array([0.0, 1e3, 3e4, 1e5])
 
 def answer(frequency=160.0, amplitude=10.0, law=ARCHARD, worn=0.0, **changes):
     question = WearQuestion(frequency, amplitude, WEAR, CYCLES, law, worn)
-    return scene_answer("sdof_slider", scene_parameters("sdof_slider")(**changes), question)
+    return scene_parameters("sdof_slider")(**changes).exact_answer(question)
 
 
 def dovetail(**changes):
@@ -104,7 +103,7 @@ def test_where_the_closed_form_does_not_hold_there_is_no_answer(name):
 
 
 def test_the_mesh_is_the_skin_of_blade_and_disk():
-    mesh, whole = scene_mesh("dovetail_sector", dovetail()), define_sector(dovetail())[0].mesh
+    mesh, whole = dovetail().describe_mesh(), dovetail().define_sector()[0].mesh
     assert sorted(set(mesh.parts)) == ["blade", "disk"]
     assert np.array_equal(np.unique(mesh.quads), np.arange(len(mesh.nodes)))
     # every edge of a closed skin belongs to two faces, which pass it in opposite directions
@@ -123,7 +122,7 @@ def test_the_mesh_is_the_skin_of_blade_and_disk():
 def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector():
     parameters = dovetail(nodal_diameter=4, n_sectors=12)
     model = build_scene("dovetail_sector", parameters, 3)
-    whole, own = scene_frequencies("dovetail_sector", parameters), stuck_frequencies(model)
+    whole, own = parameters.natural_frequencies(model), stuck_frequencies(model)
     assert whole.nodal_diameters == (0, 1, 2, 3, 4, 5, 6)
     assert own.nodal_diameters == tuple(model.linear) == (0, 4)
     assert own.frequencies == pytest.approx(whole.frequencies[[0, 4]], rel=1e-9, abs=0.0)

@@ -8,7 +8,7 @@ import pytest
 
 from solver.model import LinearModel
 from studies.model_check import check_model
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scene_file import read_mesh, read_scene, scene_datasets, write_scene
 from tests.studies.scene_models import (

@@ -9,8 +9,7 @@ import pytest
 from studies import build_scene
 from studies.model_check import check_model
 from studies.scene_error import SceneError
-from studies.scene_help import scene_help
-from studies.scenes import BUNDLED, scene_parameters
+from studies.scenes import BUNDLED, scene_help, scene_parameters
 from studyrunner.cli import main
 from tests.references import coulomb_orbit, vibro_impact_orbit
 

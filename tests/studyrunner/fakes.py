@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from solver.packing import Packed
-from studyrunner.checkpoint.completion_index import CompletionIndex, record_type
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import Store
-from studyrunner.kinds.task import Identity, Index, PointResult, Result, StartResult, Task, TaskPlan, digest
+from studyrunner.kinds.task import Index, PointResult, Result, StartResult, Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
+from studyrunner.plan import build_tasks
 from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
@@ -23,7 +25,16 @@ FACTS = SceneFacts(
     surface=("intrados", "extrados"),
     response_names=("tip",),
     digest="0" * 64,
+    gap=np.zeros(2),
 )
+
+
+def plan_of(study: Study, n_displacements: int = 2, n_pairs: int = 1) -> TaskPlan:
+    """The tasks of a study, all of whose scenes are of this size."""
+    scenes = find_scenes(study)
+    pairs = {"position": np.zeros((n_pairs, 3)), "area": np.ones(n_pairs), "surface": ("",) * n_pairs}
+    facts = replace(FACTS, n_displacements=n_displacements, gap=np.zeros(n_pairs), **pairs)
+    return build_tasks(study, scenes, [facts] * len(scenes.studies))
 
 
 def fake_evaluate(task: Task, facts: SceneFacts = FACTS, seconds: float = 0.0) -> Iterator[Result]:
@@ -110,8 +121,7 @@ def without_values(result: PointResult, outcome: int) -> PointResult:
 
 def open_completion(study: Study, plan: TaskPlan, path: Path) -> CompletionIndex:
     """What is in the file of a study; its store is to be closed."""
-    kind = record_type(study, FACTS)
-    return CompletionIndex(plan, Identity((FACTS.digest,), digest(repr(kind.descr))), Store(path), kind)
+    return CompletionIndex(study, plan, FACTS, [FACTS.digest], Store(path))
 
 
 def fake_completion(study: Study, plan: TaskPlan, results: Iterable[PointResult], path: Path) -> CompletionIndex:

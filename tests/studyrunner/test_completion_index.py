@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 import solver
-from solver.outcome import COMPLETE, Outcome
+from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_CRASHES
 from studyrunner.checkpoint.store import RESULTS, STARTS
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import Identity, solver_digest
 from studyrunner.kinds.wear import Sweep
 from studyrunner.study.study_file import read_study
 from studyrunner.task_runs import TaskProgress
-from tests.studyrunner.fakes import FACTS, fake_evaluate, fake_sweep, open_completion
+from tests.studyrunner.fakes import FACTS, fake_evaluate, fake_sweep, open_completion, plan_of
 
 BASE = (
     "axes.frequency=[100, 110, 120]",
@@ -33,7 +32,7 @@ BASE = (
 @contextlib.contextmanager
 def completion_of(folder, *overrides):
     study = read_study("sdof_slider", (*BASE, *overrides))
-    completion = open_completion(study, build_tasks(study, FACTS.n_displacements), folder)
+    completion = open_completion(study, plan_of(study, FACTS.n_displacements), folder)
     with contextlib.closing(completion.store):
         yield completion
 
@@ -144,7 +143,7 @@ def test_a_history_that_ended_its_process_has_failed(folder):
         assert np.isnan(record["worn_volume"]).all()
     with completion_of(folder) as completion:
         assert compute(completion)[1] == 12 - n_before - 1
-        completion.forget_failed(COMPLETE)
+        completion.forget_failed()
         assert compute(completion) == (0, 1)
 
 
@@ -197,7 +196,7 @@ def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder):
                 completion.add(sweep, replace(start, n_unknowns=0) if failed else start)
         completion.keep(down, Packed("progress", (np.zeros(1),)))
         compute(completion)
-        completion.forget_failed(COMPLETE)
+        completion.forget_failed()
         assert completion.n_points_finished == 10
         (left,) = completion.sweeps_left()
         assert (left.number, left.known, left.resume) == (1, frozenset({0, 2}), None)
@@ -207,7 +206,7 @@ def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder):
 def names_of(scene=FACTS.digest):
     """All names of the results of a study; which keys change them is in the table above."""
     study = read_study("sdof_slider", ["axes.frequency=[150, 155]", "axes.scheme=implicit", "axes.step=[100, 150]"])
-    plan, identity = build_tasks(study, FACTS.n_displacements), Identity((scene,), "kind")
+    plan, identity = plan_of(study, FACTS.n_displacements), Identity((scene,), "kind")
     solver_digest.cache_clear()
     return {name for task in (*plan.sweeps, *plan.results) for name in task.names(identity)}
 

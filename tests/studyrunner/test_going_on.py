@@ -8,9 +8,12 @@ import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
+from studyrunner import cli
+from studyrunner.checkpoint import store
 from studyrunner.cli import main
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.result import write
+from studyrunner.user_error import UserError
 from tests.mpi.launching import count_entries, results
 from tests.studyrunner.faked_runs import SMALL
 
@@ -83,6 +86,19 @@ def test_a_second_run_of_the_same_study_is_refused(solver, capsys, monkeypatch):
     assert second == [2]
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study:")]
     assert "out.nc.progress: in use: by process" in line
+
+
+def test_no_other_run_writes_the_result_before_its_last_lines_are_read(solver, monkeypatch):
+    monkeypatch.setattr(store, "_SECONDS_TO_DIE", 0.1)
+    own = cli._answer
+
+    def answer(path):
+        with pytest.raises(UserError, match="in use"):
+            store.Store(path.with_name("out.nc.progress"))
+        return own(path)
+
+    monkeypatch.setattr(cli, "_answer", answer)
+    assert main(SMALL) == 0
 
 
 @pytest.mark.slow

@@ -10,14 +10,13 @@ from solver import Block, Outcome, Passage, integrate_mission
 from studies import build_scene
 from studyrunner.cli import main
 from studyrunner.kinds.estimate import iterations_of_missions
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi import schedule
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from tests.mpi.launching import options, results
 from tests.studyrunner.faked_blocks import FakedBlocks, load_of
-from tests.studyrunner.fakes import points_of
+from tests.studyrunner.fakes import plan_of, points_of
 from tests.studyrunner.small_studies import MISSIONS, compute
 
 LINE = ("axes.frequency=160", "axes.sweep=up")
@@ -144,7 +143,7 @@ def test_a_target_ends_the_missions(blocks):
     assert 100.0 < slow < 200.0
     assert fast == pytest.approx(0.5 * slow, rel=0.05)
     assert (result.missions_to_target_error > 0.0).all()
-    assert all("later ones are not computed" in message for message in result.message.values.ravel())
+    assert all("later missions are not computed" in message for message in result.message.values.ravel())
     assert summary(result).values["life"]["count"] == fast
 
 
@@ -162,7 +161,7 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
     scenes = find_scenes(study)
     assert len(scenes.studies) == 4
     assert scenes.of_blocks == ((0, 0, 1), (2, 2, 3))
-    plan = build_tasks(study, 2)
+    plan = plan_of(study, 2)
     assert [task.scenes for task in plan.results[:: len(plan.results) // 2]] == [(0, 1), (2, 3)]
     assert plan.n_points == len({point for task in plan.results for point in points_of(task)}) == 8
     begins = [[block.begin for block in task.blocks] for task in plan.results[:2]]
@@ -175,7 +174,7 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
 def test_an_engine_order_is_a_frequency_by_the_speed_of_the_block():
     study = read_study("engine.toml")
     assert tuple(study.dimensions) == ("wear_coefficient", "excitation_amplitude", "sweep", "rotation_speed")
-    tasks = build_tasks(study, 10).results
+    tasks = plan_of(study, 10).results
     assert [[block.frequency for block in task.blocks] for task in tasks] == [[180.0, 200.0], [180.0, 4 * 3100 / 60]]
     assert [task.blocks[1].cycles for task in tasks] == [2000.0, 10 * 4 * 3100 / 60]
     assert find_scenes(study).of_blocks == ((0, 1), (0, 2))
@@ -197,10 +196,8 @@ def test_samples_draw_what_all_blocks_have(blocks):
 
 
 def test_the_estimated_time_follows_the_number_of_missions():
-    times = [iterations_of_missions([("ramp", 0.0)], number, one_pair=False) for number in (1, 3, 20, 1e6)]
+    times = [iterations_of_missions([("ramp", 0.0)], number) for number in (1, 3, 20, 1e6)]
     assert times[2] < 4 * times[1]
     assert times[3] < 5 * times[2]
-    # a ramp of one pair is seldom computed again
-    assert iterations_of_missions([("ramp", 0.0)], 20, one_pair=True) < 0.7 * times[2]
-    narrow, wide = (iterations_of_missions([("up", octaves)], 20, one_pair=True) for octaves in (0.1, 13.3))
+    narrow, wide = (iterations_of_missions([("up", octaves)], 20) for octaves in (0.1, 13.3))
     assert wide == pytest.approx(6 * narrow, rel=0.2)

@@ -8,14 +8,13 @@ from solver import backbone
 from studies import build_scene
 from studyrunner.api import run_study
 from studyrunner.cli import main
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.report.contents import draw_report
 from studyrunner.report.page.page import write_page
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from tests.mpi.launching import options, results
-from tests.studyrunner.fakes import points_of
+from tests.studyrunner.fakes import plan_of, points_of
 from tests.studyrunner.small_studies import compute
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("folder")]
@@ -114,7 +113,7 @@ def test_points_are_the_same_in_another_list(study, result):
 def test_points_of_a_line_share_a_task(study):
     """Lines that are equal are followed once."""
     lines = read_study(study, ["scene.worn={depth=[[0.0], [0.0]], cycle=[1e4, 0]}", "axes.sweep=['up', 'down']"])
-    plan = build_tasks(lines, 2)
+    plan = plan_of(lines, 2)
     assert plan.n_points == 2 * 2 * 2 * 3 * 2
     assert {mode.amplitudes for mode in plan.results} == {(1e-6, 1e-4, 1e-3)}
     points = [point for mode in plan.results for point in points_of(mode)]

@@ -10,10 +10,10 @@ import pytest
 from scipy import io
 
 from solver import SolverSettings, march_wear, with_contact_stiffness
-from studies.fe_models.from_files import scene as scene_of_files
+from studies.fe_models.from_files import model as scene_of_files
 from studies.finite_element.element_matrices import Material
 from studies.finite_element.surfaces import surface_of_nodes
-from studies.scene_answers import stuck_frequencies
+from studies.scene import stuck_frequencies
 from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study

@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 from scipy.stats import kstest, sobol_indices
 
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.arrays import sample_coordinates
 from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn, flat_table, unit_design
 from studyrunner.scene.scene import build_study_scene, describe_scene
@@ -13,6 +12,7 @@ from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.realisation import draw_inputs, realise
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import WrongValueError
+from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -159,7 +159,7 @@ def test_more_samples_go_on_from_those_there_are(capsys):
     few = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=2", *scatter)
     capsys.readouterr()
     many = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=4", *scatter)
-    assert "2 of 4 points are there from an earlier run" in capsys.readouterr().err
+    assert "from an earlier run: 2 of 4 points" in capsys.readouterr().err
     same_values(many.isel(sample=slice(2)), few)
     xr.testing.assert_identical(compute("sdof_slider", "n.nc", *CHEAP, "scatter.samples=4", *scatter), many)
     assert len(np.unique(many.worn_volume[..., -1])) == 4
@@ -169,7 +169,7 @@ def test_more_samples_go_on_from_those_there_are(capsys):
 def test_scatter_of_the_wear_coefficient_alone_is_one_history():
     given = (*CHEAP, "axes.scheme=adaptive", "scatter.samples=64", WEAR)
     study = read_study("sdof_slider", given)
-    plan = build_tasks(study, 2)
+    plan = plan_of(study, 2)
     assert (len(plan.sweeps), len(plan.results), *plan.left_out.values()) == (1, 1, 63)
     samples = compute("sdof_slider", "w.nc", *given)
     assert samples.newton_iterations.min() == samples.newton_iterations.max()
@@ -230,7 +230,7 @@ def test_a_saltelli_design_of_wear_coefficient_and_factor_of_a_surface():
     sliding = ("scene.normal_stiffness=0", "axes.wear_coefficient=1e-11", "wear.surfaces={support=0.5}")
     surface = "scatter.surfaces={support={lognormal={factor=1.3}}}"
     given = (*CHEAP, "axes.step=2000", *sliding, "scatter.method=saltelli", "scatter.samples=4", WEAR, surface)
-    assert len(build_tasks(read_study("sdof_slider", given), 2).sweeps) == 1, "all samples start from one state"
+    assert len(plan_of(read_study("sdof_slider", given), 2).sweeps) == 1, "all samples start from one state"
     samples = compute("sdof_slider", "w.nc", *given)
     assert samples.sizes["sample"] == 4 * 4
     ratio = samples.worn_volume[..., -1] / (samples.sample_wear_coefficient * samples.sample_surfaces_support)

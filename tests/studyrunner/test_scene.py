@@ -9,11 +9,10 @@ import pytest
 from solver.model import ContactInterface, needed_nodal_diameters
 from solver.packing import Packed, pack
 from studies import build_scene, read_scene
-from studies.fe_models.from_files import scene as from_files
+from studies.fe_models.from_files import model as from_files
 from studies.scene_file import write_scene
 from studies.scenes import sector as sector_room
 from studyrunner.cli import main
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.edge_pairs import edge_pairs
@@ -30,6 +29,7 @@ from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.mpi.launching import options
 from tests.studies.scene_models import plain, sector
+from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import CHEAP, SLIDER, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -170,7 +170,7 @@ class Sent:
 
     def __init__(self, folder):
         study = read_study("sdof_slider", [f"axes.stiffness={list(STIFFNESSES)}"])
-        self.sweeps = {sweep.joint.scene: sweep for sweep in build_tasks(study, 2).sweeps}
+        self.sweeps = {sweep.joint.scene: sweep for sweep in plan_of(study, 2).sweeps}
         self.models = [build_scene("sdof_slider", stiffness=stiffness) for stiffness in STIFFNESSES]
         self.read: list[int] = []
         self._handed = SceneModels(self._read, {0, 1}, folder / "out.nc.progress")

@@ -11,13 +11,13 @@ from studies.finite_element.elimination import NotPositiveDefiniteError
 from studies.finite_element.reduction import Reduction
 from studyrunner import compute_worn_joint
 from studyrunner.cli import main
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.opening import open_known
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.answers import exact_answers
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from tests.mpi.launching import options, results
+from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -68,7 +68,7 @@ def test_ratios_are_frequencies_of_each_scene():
 @pytest.mark.slow
 def test_thresholds_share_start_states():
     law = ("wear.law=threshold", "axes.threshold=[0, 5, 1e9]")
-    plan = build_tasks(read_study("sdof_slider", [*CHEAP, *law]), 2)
+    plan = plan_of(read_study("sdof_slider", [*CHEAP, *law]), 2)
     assert (len(plan.sweeps), len(plan.results)) == (1, 3)
     whole = compute("sdof_slider", "whole.nc", *CHEAP, *law)
     assert whole.threshold.attrs["units"] == "J/m2"

@@ -14,7 +14,6 @@ import pytest
 from studies import build_scene
 from studyrunner import task_runs
 from studyrunner.cli import main
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi import dispatch, mapped_file
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.mapped_file import open_mapped, ranks_that_see, write_mapped
@@ -25,7 +24,7 @@ from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, Standing
 from studyrunner.task_runs import TaskProgress
 from tests.benchmarks.simulation import MemoryIndex
-from tests.studyrunner.fakes import fake_history, fake_sweep
+from tests.studyrunner.fakes import fake_history, fake_sweep, plan_of
 
 
 @dataclass(frozen=True)
@@ -110,13 +109,13 @@ def test_what_waits_is_bounded(monkeypatch):
     dispatcher.add([Job("sweep", 1.0, 4, True)] * 50)
     most, n_done, waiting = 0, 0, 0
     while not dispatcher.done:
-        ((rank, assignment),) = dispatcher.assign()
-        for _ in range(assignment.task.n_results):
-            dispatcher.deliver(rank, assignment.number, 1.0)
-            if assignment.task.gives_starts:
+        ((rank, number, task),) = dispatcher.assign()
+        for _ in range(task.n_results):
+            dispatcher.deliver(rank, number, 1.0)
+            if task.gives_starts:
                 dispatcher.add([Job("history", 1.0)])
                 waiting += 1
-        if not assignment.task.gives_starts:
+        if not task.gives_starts:
             n_done, waiting = n_done + 1, waiting - 1
         most = max(most, waiting)
     assert (n_done, waiting) == (200, 0)
@@ -168,11 +167,11 @@ def test_ranks_that_see_a_file_are_found_and_the_file_goes(size, blind, expected
     assert ranks_that_see(Blind(size, blind), tmp_path / "file") == frozenset(expected)
     assert list(tmp_path.iterdir()) == []
 
-    def create(path):
+    def create(path, _):
         path.touch()
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(mapped_file, "create", create)
+    monkeypatch.setattr(mapped_file.Path, "open", create)
     assert ranks_that_see(Blind(size, ()), tmp_path / "file") == frozenset()
     assert list(tmp_path.iterdir()) == []
 
@@ -226,13 +225,13 @@ def test_a_run_that_has_to_compile_says_so_once(compiles, solver, tmp_path, monk
     assert said.count("the solver is compiled for this machine") == int(compiles)
 
 
-def plan_of():
+def tasks_of():
     axes = ("frequency={start=1, stop=2, num=8}", "wear_coefficient=[1e-12, 7e-12]", "step=1000", "scheme=implicit")
-    return build_tasks(read_study("sdof_slider", [f"axes.{each}" for each in (*axes, "sweep=['up', 'down']")]), 2)
+    return plan_of(read_study("sdof_slider", [f"axes.{each}" for each in (*axes, "sweep=['up', 'down']")]), 2)
 
 
 def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
-    plan = plan_of()
+    plan = tasks_of()
     progress = TaskProgress(MemoryIndex(plan))
     assert progress.look(()).seconds_left == pytest.approx(plan.cost)
     histories = []
@@ -252,7 +251,7 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
 
 def test_a_sweep_says_where_it_is():
     """What a sweep sends on its way, by `Keep`, stands behind its name."""
-    progress = TaskProgress(MemoryIndex(plan_of()))
+    progress = TaskProgress(MemoryIndex(tasks_of()))
     (sweep, *_) = progress.begin()
     progress.keep(sweep, "at 211.5 Hz, 3 of 48 pairs slip or open")
     (running,) = progress.look([(sweep, sweep.n_results, 1.0)]).running

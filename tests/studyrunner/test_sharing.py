@@ -12,11 +12,9 @@ from solver.outcome import Outcome
 from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Resolution
-from studyrunner.kinds.kind import build_tasks
-from studyrunner.kinds.sharing import describe_left_out, share_histories
 from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study_file import read_study
-from tests.studyrunner.fakes import totals_of
+from tests.studyrunner.fakes import plan_of, totals_of
 from tests.studyrunner.histories import history
 
 WEARS = ["0", "1e-12", "2e-12", "3e-12", "1e-11", "1.5e-11"]
@@ -32,17 +30,16 @@ def some(values):
     return st.lists(st.sampled_from(values), min_size=1, unique=True)
 
 
-def alike(study, wears, one, other):
-    """Whether two choices have the same history by one integration."""
+def alike(study, one, other):
+    """Whether two points have the same history by one integration."""
     (wear, _, scheme), (wear2, _, scheme2) = one, other
-    if wears[wear] == 0 or wears[wear2] == 0:
-        return wears[wear] == wears[wear2]
+    if wear == 0.0 or wear2 == 0.0:
+        return wear == wear2
     if scheme != scheme2:
         return False
-    word = study.axes.scheme[scheme]
-    if word == "adaptive":
+    if scheme == "adaptive":
         return True
-    if word == "explicit" and study.slow_time.largest_depth is not None:
+    if scheme == "explicit" and study.slow_time.largest_depth is not None:
         return wear == wear2
     return False
 
@@ -51,21 +48,25 @@ def alike(study, wears, one, other):
 def test_histories_are_shared_where_they_are_the_same(wears, steps, schemes, by_depth):
     axes = [f"axes.{name}=[{', '.join(values)}]" for name, values in (("wear_coefficient", wears), ("step", steps))]
     study = study_of(*axes, f"axes.scheme={schemes}", *["slow_time.largest_depth=1e-6"] * by_depth)
-    tasks, causes = share_histories(study)
-    histories = [(number, scaled) for number, task in enumerate(tasks) for scaled in task.histories]
-    task_of = {choice: number for number, scaled in histories for choice in scaled.points}
-    choices = list(itertools.product(*(range(len(axis)) for axis in (wears, steps, schemes))))
-    assert sorted(task_of) == choices
-    exact = [float(text) for text in wears]
-    for one, other in itertools.combinations(choices, 2):
-        assert (task_of[one] == task_of[other]) == alike(study, exact, one, other)
-    assert sum(describe_left_out(causes).values()) == len(choices) - len(tasks)
-    for found in tasks:
-        descending = [scaled.wear_coefficient for scaled in found.histories]
-        for scaled in found.histories:
-            assert {study.axes.wear_coefficient[wear] for wear, _, _ in scaled.points} == {scaled.wear_coefficient}
+    plan = plan_of(study)
+    shared = [each for task in plan.results for each in task.integrated]
+    of_axes = (study.axes.wear_coefficient, study.axes.step, study.axes.scheme)
+    found = {}
+    for number, integrated in enumerate(shared):
+        descending = [scaled.wear_coefficient for scaled in integrated.histories]
         assert descending == sorted(descending, reverse=True)
-        assert found.unworn == (descending[0] == 0.0)
+        assert integrated.unworn == (descending[0] == 0.0)
+        for scaled in integrated.histories:
+            for index in scaled.points:
+                at = dict(zip(study.dimensions, index, strict=True))
+                places = (at["wear_coefficient"], at["step"], at["scheme"])
+                point = tuple(values[place] for values, place in zip(of_axes, places, strict=True))
+                assert scaled.wear_coefficient == point[0]
+                found[point] = number
+    assert found.keys() == set(itertools.product(*of_axes))
+    for one, other in itertools.combinations(found, 2):
+        assert (found[one] == found[other]) == alike(study, one, other)
+    assert sum(plan.left_out.values()) == len(found) - len(shared)
 
 
 ADAPTIVE = ("axes.wear_coefficient=[2e-12, 1e-11, 4e-12]", "axes.scheme=adaptive", "axes.step=[1, 2]")
@@ -75,7 +76,7 @@ COUNTS = [0.0, 2.0, 4.0, 5.0, 10.0]
 def shared_task(*overrides):
     """A task of three histories at cycles 0 and 10, which are read at 0, 10; 0, 4; 0, 2 cycles of the first."""
     study = study_of(*ADAPTIVE, "slow_time.cycles=10", "slow_time.outputs=2", *overrides)
-    (task,) = build_tasks(study, 2).results
+    (task,) = plan_of(study, 2).results
     start = StartState(Outcome.CONVERGED, None, 1.0, Resolution((1,), 64), 0.0, 0.0, 0, 0.0)
     return replace(task, start=pack(start))
 
@@ -112,7 +113,7 @@ def test_each_history_has_its_own_counts_and_rates_back():
 def test_histories_of_one_that_ended_early_are_results_all_the_same(last, outcomes, lasts):
     """Cycles 0 and 10 of the histories are 0, 10; 0, 4; 0, 2 cycles of the integrated one."""
     found = results_of(replace(history(COUNTS, Outcome.MARCH_FAILED), last_cycle=last, message="at cycle 9"))
-    assert [result.outcome for result in found] == outcomes
+    assert [result.values["outcome"] for result in found] == outcomes
     np.testing.assert_allclose([result.values["last_cycle"] for result in found], lasts)
     for result, end in zip(found, (10.0, 4.0, 2.0), strict=True):
         there = np.isfinite(result.values["worn_volume"]).tolist()
@@ -120,7 +121,7 @@ def test_histories_of_one_that_ended_early_are_results_all_the_same(last, outcom
         assert result.values["error_estimate"] == pytest.approx(0.03 * result.values["worn_volume"][there][-1])
     # the message of the integrated one counts its own cycles
     assert [result.values["message"] == "at cycle 9" for result in found] == [True, False, False]
-    assert all(result.values["message"] == "" for result in found if result.outcome == 0)
+    assert all(result.values["message"] == "" for result in found if result.values["outcome"] == 0)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +138,7 @@ def test_histories_of_one_that_ended_early_are_results_all_the_same(last, outcom
 def test_a_scaled_history_is_inaccurate_by_its_own_counts(first, ended, expected):
     inaccurate = {"inaccurate_from": first, "inaccurate_in": "wear rate", "inaccurate_error": 0.04}
     found = results_of(replace(history(COUNTS, ended), message="of it", **inaccurate))
-    assert [result.outcome for result in found] == expected
+    assert [result.values["outcome"] for result in found] == expected
     # 4 cycles of the integrated history are 10 of the second, 2 of them 10 of the third
     for result, slower in zip(found[1:], (0.4, 0.2), strict=True):
-        assert (f"from cycle {first / slower:.0f} on" in result.values["message"]) is bool(result.outcome)
+        assert (f"from cycle {first / slower:.0f} on" in result.values["message"]) is bool(result.values["outcome"])

@@ -10,12 +10,11 @@ import pytest
 from solver.outcome import Outcome
 from studyrunner import task_runs
 from studyrunner.cli import main
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study_file import read_study
 from studyrunner.variables import ASKED, USUAL
 from tests.mpi.launching import options, results
-from tests.studyrunner.fakes import changed, points_of, totals_of, without_values
+from tests.studyrunner.fakes import changed, plan_of, points_of, totals_of, without_values
 from tests.studyrunner.histories import history
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")
@@ -30,9 +29,9 @@ GRID = (
 )
 
 
-def plan_of(*overrides):
+def tasks_of(*overrides):
     study = read_study("sdof_slider", overrides)
-    return study, build_tasks(study, 2)
+    return study, plan_of(study)
 
 
 def assert_every_point_once(study, plan):
@@ -43,7 +42,7 @@ def assert_every_point_once(study, plan):
 
 
 def test_one_sweep_along_a_line_of_frequencies():
-    study, plan = plan_of(*GRID)
+    study, plan = tasks_of(*GRID)
     lines = [(sweep.excitation_amplitude, sweep.direction, sweep.settings.harmonics) for sweep in plan.sweeps]
     assert sorted(lines) == sorted(itertools.product((1.0, 2.0), ("up", "down"), (1, 5)))
     assert {sweep.frequencies for sweep in plan.sweeps} == {(150.0, 155.0, 160.0)}
@@ -52,7 +51,7 @@ def test_one_sweep_along_a_line_of_frequencies():
 
 def test_a_ramp_is_a_task_at_each_frequency():
     """Nothing is serial in it: as many ramps as points, and the histories of each from its only state."""
-    study, plan = plan_of("axes.frequency=[160, 150, 155]", "axes.sweep=['ramp', 'up']", *SHARED)
+    study, plan = tasks_of("axes.frequency=[160, 150, 155]", "axes.sweep=['ramp', 'up']", *SHARED)
     ramps = [sweep for sweep in plan.sweeps if sweep.direction == "ramp"]
     assert [sweep.frequencies for sweep in ramps] == [(150.0,), (155.0,), (160.0,)]
     assert [sweep.number for sweep in plan.sweeps] == list(range(4))
@@ -66,7 +65,7 @@ def test_a_ramp_is_a_task_at_each_frequency():
 
 def test_points_know_their_task():
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
-    study, plan = plan_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
+    study, plan = tasks_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
     assert any(len(each.histories) > 1 for task in plan.results for each in task.integrated)
     assert any(len(task.integrated) > 1 for task in plan.results)
     for task in plan.results:
@@ -117,7 +116,7 @@ def test_plan_is_printed(capsys):
     ],
 )
 def test_estimates_hold_to_a_factor_of_two(study, n_displacements, used):
-    planned = build_tasks(read_study(study), n_displacements).cost
+    planned = plan_of(read_study(study), n_displacements).cost
     assert 0.5 * used < planned < 2.0 * used
 
 
@@ -179,7 +178,7 @@ def test_unexpected_failure_keeps_the_old_file(folder, solver, monkeypatch, caps
 
 def history_task(*overrides):
     study = read_study("sdof_slider", ["axes.frequency=100", "axes.scheme=implicit", *overrides])
-    return build_tasks(study, 2).results[0]
+    return plan_of(study, 2).results[0]
 
 
 def ended_at(last, at, outcome=Outcome.CERTIFICATE_FAILED):

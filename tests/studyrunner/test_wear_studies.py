@@ -6,7 +6,6 @@ import pytest
 from studyrunner import open_result
 from studyrunner.accessor import join_results
 from studyrunner.cli import main
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import Identity
 from studyrunner.report.figures.wear import draw_excitation
 from studyrunner.result.view import open_for_report
@@ -14,7 +13,7 @@ from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from studyrunner.variables import CERTIFICATE, KEPT, LOOPS, USUAL
 from tests.mpi.launching import options, results
-from tests.studyrunner.fakes import FACTS
+from tests.studyrunner.fakes import FACTS, plan_of
 from tests.studyrunner.small_studies import UNWORN, compute
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
@@ -33,7 +32,7 @@ TABLE = ("wear.law=table", "wear.pressure=[1e4, 1e5]", "wear.depth=[0, 1e-5]", "
 def test_a_history_is_known_by_its_law_and_a_start_state_is_not():
     found = []
     for wear in ((), ("wear.law=energy",), ("wear.surfaces={support=2.0}",), ("slow_time.until={wear_depth=1}",)):
-        plan = build_tasks(read_study("sdof_slider", (*SHORT, *wear)), FACTS.n_displacements)
+        plan = plan_of(read_study("sdof_slider", (*SHORT, *wear)), FACTS.n_displacements)
         of = Identity((FACTS.digest,), "kind")
         found.append((plan.sweeps[0].names(of), plan.results[0].names(of)))
     starts, histories = map(set, zip(*found, strict=True))
@@ -80,7 +79,7 @@ def test_points_end_at_their_target_each_at_its_own_count():
     # nothing wears, nothing is reached
     still = run(*SHORT, "axes.wear_coefficient=0", "slow_time.until={worn_volume=1e-12}")
     assert np.isnan(still.cycles_to_target.item())
-    assert "stays below 1e-12 m3: it is 0 m3" in still.message.item()
+    assert "stays below 1e-12" in still.message.item()
 
 
 END = ("axes.frequency=160", "axes.sweep=ramp", "slow_time.cycles=inf", "slow_time.outputs=6", "solver.harmonics=3")
@@ -120,7 +119,7 @@ def test_points_to_the_end_have_counts_of_their_own_in_file_report_and_archive()
 
 def test_the_scheme_final_is_computed_once_for_all_coefficients_and_steps():
     several = ("axes.wear_coefficient=[1.1e-11, 1e-12]", "axes.scheme=['adaptive', 'final']", "axes.step=[10, 100]")
-    assert len(build_tasks(read_study("sdof_slider", (*END, *several)), 2).results) == 1
+    assert len(plan_of(read_study("sdof_slider", (*END, *several)), 2).results) == 1
     result = run(*END, *several).squeeze(drop=True)
     assert (result.outcome == 0).all()
     assert np.array_equal(result.worn_volume.sel(scheme="final"), result.worn_volume.sel(scheme="adaptive"))

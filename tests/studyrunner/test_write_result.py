@@ -11,7 +11,6 @@ import pytest
 import xarray as xr
 
 from studyrunner.accessor import FretwearAccessor
-from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.result.arrays import coordinates
 from studyrunner.result.provenance import describe_run
@@ -20,7 +19,7 @@ from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
-from tests.studyrunner.fakes import FACTS, fake_completion, fake_history, started, without_values
+from tests.studyrunner.fakes import FACTS, fake_completion, fake_history, plan_of, started, without_values
 from tests.studyrunner.results import build_dataset, write_dataset
 
 OVERRIDES = (
@@ -37,13 +36,13 @@ SHAPE = (2, 1, 1, 1, 2, 1, 2)
 
 
 def fake_results(*overrides):
-    plan = build_tasks(read_study("sdof_slider", (*OVERRIDES, *overrides)), FACTS.n_displacements)
+    plan = plan_of(read_study("sdof_slider", (*OVERRIDES, *overrides)), FACTS.n_displacements)
     return [fake_history(task, place=place) for task in started(plan) for place in task.order]
 
 
 def write_study(study, results, path):
     """The file of a run of the study with these results."""
-    plan = build_tasks(study, FACTS.n_displacements)
+    plan = plan_of(study, FACTS.n_displacements)
     completion = fake_completion(study, plan, results, Target(path).progress)
     arrays = [*coordinates(study, FACTS, pair_arrays(study, [FACTS]))]
     with contextlib.closing(completion.store):
@@ -177,7 +176,7 @@ def test_the_examples_of_readme_and_pages_run(tmp_path, monkeypatch):
     (short,), (example,), (of_accessor,) = (re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL) for text in texts)
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]", "outputs.loops=[]"])
-    plan = build_tasks(study, FACTS.n_displacements)
+    plan = plan_of(study, FACTS.n_displacements)
     write_study(study, [fake_history(task) for task in started(plan)], tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     for page, code in zip(pages, (short, example), strict=False):

@@ -38,53 +38,38 @@ class Surface:
     faces: IntArray
     nodes: IntArray
 
-    @property
-    def of_nodes(self) -> bool:
-        """Whether the surface is one of nodes."""
-        return self.nodes.size > 0
-
 
 @dataclass(frozen=True)
-class Tie:
-    """Two glued surfaces by name, slave first, or the cut faces of a sector (cyclic).
+class SurfacePair:
+    """Two surfaces by name, the dependent one first, that are glued (*TIE) or touch (*CONTACT PAIR).
 
-    tolerance: largest distance of a tied node; None where the deck gives none, or 0.
-    """
-
-    name: str
-    dependent: str
-    independent: str
-    tolerance: float | None
-    cyclic: bool
-
-
-@dataclass(frozen=True)
-class ContactPair:
-    """Two surfaces in contact by name, slave first.
-
-    friction_coefficient: None where the deck gives none. clearance: distance of the surfaces, negative for an
-    interference; None for the distances in the mesh. Places, "" where there is nothing of the kind: problem of a law
-    that is not read, glued where surfaces do not part, fitted of a clearance or interference, adjusted where nodes are
-    moved.
+    tolerance: largest distance of a tied node; None where the deck gives none. friction_coefficient: None where the
+    deck gives none. clearance: distance of the surfaces, negative for an interference; None for the distances in the
+    mesh. Places, "" where there is nothing of the kind: problem of a law of friction that is not read, glued where
+    surfaces in contact do not part, fitted of a clearance or interference, adjusted where nodes are moved.
     """
 
     dependent: str
     independent: str
-    interaction: str
-    friction_coefficient: float | None
+    tolerance: float | None = None
+    friction_coefficient: float | None = None
     problem: str = ""
     glued: str = ""
     fitted: str = ""
     clearance: float | None = None
     adjusted: str = ""
 
+    @property
+    def labels(self) -> tuple[str, str, str]:
+        """Names by which a study means the pair, that of both surfaces last."""
+        return self.dependent, self.independent, f"{self.dependent}-{self.independent}"
+
 
 @dataclass(frozen=True)
 class CyclicSymmetry:
-    """A sector. ties: names of those of the cut faces, if the deck gives some. axis (2, 3): two points on the axis."""
+    """A sector. axis (2, 3): two points on the axis."""
 
     n_sectors: int
-    ties: tuple[str, ...]
     axis: FloatArray
 
 
@@ -92,16 +77,15 @@ class CyclicSymmetry:
 class Boundary:
     """Prescribed displacements of nodes (p,); value 0 for held ones.
 
-    name: the set, or the node number as text. first_dof, last_dof: 1 to 3 are displacements along x, y and z, or along
-    the directions of a `Transform`; 4 to 6 rotations of reference points; larger numbers are possible.
+    first_dof, last_dof: 1 to 3 are displacements along x, y and z, or along the directions of a `Transform`; 4 to 6
+    rotations of reference points; larger numbers are possible.
     """
 
-    name: str
+    place: str
     nodes: IntArray
     first_dof: int
     last_dof: int
     value: float
-    place: str = ""
 
 
 @dataclass(frozen=True)
@@ -175,21 +159,19 @@ class Material:
 
 
 @dataclass(frozen=True)
-class SolidSection:
-    """Names of a set of elements and of their material."""
+class Section:
+    """Elements (m,) and the name of their material. name: of the set of elements."""
 
-    element_set: str
+    name: str
+    elements: IntArray
     material: str
 
 
 @dataclass(frozen=True)
 class CentrifugalLoad:
-    """Centrifugal load of elements (m,). name: the set, or the element number as text.
+    """Centrifugal load of elements (m,). omega_squared: rad2/s2. point (3,): on the axis. axis (3,): unit vector."""
 
-    omega_squared: rad2/s2. point (3,): on the axis. axis (3,): unit vector.
-    """
-
-    name: str
+    place: str
     elements: IntArray
     omega_squared: float
     point: FloatArray
@@ -210,13 +192,12 @@ class Deck:
     """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
 
     path: name of the file. node_numbers (n,), coordinates (n, 3): numbers ascending. No element number is in two
-    blocks; all numbers in sets exist. Ties to rigid motions, forces and pressures stand in the order of the file.
-    centrifugal: loads of the last step that has some. gravity (3,): acceleration of all elements in static steps.
-    unassembled: places of what only matrices of another program hold. removed: what *MODEL CHANGE takes away, a
-    sentence each; it is not among the rest. n_instances: where there are several, numbers are not those of the file.
-    skipped: places of keywords that cannot change the model. notes: what was read in a way that may be asked for, a
-    sentence each. included: files relative to the deck's folder. contact_nodes: of a table of nodes, which has no
-    elements; None of a mesh.
+    blocks; all numbers in sets exist, and nothing names elements that are taken away. cut_faces: names of surfaces that
+    are images of each other. centrifugal: loads of the last step that has some. gravity (3,): acceleration of all
+    elements in static steps. unassembled: places of what only matrices of another program hold. n_instances: where
+    there are several, numbers are not those of the file. skipped: places of keywords that cannot change the model.
+    notes: what was read in a way that may be asked for, a sentence each. included: files relative to the deck's folder.
+    contact_nodes: of a table of nodes, which has no elements; None of a mesh.
     """
 
     path: str
@@ -226,21 +207,21 @@ class Deck:
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)
     element_sets: Mapping[str, IntArray] = field(default_factory=dict)
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
-    ties: tuple[Tie, ...] = ()
-    contact_pairs: tuple[ContactPair, ...] = ()
+    ties: tuple[SurfacePair, ...] = ()
+    contact_pairs: tuple[SurfacePair, ...] = ()
     cyclic: CyclicSymmetry | None = None
+    cut_faces: tuple[tuple[str, str], ...] = ()
     boundaries: tuple[Boundary, ...] = ()
     transforms: tuple[Transform, ...] = ()
     equations: tuple[Equation, ...] = ()
     rigid_motions: tuple[RigidMotion, ...] = ()
     materials: Mapping[str, Material] = field(default_factory=dict)
-    sections: tuple[SolidSection, ...] = ()
+    sections: tuple[Section, ...] = ()
     centrifugal: tuple[CentrifugalLoad, ...] = ()
     forces: tuple[NodalForce, ...] = ()
     pressures: tuple[Pressure, ...] = ()
     gravity: FloatArray | None = None
     unassembled: tuple[str, ...] = ()
-    removed: tuple[str, ...] = ()
     n_instances: int = 0
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -252,8 +233,7 @@ class Deck:
         """Label and text of lines for the user: what was skipped, where there is something, and the notes."""
         more = len(self.skipped) - _MOST_NAMED
         skipped = "; ".join(self.skipped[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-        notes = (("note", text) for text in (*self.notes, *self.removed))
-        return (*((("skipped", skipped),) if skipped else ()), *notes)
+        return (*((("skipped", skipped),) if skipped else ()), *(("note", text) for text in self.notes))
 
     def rows_of_nodes(self, numbers: IntArray) -> IntArray:
         """Places of nodes in `coordinates`, of the shape of `numbers`; all of them must exist."""

@@ -1,21 +1,55 @@
-"""The mesh of a deck: every number exists, and sets, surfaces and numbers can be looked up by what a line says."""
+"""The mesh of a deck: as it is read, and then with every number in its place and every set to be looked up."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cached_property
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from studies.fe_models.deck.blocks import Block, Reference
 from studies.fe_models.deck.contents import NODES_OF_KIND, ElementBlock, Surface
-from studies.fe_models.deck.draft import Draft, Records
-from studies.fe_models.deck.sets import Key, Reference, Resolver, scope_of
+from studies.fe_models.deck.sets import NONE, Key, Resolver, SetDefinitions, find_key
 from studies.fe_models.text import LARGEST_NUMBER, FloatArray, IntArray, Place, shown
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.scene_error import SceneError
 
 _MOST_FACES = 20_000_000  # of all surfaces together
-_NONE = np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Records:
+    """Nodes or elements as they are written. numbers (n,), values (n, k): coordinates or nodes. kind: of elements."""
+
+    scope: str
+    numbers: IntArray
+    values: FloatArray | IntArray
+    place: Place
+    kind: str = ""
+
+
+@dataclass
+class Draft:
+    """The mesh as far as it is read.
+
+    name: of the file. scope: name of the instance that is read, else "". parts: keywords by the name of the part. part:
+    name of the one that is read. placed: shift (3,) and turn (3, 3) of every instance. system: origin and axes, one a
+    row, of *NODE. surfaces: sets or numbers with faces, 0 of nodes. others: keywords that are not of the mesh.
+    """
+
+    name: str
+    nodes: list[Records] = field(default_factory=list)
+    elements: list[Records] = field(default_factory=list)
+    node_sets: SetDefinitions = field(default_factory=lambda: SetDefinitions("nodes"))
+    element_sets: SetDefinitions = field(default_factory=lambda: SetDefinitions("elements"))
+    surfaces: dict[Key, list[tuple[Reference, int]]] = field(default_factory=dict)
+    system: tuple[FloatArray, FloatArray] | None = None
+    parts: dict[str, list[Block]] = field(default_factory=dict)
+    part: str = ""
+    placed: dict[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    scope: str = ""
+    others: list[Block] = field(default_factory=list)
+    included: list[str] = field(default_factory=list)
 
 
 class Mesh:
@@ -27,69 +61,68 @@ class Mesh:
     """
 
     def __init__(self, draft: Draft) -> None:
-        for generate in draft.generators:
-            generate(draft)
         self.draft = draft
         self.offsets = _find_offsets(draft)
         self.numbers, self.coordinates = _build_nodes(draft, self.offsets)
         self.blocks = _build_blocks(draft, self.offsets, self.numbers)
-        order = np.concatenate([block.numbers for block in self.blocks] or [_NONE])
+        order = np.concatenate([block.numbers for block in self.blocks] or [NONE])
         kinds = np.repeat([block.kind for block in self.blocks], [block.numbers.size for block in self.blocks])
         rows = np.argsort(order)
         self.all_elements, self.kinds = order[rows], kinds[rows]
         self.solid = np.isin(self.kinds, list(NODES_OF_KIND))
         self._elements = Resolver(draft.element_sets, self.all_elements, self.offsets, "EALL")
         self._nodes = Resolver(draft.node_sets, self.numbers, self.offsets, "NALL", self.nodes_of)
-        self._faces_left = _MOST_FACES
         # sets first: their errors are about the lines where they are defined
         self.element_sets, self.node_sets = self._sets(self._elements), self._sets(self._nodes)
+        self._faces_left = _MOST_FACES
         self.surfaces: dict[str, Surface] = {}
         for key in draft.surfaces:
             self.surfaces.update(dict.fromkeys(self._names(key, draft.surfaces), self._surface(key)))
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What sets name that does not exist."""
-        return (*self._nodes.notes, *self._elements.notes)
-
-    @property
-    def numbering(self) -> tuple[str, ...]:
-        """Which numbers the nodes of instances have."""
+        """What sets name that does not exist, and which numbers the nodes of later instances have."""
         later = [(name, offset) for name, offset in self.offsets.items() if offset]
-        return tuple(f"Node 1 of {name or 'the assembly'} is node {offset + 1}." for name, offset in later)
+        numbering = (f"Node 1 of {name or 'the assembly'} is node {offset + 1}." for name, offset in later)
+        return (*self._nodes.notes, *self._elements.notes, *numbering)
 
-    def nodes(self, reference: Reference) -> tuple[str, IntArray]:
-        """Name for messages, and the nodes of a set or number."""
-        return self._name(reference, self.draft.node_sets.items), self._nodes.find(reference)
+    def nodes(self, reference: Reference) -> IntArray:
+        """The nodes of a set or number, ascending."""
+        return self._nodes.find(reference)
 
-    def elements(self, reference: Reference) -> tuple[str, IntArray]:
-        """Name for messages, and the elements of a set or number."""
-        return self._name(reference, self.draft.element_sets.items), self._elements.find(reference)
+    def elements(self, reference: Reference) -> IntArray:
+        """The elements of a set or number, ascending."""
+        return self._elements.find(reference)
+
+    def name_of_elements(self, reference: Reference) -> str:
+        """Name that a set of elements has in the deck; the number of a single one."""
+        sets = self.draft.element_sets.items
+        key = find_key(sets, self.offsets, reference)
+        return reference.target if key is None else self._names(key, sets)[0]
 
     def node(self, reference: Reference) -> int:
         """A node, or the only one of a set."""
         found = self._nodes.find(reference)
         if found.size != 1:
-            what = f"{shown(str(reference.target))} has {found.size} nodes"
+            what = f"{shown(reference.target)} has {found.size} nodes"
             raise reference.place.wrong(what, "give one reference node that exists")
         return int(found[0])
 
     def ordered(self, reference: Reference) -> IntArray:
         """Nodes of a set or number in the order that counts in equations."""
-        found, name = self._nodes.find(reference), shown(str(reference.target))
-        if (reference.scope, reference.target) in self.draft.node_sets.unsorted and found.size > 1:
-            raise reference.place.wrong(f"the set {name} is UNSORTED", "give nodes one by one")
-        if not found.size:
-            raise reference.place.wrong(f"{name} of a constraint has no node", "give nodes that exist")
+        found, sets = self._nodes.find(reference), self.draft.node_sets
+        unsorted = found.size > 1 and find_key(sets.items, self.offsets, reference) in sets.unsorted
+        if unsorted or not found.size:
+            found_wrong = f"the set {shown(reference.target)} " + ("is UNSORTED" if unsorted else "has no node")
+            raise reference.place.wrong(found_wrong, "give nodes that exist, one by one")
         return found
 
     def surface(self, reference: Reference) -> str:
         """Name of a surface."""
-        scope = scope_of(self.draft.surfaces, self.offsets, reference)
-        if scope is None:
-            found = f"there is no surface {shown(str(reference.target))}"
-            raise reference.place.wrong(found, "define it with *SURFACE")
-        return self._names((scope, str(reference.target)), self.draft.surfaces)[0]
+        key = find_key(self.draft.surfaces, self.offsets, reference)
+        if key is None:
+            raise reference.place.wrong(f"there is no surface {shown(reference.target)}", "define it with *SURFACE")
+        return self._names(key, self.draft.surfaces)[0]
 
     def surface_nodes(self, name: str) -> IntArray:
         """Nodes of a surface."""
@@ -97,8 +130,8 @@ class Mesh:
         found = [surface.nodes]
         for block in self.blocks:
             if block.kind in NODES_OF_KIND:
-                for face, local in enumerate(ELEMENT_KINDS[block.kind].faces):
-                    own = surface.elements[surface.faces == face + 1]
+                for face, local in enumerate(ELEMENT_KINDS[block.kind].faces, 1):
+                    own = surface.elements[surface.faces == face]
                     found.append(block.nodes[np.isin(block.numbers, own)][:, local].ravel())
         return np.unique(np.concatenate(found))
 
@@ -106,7 +139,7 @@ class Mesh:
         """Nodes of a set of elements."""
         elements = self._elements.find(reference)
         found = [block.nodes[np.isin(block.numbers, elements)].ravel() for block in self.blocks]
-        return np.unique(np.concatenate([_NONE, *found]))
+        return np.unique(np.concatenate([NONE, *found]))
 
     def other_kinds(self, elements: IntArray) -> list[str]:
         """Kinds of those elements (m,) that are not read."""
@@ -117,19 +150,12 @@ class Mesh:
         shift, turn = self.draft.placed.get(scope, (np.zeros(3), np.eye(3)))
         return points @ turn.T + (0.0 if vectors else shift)
 
-    def _names(self, key: Key, everything: Mapping[Key, object]) -> list[str]:
+    def _names(self, key: Key, everything: Container[Key]) -> list[str]:
         """Names of a set or surface: where others have the same, the one of an instance has that before it."""
         scope, name = key
-        if not scope:
-            return [name]
-        long = f"{scope}.{name}"
-        alone = [other for other in ("", *self.draft.placed) if (other, name) in everything] == [scope]
-        return [name, long] if alone else [long]
-
-    def _name(self, reference: Reference, everything: Mapping[Key, object]) -> str:
-        scope = scope_of(everything, self.offsets, reference)
-        target = str(reference.target)
-        return target if scope is None else self._names((scope, target), everything)[0]
+        alone = all((other, name) not in everything for other in ("", *self.draft.placed) if other != scope)
+        long = f"{scope}.{name}" if scope else name
+        return [name, long] if alone and scope else [long]
 
     def _sets(self, resolver: Resolver) -> dict[str, IntArray]:
         start, sets = Place(self.draft.name, 1), resolver.sets.items
@@ -138,28 +164,23 @@ class Mesh:
     def _surface(self, key: Key) -> Surface:
         parts = self.draft.surfaces[key]
         if not parts or parts[0][1] == 0:
-            nodes = np.concatenate([_NONE, *(self._nodes.find(reference) for reference, _ in parts)])
-            return Surface(_NONE, _NONE, np.unique(nodes))
+            nodes = np.concatenate([NONE, *(self._nodes.find(reference) for reference, _ in parts)])
+            return Surface(NONE, NONE, np.unique(nodes))
+        n_faces = {kind: len(each.corner_faces) for kind, each in ELEMENT_KINDS.items()}
         found: list[IntArray] = []
         for reference, face in parts:
-            name, members = self.elements(reference)
+            members = self._elements.find(reference)
             self._faces_left -= members.size
             if self._faces_left < 0:
                 raise reference.place.wrong(f"more than {_MOST_FACES} faces", "remove surfaces that are not used")
-            rows = np.searchsorted(self.all_elements, members)
-            few = rows[self._n_faces[rows] < face]
-            if few.size:
-                example = f"element {self.all_elements[few[0]]} ({self.kinds[few[0]]})"
-                what = f"elements of {shown(name)} have no face S{face}, as {example}"
-                raise reference.place.wrong(what, "give another, of a solid element")
+            kinds = self.kinds[np.searchsorted(self.all_elements, members)]
+            for kind in set(kinds.tolist()):
+                if n_faces.get(kind, 0) < face:
+                    what = f"elements of {shown(reference.target)} have no face S{face}: they are {kind}"
+                    raise reference.place.wrong(what, "give another, of a solid element")
             found.append(np.stack((members, np.full(members.size, face)), axis=1))
         both = np.unique(np.concatenate(found), axis=0)
-        return Surface(both[:, 0].copy(), both[:, 1].copy(), _NONE)
-
-    @cached_property
-    def _n_faces(self) -> IntArray:
-        faces = {kind: len(each.corner_faces) for kind, each in ELEMENT_KINDS.items()}
-        return np.array([faces.get(kind, 0) for kind in self.kinds], dtype=np.int64)
+        return Surface(both[:, 0].copy(), both[:, 1].copy(), NONE)
 
 
 def _find_offsets(draft: Draft) -> dict[str, int]:
@@ -218,7 +239,7 @@ def _build_blocks(draft: Draft, offsets: Mapping[str, int], nodes: IntArray) -> 
         numbers, used = (np.concatenate(each) for each in zip(*parts, strict=True))
         order = np.argsort(numbers, kind="stable")
         blocks.append(ElementBlock(kind, numbers[order], used[order]))
-    numbers = np.sort(np.concatenate([block.numbers for block in blocks] or [_NONE]))
+    numbers = np.sort(np.concatenate([block.numbers for block in blocks] or [NONE]))
     again = numbers[1:][numbers[1:] == numbers[:-1]]
     if again.size:
         place = _place_of(draft.elements, offsets, again[0])

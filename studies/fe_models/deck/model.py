@@ -2,38 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from studies.fe_models.deck.blocks import Block
 from studies.fe_models.deck.contents import (
     NODES_OF_KIND,
-    ContactPair,
     CyclicSymmetry,
     Deck,
     ElementBlock,
     Material,
-    SolidSection,
+    Section,
     Surface,
+    SurfacePair,
 )
-from studies.fe_models.deck.draft import Draft, Records, refused
-from studies.fe_models.deck.mesh import Mesh
-from studies.fe_models.deck.sets import Reference, read_reference
-from studies.fe_models.text import Block, FloatArray, IntArray, Place, shown
+from studies.fe_models.deck.mesh import Draft, Mesh, Records
+from studies.fe_models.deck.sets import NONE, Numbers
+from studies.fe_models.text import FloatArray, IntArray, Place, shown
 from studies.scene_error import SceneError
 
 _SAME_AXIS = 1e-6  # distance of two axes over the distance of the points that give them
-_NONE = np.empty(0, dtype=np.int64)
+_MOST_SKIPPED = 1000
 
 
 @dataclass
 class MaterialRows:
-    """A material: rows of *ELASTIC and *DENSITY, the temperature last, and where they stand."""
+    """A material: rows of *ELASTIC and *DENSITY, the temperature last, by keyword, and where they stand."""
 
-    elastic: list[list[float]] = field(default_factory=list)
-    density: list[list[float]] = field(default_factory=list)
+    rows: dict[str, list[list[float]]] = field(default_factory=dict)
     places: dict[str, Place] = field(default_factory=dict)
     problem: str = ""
 
@@ -64,14 +63,14 @@ class Step:
 
 @dataclass
 class Model:
-    """All that was read so far. scope: name of the instance of the keyword that is read, else "".
+    """All that was read so far.
 
     fields: entries of the fields of the deck in the order of the file, by a key for those that may be replaced.
     interaction, material: those that the next keywords are about. thermal: where temperatures and expansion stand.
+    coupling: a *COUPLING that does not say yet what it couples.
     """
 
     mesh: Mesh
-    scope: str = ""
     fields: dict[str, dict[Hashable, list[Any]]] = field(default_factory=dict)
     interactions: dict[str, Interaction] = field(default_factory=dict)
     interaction: Interaction | None = None
@@ -83,7 +82,7 @@ class Model:
     skipped: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def add(self, name: str, items: Iterable[Any], key: Hashable = None) -> None:
+    def add(self, name: str, *items: Any, key: Hashable = None) -> None:
         """Adds entries of a field of the deck; those of the same key, which is not None, are replaced."""
         entries = self.fields.setdefault(name, {})
         entries[len(entries) if key is None else key] = list(items)
@@ -103,157 +102,130 @@ class Model:
 
     def skip(self, block: Block) -> None:
         """Notes a keyword that cannot change the model."""
-        if len(self.skipped) < 1000:
-            self.skipped.append(f"{block.place}: *{block.written}")
-
-    def named(self, block: Block, parameter: str) -> Reference:
-        """What the name in a parameter points to. Raises SceneError."""
-        return self.refer(f'"{block.name(parameter)}"', block.place)
-
-    def refer(self, text: str, place: Place) -> Reference:
-        """What a name or number of a data line points to. Raises SceneError."""
-        return read_reference(text, self.scope, self.mesh.draft.placed, place)
-
-    def check_coupling(self) -> None:
-        """Raises SceneError where a coupling does not say what it couples."""
-        if self.coupling is not None:
-            raise refused(self.coupling, "no *KINEMATIC below it", "write it there, or remove the coupling")
+        if len(self.skipped) < _MOST_SKIPPED:
+            self.skipped.append(str(block.place))
 
     def deck(self) -> Deck:
         """The deck. Raises SceneError where names are missing or do not fit."""
         mesh = self.mesh
-        gone = _NONE
+        gone = NONE
         for removed, elements, _ in self.get("removed"):
             gone = np.union1d(gone, elements) if removed else np.setdiff1d(gone, elements)
-        blocks = [_without(block, gone) for block in mesh.blocks if block.kind in NODES_OF_KIND]
+        solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.blocks if block.kind in NODES_OF_KIND]
+        faces = {name: (surface, ~np.isin(surface.elements, gone)) for name, surface in mesh.surfaces.items()}
         kept = np.setdiff1d(mesh.all_elements[mesh.solid], gone)
-        names = ("ties", "boundaries", "transforms", "equations", "rigid_motions", "forces", "pressures")
+        names = ("boundaries", "transforms", "equations", "rigid_motions", "forces", "pressures")
         fields: dict[str, Any] = {name: tuple(self.get(name)) for name in names}
         loads = [load for load in self.get("centrifugal") if np.isin(load.elements, kept).any() or not kept.size]
-        changes = (*self.get("removed"), *self.get("apart"))
+        changes = [text for taken, _, text in (*self.get("removed"), *self.get("apart")) if taken]
+        ties, named = self.get("ties"), [name for _, name, *_ in self.get("cyclic") if name]
+        cut = [pair for name, cyclic, pair in ties if cyclic and (not named or name in named)]
         return Deck(
             path=mesh.draft.name,
             node_numbers=mesh.numbers,
             coordinates=mesh.coordinates,
-            blocks=tuple(block for block in blocks if block.numbers.size),
+            blocks=tuple(
+                ElementBlock(block.kind, block.numbers[own], block.nodes[own]) for block, own in solid if own.any()
+            ),
             node_sets=mesh.node_sets,
             element_sets={name: np.intersect1d(members, kept) for name, members in mesh.element_sets.items()},
-            surfaces={name: _surface_without(surface, gone) for name, surface in mesh.surfaces.items()},
+            surfaces={
+                name: Surface(each.elements[own], each.faces[own], each.nodes) for name, (each, own) in faces.items()
+            },
+            ties=tuple(pair for _, cyclic, pair in ties if not cyclic),
             contact_pairs=tuple(self._contact_pairs()),
             cyclic=self._cyclic(),
+            cut_faces=tuple((pair.dependent, pair.independent) for pair in cut),
             materials={name: self._material(each) for name, each in self.materials.items()},
             sections=tuple(self._sections()),
             centrifugal=tuple(loads),
             gravity=self._gravity(kept),
-            removed=tuple(text for taken, _, text in changes if taken),
             n_instances=len(mesh.draft.placed),
             unassembled=tuple(text for text, _ in self.get("unassembled")),
             skipped=(*self.skipped, *self._idle()),
-            notes=(*mesh.notes, *self.notes, *mesh.numbering),
+            notes=(*mesh.notes, *self.notes, *changes),
             included=tuple(mesh.draft.included),
             **fields,
         )
 
     def _idle(self) -> Iterator[str]:
         """Elements that are not read, and carry nothing as no section has them."""
-        carry = np.concatenate([_NONE, *(own for _, own in self.get("unassembled"))])
+        carry = np.concatenate([NONE, *(own for _, own in self.get("unassembled"))])
         for each in self.mesh.draft.elements:
             own = each.numbers + self.mesh.offsets[each.scope]
             if each.kind not in NODES_OF_KIND and not np.isin(own, carry).all():
-                yield f"{each.place}: *ELEMENT of type {each.kind} without a section"
+                yield f"{each.place} of type {each.kind} without a section"
 
-    def _sections(self) -> Iterator[SolidSection]:
-        for elements, material, place in self.get("sections"):
-            if material not in self.materials:
-                raise place.wrong(f"there is no material {shown(material)}", "define it with *MATERIAL")
-            yield SolidSection(elements, material)
+    def _sections(self) -> Iterator[Section]:
+        for section, place in self.get("sections"):
+            if section.material not in self.materials:
+                raise place.wrong(f"there is no material {shown(section.material)}", "define it with *MATERIAL")
+            yield section
 
     def _gravity(self, kept: IntArray) -> FloatArray | None:
         total = None
         for elements, acceleration, place in self.get("gravity"):
             if not np.isin(kept, elements).all():
-                raise place.wrong("*DLOAD, GRAV on a part of the elements", "give it to all of them")
+                raise place.wrong("GRAV on a part of the elements", "give it to all of them")
             total = acceleration + (0.0 if total is None else total)
         return total
 
-    def _material(self, rows: MaterialRows) -> Material:
+    def _material(self, material: MaterialRows) -> Material:
         """Values at the temperature of all nodes; of several temperatures without one they are a problem."""
         given, thermal = self.get("temperatures"), self.thermal
         if thermal.keys() >= {"TEMPERATURE", "EXPANSION"}:
-            found = "*TEMPERATURE strains materials with *EXPANSION"
-            raise thermal["TEMPERATURE"].wrong(found, "remove one of them")
+            raise thermal["TEMPERATURE"].wrong("it strains materials with *EXPANSION", "remove one of them")
         solid = [each.nodes.ravel() for each in self.mesh.blocks if each.kind in NODES_OF_KIND]
-        warm = np.concatenate([_NONE, *(nodes for nodes, _ in given)])
-        everywhere = np.isin(np.concatenate([_NONE, *solid]), warm).all() and "TEMPERATURE" not in thermal
+        warm = np.concatenate([NONE, *(nodes for nodes, _ in given)])
+        everywhere = np.isin(np.concatenate([NONE, *solid]), warm).all() and "TEMPERATURE" not in thermal
         values = {value for _, value in given} if everywhere else set()
-        problem, found_values = rows.problem, []
-        for name, table, column, n_values in (
-            ("ELASTIC", rows.elastic, 0, 2),
-            ("ELASTIC", rows.elastic, 1, 2),
-            ("DENSITY", rows.density, 0, 1),
-        ):
-            own = {(row[n_values] if len(row) > n_values else 0.0): row[column] for row in table}
+        problem, found = material.problem, list[float | None]()
+        for name, column, n_values in (("ELASTIC", 0, 2), ("ELASTIC", 1, 2), ("DENSITY", 0, 1)):
+            own = {(row[n_values] if len(row) > n_values else 0.0): row[column] for row in material.rows.get(name, ())}
             if len(set(own.values())) > 1 and len(values) != 1:
-                several = f"*{name} at several temperatures, of which none is given"
-                problem = problem or f"{rows.places[name]}: {several}"
+                problem = problem or f"{material.places[name]} at several temperatures, of which none is given"
             at = sorted(own)
             value = np.interp(min(values, default=0.0), at, [own[each] for each in at]) if own else None
-            found_values.append(None if value is None else float(value))
-        young, poisson, density = found_values
+            found.append(None if value is None else float(value))
+        young, poisson, density = found
         return Material(young, poisson, density, problem)
 
-    def _contact_pairs(self) -> Iterator[ContactPair]:
+    def _contact_pairs(self) -> Iterator[SurfacePair]:
         """Contact pairs with laws and clearances, without those that *MODEL CHANGE takes away."""
         apart: set[frozenset[str]] = set()
         for removed, names, _ in self.get("apart"):
             apart = apart | {frozenset(names)} if removed else apart - {frozenset(names)}
         pairs = self.get("contact_pairs")
-        known = {frozenset(names) for names, *_ in pairs}
         fits: dict[frozenset[str], tuple[str, float | None]] = {}
-        for names, text, value, place in self.get("fits"):
-            if frozenset(names) not in known:
+        for names, value, place in self.get("fits"):
+            if frozenset(names) not in {frozenset(each) for each, *_ in pairs}:
                 found = f"there is no contact pair of {names[0]} and {names[1]}"
                 raise place.wrong(found, "give the surfaces of a *CONTACT PAIR")
-            fits[frozenset(names)] = text, value
+            fits[frozenset(names)] = str(place) + ("" if value is None else f" of {value:g}"), value
         for names, interaction, glued, adjusted, place in pairs:
             if interaction and interaction not in self.interactions:
                 found = f"there is no interaction {shown(interaction)}"
                 raise place.wrong(found, "define it with *SURFACE INTERACTION")
             law = self.interactions.get(interaction, Interaction())
             if frozenset(names) not in apart:
-                one, other = names
-                fitted, clearance = fits.get(frozenset(names), ("", None))
+                (one, other), (fitted, clearance) = names, fits.get(frozenset(names), ("", None))
                 laws = law.friction, law.problem, glued or law.glued
-                yield ContactPair(one, other, interaction, *laws, fitted, clearance, adjusted)
+                yield SurfacePair(one, other, None, *laws, fitted, clearance, adjusted)
 
     def _cyclic(self) -> CyclicSymmetry | None:
         """Cyclic symmetry of one number of sectors and one axis, whose cut faces may be several ties."""
-        ties = [tie.name for tie in self.get("ties") if tie.cyclic]
-        named: list[str] = []
-        first: tuple[int, FloatArray] | None = None
+        ties = [name for name, cyclic, _ in self.get("ties") if cyclic]
+        first: CyclicSymmetry | None = None
         for number, name, axis, place in self.get("cyclic"):
             if name and name not in ties:
                 raise place.wrong(f"there is no tie {shown(name)} of cut faces", "give *TIE, CYCLIC SYMMETRY this name")
-            named += [name] if name else []
-            first = first or (number, axis)
-            own = (first[1][1] - first[1][0]) / np.linalg.norm(first[1][1] - first[1][0])
-            apart = np.cross(axis - first[1][0], own) / np.linalg.norm(axis[1] - axis[0])
-            if number != first[0] or np.abs(apart).max() > _SAME_AXIS or (axis[1] - axis[0]) @ own < 0:
-                found = (
-                    f"*CYCLIC SYMMETRY MODEL with {number} sectors, another one with {first[0]}, or about other axes"
-                )
+            first = first or CyclicSymmetry(number, axis)
+            own = (first.axis[1] - first.axis[0]) / np.linalg.norm(first.axis[1] - first.axis[0])
+            apart = np.cross(axis - first.axis[0], own) / np.linalg.norm(axis[1] - axis[0])
+            if number != first.n_sectors or np.abs(apart).max() > _SAME_AXIS or (axis[1] - axis[0]) @ own < 0:
+                found = f"{number} sectors, another one has {first.n_sectors}, or about other axes"
                 raise place.wrong(found, "give all of them one N and one axis: several stages are not supported")
-        return None if first is None else CyclicSymmetry(first[0], tuple(named or ties), first[1])
-
-
-def _without(block: ElementBlock, gone: IntArray) -> ElementBlock:
-    keep = ~np.isin(block.numbers, gone)
-    return ElementBlock(block.kind, block.numbers[keep], block.nodes[keep])
-
-
-def _surface_without(surface: Surface, gone: IntArray) -> Surface:
-    keep = ~np.isin(surface.elements, gone)
-    return Surface(surface.elements[keep], surface.faces[keep], surface.nodes)
+        return first
 
 
 def deck_of_arrays(
@@ -275,5 +247,5 @@ def deck_of_arrays(
     draft.elements += [Records("", numbers, own, place, kind) for kind, (numbers, own) in blocks.items()]
     for sets, given in ((draft.node_sets, node_sets), (draft.element_sets, element_sets)):
         for key, members in given.items():
-            sets.add("", key.strip().upper(), members)
+            sets.add(("", key.strip().upper()), Numbers("", members))
     return Model(Mesh(draft)).deck()

@@ -6,21 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.contents import Equation, RigidMotion, Transform
-from studies.fe_models.deck.draft import chosen, data_lines, keyword, refused
+from studies.fe_models.deck.blocks import Block, Row
+from studies.fe_models.deck.contents import Equation, RigidMotion, Section, Transform
+from studies.fe_models.deck.keywords import keyword
 from studies.fe_models.deck.model import MaterialRows, Model
-from studies.fe_models.deck.sets import Reference
-from studies.fe_models.text import (
-    Block,
-    IntArray,
-    Place,
-    is_integer,
-    read_fields,
-    read_float,
-    read_floats,
-    read_integer,
-    shown,
-)
+from studies.fe_models.text import IntArray, Place, is_integer, shown
 
 _ALL = (1, 2, 3)
 
@@ -31,53 +21,49 @@ def _material(model: Model, block: Block) -> None:
     model.material = model.materials.setdefault(block.name("NAME"), MaterialRows())
 
 
-def _rows(model: Model, block: Block, least: int) -> tuple[MaterialRows, list[list[float]]]:
-    """The material and the rows of a keyword about it, which are given once: programs differ in which of two they take.
+def _of_material(model: Model, block: Block) -> MaterialRows:
+    """The material of a keyword, which is given once: programs differ in which of two they take.
 
     The same lines serve several instances.
     """
-    material = model.material
-    if material is None:
-        raise block.place.wrong(f"*{block.written} without a material", "write *MATERIAL, NAME=... above it")
-    before = material.places.setdefault(block.keyword, block.place)
+    if model.material is None:
+        raise block.place.wrong("no material", "write *MATERIAL, NAME=... above it")
+    before = model.material.places.setdefault(block.keyword, block.place)
     if before != block.place:
-        found = f"*{block.written} of one material again (before: {before})"
-        raise block.place.wrong(found, "give each material once")
-    return material, [read_floats(block, line, least) for line in range(max(len(block.lines), 1))] if least else []
+        raise block.place.wrong(f"one material again (before: {before})", "give each material once")
+    return model.material
 
 
 @keyword("ELASTIC", "TYPE DEPENDENCIES", "MODULI")
 def _elastic(model: Model, block: Block) -> None:
     """Young's modulus, Poisson's ratio, temperature; a law that is not isotropic matters where it is used."""
-    law = block.parameters.get("TYPE", "ISO").upper()
+    material, law = _of_material(model, block), block.value("TYPE") or "ISO"
     other = law not in ("ISO", "ISOTROPIC")
     if other or block.parameters.get("DEPENDENCIES", "0") != "0":
-        what = f"TYPE={shown(law)}" if other else "DEPENDENCIES"
-        _rows(model, block, 0)[0].problem = f"{block.place}: *{block.written}, {what} is not read"
+        material.problem = f"{block.place}, {f'TYPE={shown(law)}' if other else 'DEPENDENCIES'} is not read"
         return
-    material, material_rows = _rows(model, block, 2)
-    material.problem, material.elastic = "", material_rows
-    for line, (young, poisson, *_) in enumerate(material_rows):
+    material.rows["ELASTIC"] = [block.reals(line, 2) for line in range(max(len(block.lines), 1))]
+    for young, poisson, *_ in material.rows["ELASTIC"]:
         if not young > 0 or not -1 < poisson < 0.5:
             found = f"Young's modulus {young:g} and Poisson's ratio {poisson:g}"
-            raise block.place_of(line).wrong(found, "give a positive modulus, and a ratio between -1 and 0.5")
+            raise block.place.wrong(found, "give a positive modulus, and a ratio between -1 and 0.5")
 
 
 @keyword("DENSITY")
 def _density(model: Model, block: Block) -> None:
     """Density, temperature."""
-    material, rows = _rows(model, block, 1)
-    material.density = rows
-    for line, (density, *_) in enumerate(material.density):
-        if not density > 0:
-            raise block.place_of(line).wrong(f"a density of {density:g}", "give a positive one")
+    rows = [block.reals(line, 1) for line in range(max(len(block.lines), 1))]
+    _of_material(model, block).rows["DENSITY"] = rows
+    if not min(density for density, *_ in rows) > 0:
+        raise block.place.wrong("a density of 0 or less", "give a positive one")
 
 
 @keyword("SOLIDSECTION", "ELSET MATERIAL", "ORIENTATION CONTROLS")
 def _section(model: Model, block: Block) -> None:
     """A set of elements and its material."""
-    elements, material = model.named(block, "ELSET"), block.name("MATERIAL")
-    model.add("sections", [(model.mesh.elements(elements)[0], material, block.place)])
+    own = block.reference("ELSET")
+    section = Section(model.mesh.name_of_elements(own), model.mesh.elements(own), block.name("MATERIAL"))
+    model.add("sections", (section, block.place))
     _other_section(model, block)
 
 
@@ -87,25 +73,25 @@ def _section(model: Model, block: Block) -> None:
 @keyword("DASHPOT MASS SPRING", "ELSET")
 def _other_section(model: Model, block: Block) -> None:
     """Elements that are not read carry something."""
-    elements = model.mesh.elements(model.named(block, "ELSET"))[1]
+    elements = model.mesh.elements(block.reference("ELSET"))
     kinds = model.mesh.other_kinds(elements)
     if kinds:
-        text = f"{block.place}: *{block.written} of elements of type {' and '.join(kinds)}, which are not read"
-        model.add("unassembled", [(text, elements)])
+        text = f"{block.place} of elements of type {' and '.join(kinds)}, which are not read"
+        model.add("unassembled", (text, elements))
 
 
 @keyword("INITIALCONDITIONS", "TYPE")
 def _initial_conditions(model: Model, block: Block) -> None:
     """Temperatures; velocities do not matter."""
-    kind = block.parameters.get("TYPE", "").upper()
+    kind = block.value("TYPE")
     if kind == "VELOCITY":
         model.skip(block)
         return
     if kind != "TEMPERATURE":
-        raise refused(block, f"TYPE={shown(kind)} is not read", "remove it: the prestress is that of the rotation")
-    for fields, place in data_lines(block, 2, "set of nodes and temperature"):
-        nodes = model.mesh.nodes(model.refer(fields[0], place))[1]
-        model.add("temperatures", [(nodes, read_float(fields[1], place))])
+        remedy = "remove it: the prestress is that of the rotation"
+        raise block.place.wrong(f"TYPE={shown(kind)} is not read", remedy)
+    for row in block.rows(2, "set of nodes and temperature"):
+        model.add("temperatures", (model.mesh.nodes(row.reference(0)), row.real(1)))
 
 
 @keyword("EXPANSION", "", "TYPE ZERO")
@@ -119,16 +105,14 @@ def _thermal(model: Model, block: Block) -> None:
 @keyword("TRANSFORM", "NSET TYPE")
 def _transform(model: Model, block: Block) -> None:
     """Directions of the displacements of nodes."""
-    kind = chosen(block, "TYPE", ("R", "C", "S"), "R")
-    if kind == "S":
-        raise refused(block, "spherical directions are not read", "give rectangular or cylindrical ones")
-    points = np.array(read_floats(block, 0, 6)[:6]).reshape(2, 3)
+    kind = block.chosen("TYPE", ("R", "C"), "R")
+    points = np.array(block.reals(0, 6)[:6]).reshape(2, 3)
     spans = points[1] - points[0] if kind == "C" else np.cross(points[0], points[1])
     if not 0 < np.linalg.norm(spans) < np.inf:
-        raise block.place_of(0).wrong(f"*{block.written} by points on one line", "give points that are apart")
-    placed = model.mesh.placed(model.scope, points, vectors=kind == "R")
-    nodes = model.mesh.nodes(model.named(block, "NSET"))[1]
-    model.add("transforms", [Transform(f"{block.place}: *{block.written}", nodes, kind == "C", placed)])
+        raise block.place.wrong("points on one line", "give points that are apart")
+    placed = model.mesh.placed(block.scope, points, vectors=kind == "R")
+    nodes = model.mesh.nodes(block.reference("NSET"))
+    model.add("transforms", Transform(str(block.place), nodes, kind == "C", placed))
 
 
 @keyword("EQUATION", "REMOVE REMOVEALL")
@@ -137,42 +121,38 @@ def _equation(model: Model, block: Block) -> None:
     if "REMOVEALL" in block.parameters or "REMOVE" in block.parameters:
         if model.step is None or "REMOVE" in block.parameters:
             remedy = "write REMOVE ALL in the step that writes matrices"
-            raise refused(block, "REMOVE of some equations is not read", remedy)
+            raise block.place.wrong("REMOVE of some equations is not read", remedy)
         model.step.writes = True
         return
     line = 0
     while line < len(block.lines):
-        place, first = block.place_of(line), read_fields(block, line)
-        n_terms = read_integer(first[0] if first else "", place, "the number of terms")
+        head = block.row(line)
+        n_terms, line = head.whole(0, "the number of terms"), line + 1
         fields: list[str] = []
-        while len(fields) < 3 * n_terms and line + 1 < len(block.lines):
-            line += 1
-            more = read_fields(block, line)
+        while len(fields) < 3 * n_terms and line < len(block.lines):
+            more = block.row(line).fields
             fields += more + [""] * (-len(more) % 3)
+            line += 1
         if len(fields) != 3 * n_terms:
-            raise place.wrong(f"{len(fields)} entries for {n_terms} terms", "give node, dof and coefficient of each")
-        terms = [
-            (model.refer(node, place), read_integer(dof, place, "a dof"), read_float(value, place))
-            for node, dof, value in zip(fields[::3], fields[1::3], fields[2::3], strict=True)
-        ]
-        if terms[0][2] == 0.0:
-            raise place.wrong("the first coefficient is 0", "give a first term that depends on the others")
-        model.add("equations", _equations(model, terms, place))
-        line += 1
+            found = f"{len(fields)} entries for {n_terms} terms"
+            raise head.place.wrong(found, "give node, dof and coefficient of each")
+        terms = [Row(fields[at : at + 3], head.place, block.scope) for at in range(0, len(fields), 3)]
+        model.add("equations", *_equations(model, terms, head.place))
 
 
-def _equations(model: Model, terms: list[tuple[Reference, int, float]], place: Place) -> Iterator[Equation]:
+def _equations(model: Model, terms: list[Row], place: Place) -> Iterator[Equation]:
     """One equation, or one for each node of a set; single nodes are in all of them."""
-    nodes = [model.mesh.ordered(reference) for reference, _, _ in terms]
+    nodes = [model.mesh.ordered(term.reference(0)) for term in terms]
+    dofs, values = np.array([term.whole(1, "a dof") for term in terms]), np.array([term.real(2) for term in terms])
+    if values[0] == 0.0:
+        raise place.wrong("the first coefficient is 0", "give a first term that depends on the others")
     count = max(map(len, nodes))
-    for (reference, _, _), each in zip(terms, nodes, strict=True):
-        if len(each) not in (1, count) or len(nodes[0]) != count:
-            remedy = "give sets of as many nodes as the first one, or one node"
-            raise place.wrong(f"*EQUATION: {shown(str(reference.target))} has {len(each)} nodes", remedy)
-    dofs, values = np.array([dof for _, dof, _ in terms]), np.array([value for _, _, value in terms])
+    if len(nodes[0]) != count or any(len(each) not in (1, count) for each in nodes):
+        found = f"sets of {' and '.join(str(len(each)) for each in nodes)} nodes"
+        raise place.wrong(found, "give sets of as many nodes as the first one, or one node")
     for row in range(count):
         own = np.array([each[min(row, len(each) - 1)] for each in nodes])
-        yield Equation(f"{place}: *EQUATION", own, dofs, values)
+        yield Equation(str(place), own, dofs, values)
 
 
 def _follow(
@@ -182,48 +162,43 @@ def _follow(
     nodes = nodes[(nodes != reference) & (nodes != rotation)]
     if not nodes.size:
         raise place.wrong("no node follows the reference node", "give the nodes that are rigid")
-    text = f"{place}: *{place.keyword}"
-    model.add("rigid_motions", [RigidMotion(text, nodes, dofs, reference, max(rotation, 0), rotation >= 0)])
+    model.add("rigid_motions", RigidMotion(str(place), nodes, dofs, reference, max(rotation, 0), rotation >= 0))
 
 
 @keyword("MPC")
 def _mpc(model: Model, block: Block) -> None:
     """TIE and PIN join two nodes, BEAM makes a node follow the motion of another one."""
-    for fields, place in data_lines(block, 1, "type and nodes"):
-        kind = fields[0].upper()
-        if kind not in ("TIE", "PIN", "BEAM") or len(fields) != 3:
+    for row in block.rows(1, "type and nodes"):
+        kind = row.text(0).upper()
+        if kind not in ("TIE", "PIN", "BEAM") or len(row.fields) != 3:
             remedy = "write TIE, PIN or BEAM and two nodes or sets, or *EQUATION"
-            raise place.wrong(f"*{block.written} {shown(kind)} of {len(fields) - 1} nodes is not read", remedy)
+            raise row.place.wrong(f"{shown(kind)} of {len(row.fields) - 1} nodes is not read", remedy)
         if kind == "BEAM":
-            model.notes.append(f"{place}: *{block.written} BEAM is rigid, as in Abaqus.")
-        first, second = (model.mesh.ordered(model.refer(text, place)) for text in fields[1:])
+            model.notes.append(f"{row.place} BEAM is rigid, as in Abaqus.")
+        first, second = (model.mesh.ordered(row.reference(n)) for n in (1, 2))
         if len(second) not in (1, len(first)):
-            remedy = "give sets of as many nodes, or one node for all"
-            raise place.wrong(f"*MPC of {len(first)} and {len(second)} nodes", remedy)
+            found = f"{len(first)} and {len(second)} nodes"
+            raise row.place.wrong(found, "give sets of as many nodes, or one node for all")
         # a node or set that follows a node, or the nodes of a set in their order
         parts = [first] if len(second) == 1 else np.split(first, len(first))
         for nodes, reference in zip(parts, second, strict=True):
-            _follow(model, place, nodes, _ALL, int(reference), 0 if kind == "BEAM" else -1)
+            _follow(model, row.place, nodes, _ALL, int(reference), 0 if kind == "BEAM" else -1)
 
 
 @keyword("RIGIDBODY", "NSET ELSET PINNSET TIENSET REFNODE ROTNODE", "ISOTHERMAL")
 def _rigid_body(model: Model, block: Block) -> None:
     """Nodes, or those of elements, follow a reference node."""
     mesh, given = model.mesh, block.parameters
-    nodes = [mesh.nodes(model.named(block, key))[1] for key in ("NSET", "PINNSET", "TIENSET") if key in given]
-    nodes += [mesh.nodes_of(model.named(block, "ELSET"))] if "ELSET" in given else []
-    if not nodes:
-        raise block.place.wrong(f"*{block.written} without NSET or ELSET", "give the nodes that are rigid")
-    reference = mesh.node(model.named(block, "REFNODE"))
-    rotation = mesh.node(model.named(block, "ROTNODE")) if "ROTNODE" in given else 0
-    _follow(model, block.place, np.unique(np.concatenate(nodes)), _ALL, reference, rotation)
+    nodes = [mesh.nodes(block.reference(key)) for key in ("NSET", "PINNSET", "TIENSET") if key in given]
+    if "ELSET" in given or not nodes:
+        nodes.append(mesh.nodes_of(block.reference("ELSET")))
+    rotation = mesh.node(block.reference("ROTNODE")) if "ROTNODE" in given else 0
+    _follow(model, block.place, np.unique(np.concatenate(nodes)), _ALL, mesh.node(block.reference("REFNODE")), rotation)
 
 
 @keyword("COUPLING", "REFNODE SURFACE", "CONSTRAINTNAME")
 def _coupling(model: Model, block: Block) -> None:
     """A reference node and a surface; *KINEMATIC below it says what is coupled."""
-    for parameter in ("REFNODE", "SURFACE"):
-        block.name(parameter)
     model.coupling = block
 
 
@@ -232,28 +207,27 @@ def _kinematic(model: Model, block: Block) -> None:
     """Dofs of the surface of *COUPLING that follow its reference node; all of them without data."""
     head, model.coupling = model.coupling, None
     if head is None:
-        raise block.place.wrong(f"*{block.written} without *COUPLING", "write it below its *COUPLING")
-    lines = [_dofs(read_fields(block, line), block.place_of(line)) for line in range(len(block.lines))]
+        raise block.place.wrong("no *COUPLING above it", "write it below its *COUPLING")
+    lines = [_dofs(row.fields, row.place) for row in block.rows()]
     following = tuple(dof for dof in _ALL if not lines or any(dof in dofs for dofs in lines))
-    nodes = model.mesh.surface_nodes(model.mesh.surface(model.named(head, "SURFACE")))
+    nodes = model.mesh.surface_nodes(model.mesh.surface(head.reference("SURFACE")))
     if following:
-        _follow(model, block.place, nodes, following, model.mesh.node(model.named(head, "REFNODE")))
+        _follow(model, block.place, nodes, following, model.mesh.node(head.reference("REFNODE")))
 
 
 @keyword("KINEMATICCOUPLING", "REFNODE")
 def _kinematic_coupling(model: Model, block: Block) -> None:
     """Node or set, first and last dof that follow the reference node."""
-    reference = model.mesh.node(model.named(block, "REFNODE"))
-    for fields, place in data_lines(block, 1, "node or set, first and last dof"):
-        nodes, dofs = model.mesh.nodes(model.refer(fields[0], place))[1], _dofs(fields[1:], place)
+    reference = model.mesh.node(block.reference("REFNODE"))
+    for row in block.rows(1, "node or set, first and last dof"):
+        nodes, dofs = model.mesh.nodes(row.reference(0)), _dofs(row.fields[1:], row.place)
         if dofs:
-            _follow(model, place, nodes, dofs, reference)
+            _follow(model, row.place, nodes, dofs, reference)
 
 
 def _dofs(fields: list[str], place: Place) -> tuple[int, ...]:
     """Displacements from the first to the last dof of a line; all of them without. Raises SceneError."""
-    if len(fields) > 2 or not all(is_integer(text) and 1 <= int(text) <= 6 for text in fields):
-        raise place.wrong("no first and last dof", "give numbers from 1 to 6")
-    if fields and int(fields[-1]) < int(fields[0]):
-        raise place.wrong(f"dofs from {fields[0]} to {fields[-1]}", "give the smaller one first")
-    return tuple(dof for dof in _ALL if not fields or int(fields[0]) <= dof <= int(fields[-1]))
+    found = [int(text) if is_integer(text) else 0 for text in fields] or [1, 6]
+    if len(found) > 2 or not 1 <= found[0] <= found[-1] <= 6:
+        raise place.wrong(f"no first and last dof: {shown(', '.join(fields))}", "give numbers from 1 to 6")
+    return tuple(dof for dof in _ALL if found[0] <= dof <= found[-1])

@@ -7,35 +7,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from studies.fe_models.text import (
-    LARGEST_NUMBER,
-    Block,
-    IntArray,
-    Place,
-    is_integer,
-    read_fields,
-    read_integer,
-    read_name,
-    shown,
-)
+from studies.fe_models.deck.blocks import Reference
+from studies.fe_models.text import IntArray, Place, is_integer, read_integer, shown
 
 _DEEPEST = 100
+NONE = np.empty(0, dtype=np.int64)
+"""No numbers."""
 
 Key = tuple[str, str]
 """Scope and name of a set or surface. The scope is the name of an instance, "" outside of instances."""
 
 
 @dataclass(frozen=True)
-class Reference:
-    """What a data line points to: a name in capitals, or a number, in a scope. place: of the data line."""
-
-    scope: str
-    target: str | int
-    place: Place
-
-
-@dataclass(frozen=True)
-class _Members:
+class Numbers:
     """Numbers as they are written in a scope; with step not 0 the first, last and step of a range."""
 
     scope: str
@@ -43,90 +27,52 @@ class _Members:
     step: int = 0
 
 
+@dataclass(frozen=True)
+class NodesOf:
+    """The nodes of a set of elements."""
+
+    elements: Reference
+
+
 @dataclass
 class SetDefinitions:
     """Sets as they are written. what: "nodes" or "elements". items: of every set what it consists of.
 
-    of_elements: sets of elements whose nodes a set has as well. unsorted: sets of several numbers whose order matters.
+    unsorted: sets of several numbers whose order matters.
     """
 
     what: str
-    items: dict[Key, list[_Members | Reference]] = field(default_factory=dict)
-    of_elements: dict[Key, list[Reference]] = field(default_factory=dict)
+    items: dict[Key, list[Numbers | Reference | NodesOf]] = field(default_factory=dict)
     unsorted: set[Key] = field(default_factory=set)
 
-    def add(self, scope: str, name: str, numbers: IntArray) -> None:
-        """Adds numbers to a set, which may be new."""
-        self.items.setdefault((scope, name), []).append(_Members(scope, numbers))
-
-    def add_all(self, scope: str, name: str, other: str) -> None:
-        """Adds all numbers of another scope to a set."""
-        self.items.setdefault((scope, name), []).append(_Members(other, np.array([1, LARGEST_NUMBER]), 1))
-
-    def add_block(self, key: Key, block: Block, instances: Container[str]) -> None:
-        """Adds what stands below *NSET or *ELSET, where INSTANCE may say whose numbers they are. Raises SceneError."""
-        items = self.items.setdefault(key, [])
-        scope = read_name(block.parameters["INSTANCE"]) if "INSTANCE" in block.parameters else key[0]
-        if scope and scope not in instances:
-            raise block.place.wrong(f"there is no instance {shown(scope)}", "give INSTANCE=... of one above")
-        if "UNSORTED" in block.parameters:
-            self.unsorted.add(key)
-        numbers: list[int] = []
-        for line in range(len(block.lines)):
-            place, fields = block.place_of(line), read_fields(block, line)
-            if "GENERATE" in block.parameters:
-                items.append(_range(scope, fields, place))
-                continue
-            for part in fields:
-                if is_integer(part):
-                    numbers.append(read_integer(part, place))
-                elif part:
-                    reference = read_reference(part, scope, instances, place)
-                    number = isinstance(reference.target, int)
-                    items.append(_Members(reference.scope, np.array([reference.target])) if number else reference)
-        if numbers:
-            items.append(_Members(scope, np.array(numbers, dtype=np.int64)))
+    def add(self, key: Key, *items: Numbers | Reference | NodesOf) -> None:
+        """Adds members to a set, which may be new."""
+        self.items.setdefault(key, []).extend(items)
 
 
-def _range(scope: str, fields: list[str], place: Place) -> _Members:
-    """First, last and step, which may be negative; the members are the same in both senses."""
-    if not 2 <= len(fields) <= 3:
-        raise place.wrong(f"{len(fields)} numbers below GENERATE", "give first, last and step")
-    first, last = (read_integer(part, place) for part in fields[:2])
-    step = read_integer(fields[2].lstrip("-"), place) if len(fields) == 3 and fields[2] else 1
-    backwards = fields[2].startswith("-") if len(fields) == 3 and fields[2] else last < first
-    if first != last and backwards != (last < first):
-        found = f"from {first} to {last} in steps of {'-' if backwards else ''}{step} below GENERATE"
-        raise place.wrong(found, "give a step that leads from the first to the last number")
-    return _Members(scope, np.array([first, last]), -step if backwards else step)
-
-
-def read_reference(text: str, scope: str, instances: Container[str], place: Place) -> Reference:
-    """A name or number of a data line; "INSTANCE.7" and "INSTANCE.NAME" are those of an instance. Raises SceneError."""
-    name = read_name(text)
+def key_of(reference: Reference, instances: Container[str]) -> Key:
+    """Scope and name, or number, that a reference means: those of an instance where it names one."""
+    target = reference.target
     # names may have dots
-    for at in [place for place, letter in enumerate(name[:100]) if letter == "."]:
-        if name[:at] in instances:
-            scope, name = name[:at], name[at + 1 :]
-            break
-    if not name:
-        raise place.wrong("a name is missing", "give the name of a set or surface")
-    return Reference(scope, read_integer(name, place) if is_integer(name) else name, place)
+    for at in [place for place, letter in enumerate(target[:100]) if letter == "."]:
+        if target[:at] in instances:
+            return target[:at], target[at + 1 :]
+    return reference.scope, target
 
 
-def scope_of(items: Container[Key], instances: Mapping[str, object], reference: Reference) -> str | None:
-    """Scope of the named set or surface: its own, else the only instance that has it; None where there is none.
+def find_key(items: Container[Key], instances: Mapping[str, object], reference: Reference) -> Key | None:
+    """Key of the named set or surface: in its own scope, else of the only instance that has it; None of none.
 
     Raises SceneError where several instances have one of this name.
     """
-    name = str(reference.target)
-    if (reference.scope, name) in items:
-        return reference.scope
-    found = [scope for scope in instances if (scope, name) in items]
+    key = key_of(reference, instances)
+    if key in items:
+        return key
+    found = [scope for scope in instances if (scope, key[1]) in items]
     if len(found) > 1:
-        remedy = f"write {found[0]}.{shown(name)} or {found[1]}.{shown(name)}"
-        raise reference.place.wrong(f"{len(found)} instances have {shown(name)}", remedy)
-    return found[0] if found else None
+        remedy = f"write {found[0]}.{shown(key[1])} or {found[1]}.{shown(key[1])}"
+        raise reference.place.wrong(f"{len(found)} instances have {shown(key[1])}", remedy)
+    return (found[0], key[1]) if found else None
 
 
 class Resolver:
@@ -134,7 +80,7 @@ class Resolver:
 
     existing: (n,) all numbers that exist, ascending. offsets: of every scope, what is added to its numbers; those of
     one scope are smaller than the difference to the next. everything: the name that the code gives to all of them.
-    nodes_of: of a reference to a set of elements, its nodes; None for sets of elements.
+    nodes_of: the nodes of a set of elements. notes: what is named and does not exist.
     """
 
     def __init__(
@@ -143,7 +89,7 @@ class Resolver:
         existing: IntArray,
         offsets: Mapping[str, int],
         everything: str,
-        nodes_of: Callable[[Reference], IntArray] | None = None,
+        nodes_of: Callable[[Reference], IntArray] = lambda _: NONE,
     ) -> None:
         self.sets, self.existing, self.offsets = sets, existing, offsets
         self.everything, self.nodes_of = everything, nodes_of
@@ -153,41 +99,44 @@ class Resolver:
 
     def find(self, reference: Reference) -> IntArray:
         """Numbers (m,) that a reference stands for, ascending. Raises SceneError where there is no such set."""
-        if isinstance(reference.target, int):
-            return self._kept(_Members(reference.scope, np.array([reference.target])), f"{reference.place}")
-        scope = scope_of(self.sets.items, self.offsets, reference)
-        if scope is not None:
-            return self.members((scope, reference.target), reference.place)
-        if reference.target == self.everything:
+        scope, target = key_of(reference, self.offsets)
+        if is_integer(target):
+            number = np.array([read_integer(target, reference.place)])
+            return self._existing(Numbers(scope, number), str(reference.place))
+        key = find_key(self.sets.items, self.offsets, reference)
+        if key is not None:
+            return self.members(key, reference.place)
+        if target == self.everything:
             return self.existing
-        found = f"there is no set of {self.sets.what} {shown(reference.target)}"
+        found = f"there is no set of {self.sets.what} {shown(target)}"
         raise reference.place.wrong(found, "define it, or remove it here")
 
     def members(self, key: Key, place: Place) -> IntArray:
         """Numbers (m,) of a set, ascending. Raises SceneError where it contains itself."""
         if key in self._done:
             return self._done[key]
-        if key in self._open:
-            raise place.wrong(f"the set {shown(key[1])} contains itself", "take it out of its own members")
-        if len(self._open) >= _DEEPEST:
-            raise place.wrong(f"more than {_DEEPEST} sets within each other", "name the members of the inner sets")
+        if key in self._open or len(self._open) >= _DEEPEST:
+            found = "contains itself" if key in self._open else f"is more than {_DEEPEST} sets deep"
+            raise place.wrong(f"the set {shown(key[1])} {found}", "name the members of the inner sets")
         self._open.append(key)
-        parts = [np.empty(0, dtype=np.int64)]
+        parts = [NONE]
         for item in self.sets.items[key]:
-            parts.append(self.find(item) if isinstance(item, Reference) else self._kept(item, f"set {shown(key[1])}"))
-        if self.nodes_of is not None:
-            parts += [self.nodes_of(reference) for reference in self.sets.of_elements.get(key, ())]
+            if isinstance(item, NodesOf):
+                parts.append(self.nodes_of(item.elements))
+            elif isinstance(item, Reference):
+                parts.append(self.find(item))
+            else:
+                parts.append(self._existing(item, f"set {shown(key[1])}"))
         self._open.pop()
         self._done[key] = np.unique(np.concatenate(parts)).astype(np.int64)
         return self._done[key]
 
-    def _kept(self, members: _Members, where: str) -> IntArray:
+    def _existing(self, members: Numbers, where: str) -> IntArray:
         """Those numbers that exist; a note says which of those that are named do not."""
         if not self.existing.size or members.scope not in self.offsets:
-            return np.empty(0, dtype=np.int64)
+            return NONE
         offset = self.offsets[members.scope]
-        larger = [other for other in self.offsets.values() if other > offset]
-        last_of_scope = min(larger) if larger else self.existing[-1]
+        last_of_scope = min((other for other in self.offsets.values() if other > offset), default=self.existing[-1])
         numbers = members.numbers + offset
         if members.step:
             # as many as there are numbers that exist, whatever the range says

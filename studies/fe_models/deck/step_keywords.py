@@ -1,13 +1,16 @@
-"""Keywords of steps and loads, *BOUNDARY, which may stand before the first step, and those that say nothing."""
+"""Keywords of what touches or is glued, of steps and loads, *BOUNDARY, and those that say nothing."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from studies.fe_models.deck.contents import Boundary, CentrifugalLoad, NodalForce, Pressure
-from studies.fe_models.deck.draft import data_lines, keyword, refused, unit, value_of
-from studies.fe_models.deck.model import Model, Step
-from studies.fe_models.text import Block, Place, read_fields, read_float, read_integer, shown
+from studies.fe_models.deck.blocks import Block, Row
+from studies.fe_models.deck.contents import Boundary, CentrifugalLoad, NodalForce, Pressure, SurfacePair
+from studies.fe_models.deck.keywords import keyword
+from studies.fe_models.deck.model import Interaction, Model, Step
+from studies.fe_models.text import is_integer, read_float, read_name, shown, unit
 
 PROCEDURES = (
     "STATIC FREQUENCY DYNAMIC BUCKLE COMPLEXFREQUENCY GREEN HEATTRANSFER MATRIXGENERATE MODALDYNAMIC"
@@ -26,7 +29,122 @@ _HELD: dict[str, tuple[tuple[int, int], ...]] = {
     "XASYMM": ((2, 4),),
     "YASYMM": ((1, 1), (3, 3), (5, 5)),
     "ZASYMM": ((1, 2), (6, 6)),
+    **dict.fromkeys(("0", "11"), ()),  # a temperature, a mass flow
 }
+_MOST_SECTORS = 100_000
+_SKIPPED = "TYPE SMALLSLIDING EXTENSIONZONE HCRIT SMOOTH TRACKING CPSET MINIMUMDISTANCE WEIGHT"
+_ONE_COEFFICIENT = "ROUGH TAUMAX EXPONENTIALDECAY ANISOTROPIC USER DEPENDENCIES PROPERTIES"  # laws that are not
+
+
+def _surface_pairs(model: Model, block: Block) -> Iterator[tuple[tuple[str, str], Row]]:
+    """The two surfaces of each data line, dependent one first."""
+    for row in block.rows(2, "the dependent and the independent surface"):
+        yield (model.mesh.surface(row.reference(0)), model.mesh.surface(row.reference(1))), row
+
+
+@keyword("TIE", "NAME POSITIONTOLERANCE CYCLICSYMMETRY", "ADJUST TYPE NOROTATION NOTHICKNESS CONSTRAINTRATIO")
+def _tie(model: Model, block: Block) -> None:
+    """Dependent and independent surface; with CYCLIC SYMMETRY the cut faces of a sector."""
+    tolerance = read_float(block.parameters.get("POSITIONTOLERANCE", ""), block.place)
+    name, cyclic = read_name(block.parameters.get("NAME", "")), "CYCLICSYMMETRY" in block.parameters
+    for names, _ in _surface_pairs(model, block):
+        model.add("ties", (name, cyclic, SurfacePair(*names, tolerance if tolerance > 0 else None)))
+
+
+@keyword("CYCLICSYMMETRYMODEL", "N TIE", "NGRAPH ELSET CHECK")
+def _cyclic_symmetry(model: Model, block: Block) -> None:
+    """Number of sectors, and two points on the axis."""
+    number = block.parameters.get("N", "")
+    if not is_integer(number) or not 1 <= int(number) <= _MOST_SECTORS:
+        raise block.place.wrong(f"N={shown(number)}", f"give a number of sectors from 1 to {_MOST_SECTORS}")
+    axis = np.array(block.reals(0, 6)[:6]).reshape(2, 3)
+    if not 0 < np.linalg.norm(axis[1] - axis[0]) < np.inf:
+        raise block.place.wrong("two equal points on the axis", "give two points that are apart")
+    name = read_name(block.parameters.get("TIE", ""))
+    model.add("cyclic", (int(number), name, model.mesh.placed(block.scope, axis), block.place))
+
+
+@keyword("CONTACTPAIR", "INTERACTION TIED ADJUST", _SKIPPED)
+def _contact_pair(model: Model, block: Block) -> None:
+    """Dependent and independent surface; with TIED they are glued."""
+    name = read_name(block.parameters.get("INTERACTION", ""))
+    glued = f"{block.place}, TIED" if "TIED" in block.parameters else ""
+    adjusted = f"{block.place}, ADJUST moves nodes" if "ADJUST" in block.parameters else ""
+    for names, _ in _surface_pairs(model, block):
+        model.add("contact_pairs", (names, name, glued, adjusted, block.place))
+
+
+@keyword("SURFACEINTERACTION", "NAME")
+def _interaction(model: Model, block: Block) -> None:
+    """What follows is about it."""
+    model.interaction = model.interactions.setdefault(block.name("NAME"), Interaction())
+
+
+def _interaction_of(model: Model, block: Block) -> Interaction:
+    if model.interaction is None:
+        raise block.place.wrong("no interaction", "write *SURFACE INTERACTION above it")
+    return model.interaction
+
+
+@keyword("SURFACEBEHAVIOR", "PRESSURE-OVERCLOSURE", "PENALTY AUGMENTEDLAGRANGE DIRECT STIFFNESS")
+def _behavior(model: Model, block: Block) -> None:
+    """Hard contact, of which LINEAR is the penalty; TIED glues. The study may say that surfaces are soft."""
+    law = block.chosen("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "TIED"), "HARD")
+    if law == "LINEAR":
+        model.notes.append(f"{block.place}, LINEAR is read as hard contact (see contact_stiffness).")
+    glued = f"{block.place}, PRESSURE-OVERCLOSURE=TIED" if law == "TIED" else ""
+    _interaction_of(model, block).glued = glued
+
+
+@keyword("FRICTION", _ONE_COEFFICIENT, "SLIPTOLERANCE ELASTICSLIP LAGRANGE SHEARTRACTIONSLOPE")
+def _friction(model: Model, block: Block) -> None:
+    """One coefficient; a law that is not read matters where the study gives no coefficient."""
+    interaction = _interaction_of(model, block)
+    laws = [name for name in _ONE_COEFFICIENT.split() if block.parameters.get(name, "0") != "0"]
+    n_lines = 0 if "ROUGH" in laws else max(len(block.lines), 0 if laws else 1)
+    values = [block.reals(line, 1)[0] for line in range(n_lines)]
+    if min(values, default=0.0) < 0:
+        raise block.place.wrong(f"a friction coefficient of {min(values):g}", "give one of at least 0")
+    what = f" with {' and '.join(laws)}" if laws else " of several coefficients" if len(set(values)) > 1 else ""
+    interaction.problem = f"{block.place}{what} is not read" if what else ""
+    interaction.friction = None if what else values[0]
+
+
+@keyword("CLEARANCE", "MASTER SLAVE VALUE")
+def _clearance(model: Model, block: Block) -> None:
+    """The distance of two surfaces; negative for an interference."""
+    if "VALUE" not in block.parameters:
+        raise block.place.wrong("a clearance without VALUE", "give VALUE=..., one for both surfaces")
+    value = read_float(block.parameters["VALUE"], block.place)
+    names = tuple(model.mesh.surface(block.reference(name)) for name in ("SLAVE", "MASTER"))
+    model.add("fits", (names, value, block.place))
+
+
+@keyword("CONTACTINTERFERENCE", "SHRINK TYPE AMPLITUDE", "OP")
+def _interference(model: Model, block: Block) -> None:
+    """The overlap of the mesh presses, as what is allowed of it ends at 0."""
+    block.chosen("TYPE", ("CONTACTPAIR",), "CONTACTPAIR")
+    if "AMPLITUDE" in block.parameters and "SHRINK" not in block.parameters:
+        raise block.place.wrong("an interference that does not end at 0", "leave AMPLITUDE out")
+    for names, row in _surface_pairs(model, block):
+        model.add("fits", (names, None, row.place))
+
+
+@keyword("MODELCHANGE", "TYPE REMOVE ADD")
+def _model_change(model: Model, block: Block) -> None:
+    """Contact pairs or elements that are taken away, or added again."""
+    kind = block.chosen("TYPE", ("CONTACTPAIR", "ELEMENT"), "ELEMENT")
+    removed = "REMOVE" in block.parameters
+    if model.step is None or removed == ("ADD" in block.parameters):
+        raise block.place.wrong("neither REMOVE nor ADD in a step", "write one of them, in a step")
+    if kind == "CONTACTPAIR":
+        for names, row in _surface_pairs(model, block):
+            model.add("apart", (removed, names, f"{row.place} takes a contact pair away."))
+        return
+    for row in block.rows(1, "sets of elements"):
+        for n in range(len(row.fields)):
+            elements = model.mesh.elements(row.reference(n))
+            model.add("removed", (removed, elements, f"{row.place} takes elements away."))
 
 
 @keyword("ASSEMBLY", "", "NAME")
@@ -38,7 +156,7 @@ def _nothing(_model: Model, _block: Block) -> None:
 @keyword("STEP", "", "PERTURBATION NLGEOM NAME INC UNSYMM AMPLITUDE CONVERTSDI EXTRAPOLATION SOLVER DIRECT")
 def _step(model: Model, block: Block) -> None:
     if model.step is not None:
-        raise block.place.wrong("a *STEP within the one before", "write *END STEP above it")
+        raise block.place.wrong("a step within the one before", "write *END STEP above it")
     model.step = Step({name: dict(entries) for name, entries in model.fields.items()})
     model.interaction, model.material = None, None
 
@@ -51,11 +169,10 @@ def _end_step(model: Model, _block: Block) -> None:
 @keyword(PROCEDURES, "*")
 def _procedure(model: Model, block: Block) -> None:
     """What the step computes."""
-    if model.step is None:
-        raise block.place.wrong(f"*{block.written} outside of a step", "write *STEP above it")
-    model.step.kind = block.keyword
-    if value_of(block, "SOLVER") == "MATRIXSTORAGE" or block.keyword in ("MATRIXGENERATE", "SUBSTRUCTUREGENERATE"):
-        model.step.writes = True
+    step = _step_of(model, block)
+    step.kind = block.keyword
+    if block.value("SOLVER") == "MATRIXSTORAGE" or block.keyword in ("MATRIXGENERATE", "SUBSTRUCTUREGENERATE"):
+        step.writes = True
     if block.keyword.endswith("COUPLEDTEMPERATURE-DISPLACEMENT"):
         model.thermal["TEMPERATURE"] = block.place
 
@@ -63,39 +180,35 @@ def _procedure(model: Model, block: Block) -> None:
 @keyword("BOUNDARY", "OP TYPE LOADCASE FIXED", "AMPLITUDE")
 def _boundary(model: Model, block: Block) -> None:
     """Set or node, first and last dof, value; or one of Abaqus' words."""
-    if model.step is not None and value_of(block, "OP") == "NEW":
+    if model.step is not None and block.value("OP") == "NEW":
         model.fields["boundaries"] = {}
-    if value_of(block, "TYPE") not in ("", "DISPLACEMENT") or value_of(block, "LOADCASE") not in ("", "1"):
-        raise refused(block, "TYPE or LOAD CASE is not read", "give displacements of one load case")
-    for line in range(len(block.lines)):
-        place, fields = block.place_of(line), read_fields(block, line)
-        if len(fields) < 2:
-            raise place.wrong("a boundary condition without a dof", "give set, first and last dof")
-        word, value = fields[1].upper(), 0.0
-        if word in ("0", "11"):  # a temperature or a mass flow
-            continue
-        held = _HELD.get(word)
+    if block.value("TYPE") not in ("", "DISPLACEMENT") or block.value("LOADCASE") not in ("", "1"):
+        raise block.place.wrong("TYPE or LOAD CASE is not read", "give displacements of one load case")
+    for row in block.rows():
+        held, value = _HELD.get(row.text(1).upper()), 0.0
         if held is None:
-            first = read_integer(word, place, "the first dof")
-            last = read_integer(fields[2], place, "the last dof") if len(fields) > 2 and fields[2] else first
+            first = row.whole(1, "the first dof")
+            last = row.whole(2, "the last dof") if row.text(2) else first
             if last < first:
-                raise place.wrong(f"dofs from {first} to {last}", "give the smaller one first")
-            value = read_float(fields[3], place) if len(fields) > 3 and "FIXED" not in block.parameters else 0.0
-            held = ((first, last),)
-        name, nodes = model.mesh.nodes(model.refer(fields[0], place))
-        model.add("boundaries", (Boundary(name, nodes, *dofs, value, str(place)) for dofs in held))
+                raise row.place.wrong(f"dofs from {first} to {last}", "give the smaller one first")
+            held, value = ((first, last),), 0.0 if "FIXED" in block.parameters else row.real(3)
+        nodes = model.mesh.nodes(row.reference(0))
+        model.add("boundaries", *(Boundary(str(row.place), nodes, *dofs, value) for dofs in held))
+
+
+def _step_of(model: Model, block: Block) -> Step:
+    if model.step is None:
+        raise block.place.wrong("it is outside of a step", "write *STEP above it")
+    return model.step
 
 
 def _step_of_load(model: Model, block: Block, *names: str) -> Step:
     """The step of a load. With OP=NEW earlier ones of these fields are gone."""
-    step = model.step
-    if step is None:
-        raise block.place.wrong(f"*{block.written} outside of a step", "write it below *STEP")
-    if value_of(block, "OP") == "NEW":
-        for name in names:
-            model.fields[name] = {}
+    step = _step_of(model, block)
+    if block.value("OP") == "NEW":
+        model.fields.update((name, {}) for name in names)
     if "AMPLITUDE" in block.parameters and step.loads_count:
-        raise refused(block, "a load with AMPLITUDE is not read", "give its last value without AMPLITUDE")
+        raise block.place.wrong("a load with AMPLITUDE is not read", "give its last value without AMPLITUDE")
     return step
 
 
@@ -103,13 +216,12 @@ def _step_of_load(model: Model, block: Block, *names: str) -> Step:
 def _cload(model: Model, block: Block) -> None:
     """Node or set, dof, force; it counts in static steps."""
     step = _step_of_load(model, block, "forces")
-    for fields, place in data_lines(block, 2, "node or set, dof and force"):
-        nodes, dof = model.refer(fields[0], place), read_integer(fields[1], place, "a dof")
-        value = read_float(fields[2], place) if len(fields) > 2 else 0.0
+    for row in block.rows(2, "node or set, dof and force"):
+        nodes, dof, value = row.reference(0), row.whole(1, "a dof"), row.real(2)
         if dof > 3 and value and step.loads_count:
-            raise place.wrong(f"*{block.written} along dof {dof}", "give forces: a moment is not read")
-        force = NodalForce(f"{place}: *{block.written}", model.mesh.nodes(nodes)[1], dof, value)
-        model.add("forces", [force], (nodes.scope, nodes.target, dof))
+            raise row.place.wrong(f"a load along dof {dof}", "give forces: a moment is not read")
+        force = NodalForce(str(row.place), model.mesh.nodes(nodes), dof, value)
+        model.add("forces", force, key=(nodes.scope, nodes.target, dof))
 
 
 @keyword("DLOAD", "OP AMPLITUDE")
@@ -117,53 +229,49 @@ def _dload(model: Model, block: Block) -> None:
     """CENTRIF in any step, P1 to P6 and GRAV in static ones; other loads are refused there."""
     static = model.step is not None and model.step.loads_count
     step = _step_of_load(model, block, "gravity", *(("centrifugal", "pressures") if static else ()))
-    fresh = True
-    for fields, place in data_lines(block, 2, "set, type and size"):
-        kind = fields[1].upper()
-        pressure = kind in ("P1", "P2", "P3", "P4", "P5", "P6")
-        if not pressure and kind not in ("CENTRIF", "GRAV"):
-            if static:
-                remedy = "give forces with *CLOAD, or `preload` in the study"
-                raise place.wrong(f"*{block.written} of type {shown(kind)} is not read", remedy)
+    fresh = step.fresh
+    for row in block.rows(2, "set, type and size"):
+        kind = row.text(1).upper()
+        if kind not in ("CENTRIF", "GRAV", "P1", "P2", "P3", "P4", "P5", "P6"):
+            _refuse_load(row, step)
             continue
-        reference = model.refer(fields[0], place)
-        name, elements = model.mesh.elements(reference)
-        values = [read_float(part, place) for part in fields[2:]]
-        if pressure:
-            faces = np.full(elements.size, int(kind[1]))
-            load = Pressure(f"{place}: *{block.written}", elements, faces, values[0] if values else 0.0)
-            model.add("pressures", [load], (reference.scope, reference.target, kind))
-            continue
-        least, what = (6, "omega^2, a point and the axis") if kind == "CENTRIF" else (4, "size and direction")
-        if len(values) < least:
-            raise place.wrong(f"{len(values)} numbers behind {kind}", f"give {what}")
+        reference = row.reference(0)
+        elements = model.mesh.elements(reference)
         if kind == "GRAV":
-            direction = unit(np.array(values[1:4]), place, "GRAV without a direction", f"give {what}")
-            model.add("gravity", [(elements, values[0] * direction, place)], reference.target)
-            continue
-        axis = np.array((values + [0.0])[4:7]) if values[0] >= 0 else np.zeros(3)
-        axis = unit(axis, place, "CENTRIF without a direction, or with omega^2 < 0", "give omega^2 and the axis")
-        if fresh and step.fresh:
-            model.fields["centrifugal"] = {}  # the last step that has some
-        fresh = step.fresh = False
-        model.add("centrifugal", [CentrifugalLoad(name, elements, values[0], np.array(values[1:4]), axis)])
+            values = row.reals(2, 4, "size and direction")
+            direction = unit(np.array(values[1:4]), row.place, "size and direction")
+            model.add("gravity", (elements, values[0] * direction, row.place), key=reference.target)
+        elif kind == "CENTRIF":
+            values = row.reals(2, 6, "omega^2, a point and the axis")
+            axis = np.array((values + [0.0])[4:7]) if values[0] >= 0 else np.zeros(3)
+            axis = unit(axis, row.place, "omega^2 of at least 0, a point and the axis")
+            if fresh:
+                model.fields["centrifugal"] = {}  # the last step that has some
+            fresh = step.fresh = False
+            load = elements, values[0], np.array(values[1:4]), axis
+            model.add("centrifugal", CentrifugalLoad(str(row.place), *load))
+        else:
+            pressure = Pressure(str(row.place), elements, np.full(elements.size, int(kind[1])), row.real(2))
+            model.add("pressures", pressure, key=(reference.scope, reference.target, kind))
 
 
 @keyword("DSLOAD", "OP AMPLITUDE")
 def _dsload(model: Model, block: Block) -> None:
     """Surface, P, pressure; it counts in static steps."""
     step = _step_of_load(model, block, "pressures")
-    for fields, place in data_lines(block, 2, "surface, P and pressure"):
-        if fields[1].upper() == "P":
-            model.add("pressures", [_on_surface(model, block, fields, place)], ("surface", model.scope, fields[0]))
-        elif step.loads_count:
-            remedy = "give a pressure P, forces with *CLOAD, or `preload` in the study"
-            raise place.wrong(f"*{block.written} of type {shown(fields[1])} is not read", remedy)
+    for row in block.rows(2, "surface, P and pressure"):
+        if row.text(1).upper() != "P":
+            _refuse_load(row, step)
+            continue
+        surface = model.mesh.surfaces[model.mesh.surface(row.reference(0))]
+        if surface.nodes.size:
+            raise row.place.wrong("a pressure on a surface of nodes", "give a surface of element faces")
+        load = Pressure(str(row.place), surface.elements, surface.faces, row.real(2))
+        model.add("pressures", load, key=("surface", block.scope, row.text(0)))
 
 
-def _on_surface(model: Model, block: Block, fields: list[str], place: Place) -> Pressure:
-    surface = model.mesh.surfaces[model.mesh.surface(model.refer(fields[0], place))]
-    if surface.of_nodes:
-        raise place.wrong("a pressure on a surface of nodes", "give a surface of element faces")
-    value = read_float(fields[2] if len(fields) > 2 else "", place)
-    return Pressure(f"{place}: *{block.written}", surface.elements, surface.faces, value)
+def _refuse_load(row: Row, step: Step) -> None:
+    """Raises SceneError where a load that is not read counts."""
+    if step.loads_count:
+        remedy = "give a pressure P, forces with *CLOAD, or `preload` in the study"
+        raise row.place.wrong(f"a load of type {shown(row.text(1))} is not read", remedy)

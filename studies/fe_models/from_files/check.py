@@ -8,13 +8,12 @@ import numpy as np
 from scipy.linalg import eigh
 
 from solver import SolverSettings, march_wear
-from solver.model import FloatArray, LinearModel, ReducedModel
-from studies.contact_compliance import make_compliant
-from studies.fe_models.from_files.model import LoadedModel
+from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
+from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.from_files.scene import reduce_model
 from studies.finite_element.joint_model import MatrixModel
 from studies.finite_element.reduced_joint import FeScene, Progress, glued_frequencies, prepare_model, silent
+from studies.scene import make_compliant
 
 N_FREQUENCIES = 4
 """Natural frequencies that are shown."""
@@ -29,48 +28,46 @@ def describe_model(
     loaded: LoadedModel, scene: FeScene, parameters: Parameters, progress: Progress = silent
 ) -> list[tuple[str, str]]:
     """Label and text of each line. scene: the reduced model. Raises SceneError."""
-    summary, deck, joint = scene.summary, loaded.deck, loaded.joint
+    deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.coordinates
+    prepared = prepare_model(loaded.model, joint)
+    free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
+    if joint.cut is not None:
+        free[joint.cut.right] = False
+    mass, placed = prepared.weight.sum(), ~np.isnan(coordinates[:, 0])
     rows = [
-        ("mass", f"{summary.mass:.6g} kg, {summary.n_dofs} displacements that are not held"),
-        ("extent", f"{_vector(summary.extent)} m; given in {loaded.units.name}"),
-        ("centre", f"{_vector(summary.centre)} m"),
+        ("mass", f"{mass:.6g} kg, {3 * np.count_nonzero(free)} displacements that are not held"),
+        ("extent", f"{_vector(np.ptp(coordinates[placed], axis=0))} m; given in {loaded.units.name}"),
+        ("centre", f"{_vector(prepared.weight[placed] @ coordinates[placed] / mass)} m"),
     ]
-    rotation = loaded.model.rotation
-    if rotation is None:
-        rows.append(("speed", "none"))
-    else:
-        rows.append(
-            ("speed", f"{np.sqrt(rotation.omega_squared) * _RPM:.6g} rpm about {_vector(rotation.axis)}{_held(loaded)}")
-        )
+    rotation, speed = loaded.model.rotation, "none"
+    if rotation is not None:
+        speed = f"{np.sqrt(rotation.omega_squared) * _RPM:.6g} rpm about {_vector(rotation.axis)}{_held(loaded)}"
+    rows.append(("speed", speed))
     if joint.cut is not None:
         n = joint.cut.axis.n_sectors
         rows.append(("sectors", f"{n}, {360.0 / n:.5g} degrees each, {len(joint.cut.left)} nodes on a cut face"))
     rows += [("contact", text) for text in _contacts(scene)]
     rows += [("glued", f"{tie.name} stay glued") for tie in joint.ties]
     progress("natural frequencies of the glued model")
-    prepared = prepare_model(loaded.model, joint)
     k = parameters.nodal_diameter
     turning = glued_frequencies(prepared, k, N_FREQUENCIES)
     where = f"nodal diameter {k}: " if joint.cut is not None else ""
+    glued = f"{where}{_frequencies(turning)} Hz without prestress"
     if isinstance(loaded.model, MatrixModel):
-        rows.append(("glued", f"{where}{_frequencies(turning)} Hz, with what the matrices hold"))
-    elif prepared.at_rest is None:
-        rows.append(("glued", f"{where}{_frequencies(turning)} Hz without prestress"))
-    else:
+        glued = f"{where}{_frequencies(turning)} Hz, with what the matrices hold"
+    elif prepared.at_rest is not None:
         still = prepared.at_rest.frequencies(k, N_FREQUENCIES) / (2.0 * np.pi)
-        rows.append(("glued", f"{where}{_frequencies(still)} Hz at rest, {_frequencies(turning)} Hz with prestress"))
-    first = dict(sorted((k, found[0]) for k, found in summary.glued_frequencies.items()))
+        glued = f"{where}{_frequencies(still)} Hz at rest, {_frequencies(turning)} Hz with prestress"
+    rows.append(("glued", glued))
+    first = dict(sorted((k, found[0]) for k, found in scene.glued_frequencies.items()))
     if len(first) > 1:
         listed = ", ".join(map(str, first))
         rows.append(("glued", f"first at nodal diameters {listed}: {_frequencies(np.array([*first.values()]))} Hz"))
     progress("reduction with twice the modes")
     rows.append(("reduction", _reduction_error(loaded, scene.model, parameters)))
     rows.append(("rigid", f"{count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
-    held = count_free_motions(scene.model)
-    if held:
-        verb = "motion is" if held == 1 else "motions are"
-        rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
-    placed = ~np.isnan(loaded.model.coordinates[:, 0])
+    if count_free_motions(scene.model):
+        rows.append(("warning", "motions are held by friction alone: give retention_stiffness"))
     total = prepared.static_load.reshape(-1, 3)[placed].sum(axis=0)
     rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
     progress("state at rest")

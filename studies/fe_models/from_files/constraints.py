@@ -137,7 +137,7 @@ class _Builder:
         for boundary in self.deck.boundaries:
             first, last = max(boundary.first_dof, 1), min(boundary.last_dof, 6)
             if first <= min(last, 3) and boundary.value != 0.0:
-                found = f"{boundary.place or self.deck.path}: *BOUNDARY moves {boundary.name} by {boundary.value:g}"
+                found = f"{boundary.place} moves nodes by {boundary.value:g}"
                 raise SceneError("clamp", found, "hold it, or give `clamp`")
             for node in boundary.nodes:
                 wanted.setdefault(int(node), set()).update(range(first, last + 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,44 +11,43 @@ import pandas as pd
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.fe_models.checks import (
+from studies.fe_models.from_files.export_mistakes import (
     check_contact_removed,
     check_mass,
     check_mesh_is_of_matrices,
     check_nodes_have_dofs,
     check_speed,
     check_translations,
-    check_units,
     mass_of,
 )
-from studies.fe_models.deck.contents import Deck
-from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.from_files.selections import Surfaces
-from studies.fe_models.library_errors import library_errors
+from studies.fe_models.from_files.selections import Selections
+from studies.fe_models.from_files.solid import check_units
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.model_files import ModelFiles, Units
+from studies.fe_models.text import library_errors
 from studies.finite_element.joint_model import MatrixModel, RowMotion
-from studies.finite_element.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
-
-_OF_ELEMENTS = ("material", "rotation_speed")
-"""Keys that need elements: the forces of rotation are among those of the matrices, or in `preload`."""
 
 
 @dataclass(frozen=True)
 class NodalMatrices:
-    """A model of matrices with displacements node by node in x, y, z: nodes of the mesh, then those of the matrices
-    alone.
+    """Matrices of another program, and a model of them with displacements node by node in x, y, z: nodes of the mesh,
+    then those of the matrices alone.
 
     Rows that are no displacement of a node, as modal coordinates, stand three by three at the end, as if of nodes
     without a place. missing (n_nodes, 3): displacements that the matrices do not have, which must be held. place
-    (n_dof,): of each row of the matrices in the displacements of the model.
+    (n_dof,): of each row of the matrices in the displacements of the model. omega_squared_held: square of the speed at
+    which they were made, rad2/s2; None where they do not tell.
     """
 
+    matrices: Matrices
     model: MatrixModel
     missing: BoolArray
     place: IntArray
+    omega_squared_held: float | None = None
 
 
 def order_by_nodes(matrices: Matrices, units: Units, numbers: IntArray, coordinates: FloatArray) -> NodalMatrices:
@@ -77,31 +76,21 @@ def order_by_nodes(matrices: Matrices, units: Units, numbers: IntArray, coordina
         # seconds in all systems of units: N s/m from a damping as N/m from a stiffness
         damping=None if matrices.damping is None else ordered(matrices.damping),
     )
-    return NodalMatrices(model, missing.reshape(-1, 3), place)
-
-
-@dataclass(frozen=True)
-class Imported:
-    """Matrices of another program, by rows and by nodes.
-
-    omega_squared_held: square of the speed at which they were made, rad2/s2; None where they do not tell.
-    """
-
-    matrices: Matrices
-    nodal: NodalMatrices
-    omega_squared_held: float | None
+    return NodalMatrices(matrices, model, missing.reshape(-1, 3), place)
 
 
 def import_matrices(
     files: ModelFiles,
-    parameters: Parameters,
-    deck: Deck,
-    mesh: SolidMesh,
-    surfaces: Surfaces,
-    units: Units,
+    selections: Selections,
+    surfaces: tuple[tuple[ContactSurfaces, ...], tuple[ContactSurfaces, ...]],
     rotation: Rotation | None,
-) -> Imported:
-    """Reads matrices; those of a mesh are whole, and nothing joins surfaces in contact. Raises SceneError."""
+    on_cut: IntArray,
+) -> NodalMatrices:
+    """Reads matrices; those of a mesh are whole, and nothing joins surfaces in contact. Raises SceneError.
+
+    surfaces: those in contact, and those that are glued. on_cut: numbers of the nodes on both cut faces.
+    """
+    deck, mesh, units, parameters = selections.deck, selections.mesh, selections.units, selections.parameters
     if not parameters.stress_stiffening:
         raise SceneError("stress_stiffening", "false", "leave it out: the matrices hold it or not")
     if deck.n_instances > 1:
@@ -113,24 +102,25 @@ def import_matrices(
         check_translations(matrices)
         check_units(deck, mass_of(deck, matrices), units)
         check_mass(deck, matrices, units)
-        for each in (*surfaces.contacts, *surfaces.ties):
+        for each in (*surfaces[0], *surfaces[1]):
             for surface in (each.first, each.second):
                 check_nodes_have_dofs(matrices, mesh.numbers[surface.nodes], surface.name)
-        for each in surfaces.contacts:
+        for each in surfaces[0]:
             nodes = mesh.numbers[each.first.nodes], mesh.numbers[each.second.nodes]
             check_contact_removed(deck, matrices, nodes, (each.first.name, each.second.name), units)
         if rotation is not None:
             held_speed = check_speed(deck, matrices, rotation, of_study=parameters.rotation_speed is not None)
-    return Imported(matrices, order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates), held_speed)
+    else:
+        _check_table(matrices, selections, on_cut)
+    return replace(order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates), omega_squared_held=held_speed)
 
 
-def check_table(deck: Deck, matrices: Matrices, parameters: Parameters, on_cut: IntArray) -> None:
-    """Raises SceneError where a table of nodes and matrices do not go together, or a key needs elements.
-
-    on_cut: numbers of the nodes on both cut faces.
-    """
-    for key in _OF_ELEMENTS:
-        if getattr(parameters, key) is not None:
+def _check_table(matrices: Matrices, selections: Selections, on_cut: IntArray) -> None:
+    """Raises SceneError where a table of nodes and matrices do not go together, or a key needs elements."""
+    deck = selections.deck
+    # forces of rotation are among those of the matrices, or in `preload`
+    for key in ("material", "rotation_speed"):
+        if getattr(selections.parameters, key) is not None:
             remedy = "leave it out: reduced matrices have it in them, and forces stand in their load or in preload"
             raise SceneError(key, "the model is a table of nodes", remedy)
     if matrices.load is not None and matrices.load.shape[1] > 1:
@@ -139,23 +129,13 @@ def check_table(deck: Deck, matrices: Matrices, parameters: Parameters, on_cut: 
     if len(lost):
         found = f"{len(lost)} nodes of {deck.path} have no row in {matrices.files[0]}, as node {lost[0]}"
         raise SceneError("matrices", found, "give the nodes that the matrices keep")
-    turning = np.unique(matrices.node[np.isin(matrices.node, on_cut) & (matrices.direction > 2)])
+    turning = matrices.node[np.isin(matrices.node, on_cut) & (matrices.direction > 2)]
     if len(turning):
         found = f"node {turning[0]} of a cut face has rotations"
         raise SceneError("cut_faces", found, "reduce the sector to the displacements of its cut faces")
 
 
-def constant_forces(matrices: Matrices, nodal: NodalMatrices, units: Units, n_nodes: int) -> FloatArray:
-    """Forces (3 n_nodes,), N, that stand beside the matrices."""
-    found = np.zeros(3 * n_nodes)
-    if matrices.load is not None:
-        found[nodal.place] = matrices.load[:, 0] * units.force
-    return found
-
-
-def read_recovery(
-    path: Path, matrices: Matrices, nodal: NodalMatrices, units: Units, taken: Collection[str]
-) -> Mapping[str, RowMotion]:
+def read_recovery(path: Path, imported: NodalMatrices, units: Units, taken: Collection[str]) -> Mapping[str, RowMotion]:
     """Quantities by name, as sums over the displacements of a model.
 
     A quantity with a unit in its name, as "root stress [MPa]", has this unit; one without is a displacement, m. taken:
@@ -168,6 +148,7 @@ def read_recovery(
         table.columns = [str(name).strip() for name in table]
         values = table[names].fillna(0.0).to_numpy(dtype=np.float64)
         rows = pd.MultiIndex.from_frame(table[["node", "dof"]])
+    matrices = imported.matrices
     own = pd.MultiIndex.from_arrays([matrices.node, matrices.direction + 1]).get_indexer(rows)
     if not names or (own < 0).any():
         unknown = "no quantity" if not names else f"node {rows[own < 0][0][0]} with dof {rows[own < 0][0][1]} is no row"
@@ -178,7 +159,7 @@ def read_recovery(
         raise SceneError("recovery", f"{path.name}: a response has the name {twice[0]} as well", "give another name")
     motions = {}
     for name, column in zip(names, values.T, strict=True):
-        weights = np.zeros(nodal.missing.size)
-        np.add.at(weights, nodal.place[own], column / (units.length if name.endswith("]") else 1.0))
+        weights = np.zeros(imported.missing.size)
+        np.add.at(weights, imported.place[own], column / (units.length if name.endswith("]") else 1.0))
         motions[name] = RowMotion(weights)
     return motions

@@ -1,40 +1,42 @@
-"""From files and a study's parameters to a model and what is done with it, in SI units."""
+"""From files and a study's parameters to a model and its reduction, in SI units."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
+from pydantic import BaseModel
 
-from solver.model import FloatArray
-from studies.fe_models.checks import check_nodes_have_dofs, check_units
+from solver.model import FloatArray, ReducedModel
 from studies.fe_models.deck.contents import Deck
 from studies.fe_models.from_files.constraints import Supported, find_constraints
-from studies.fe_models.from_files.imported import (
-    check_table,
-    constant_forces,
-    import_matrices,
-    read_recovery,
-)
+from studies.fe_models.from_files.export_mistakes import check_nodes_have_dofs
+from studies.fe_models.from_files.imported import import_matrices, read_recovery
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
-from studies.fe_models.from_files.selections import Selections, Surfaces, find_surfaces
-from studies.fe_models.from_files.solid import (
-    build_solid_mesh,
-    find_clamped,
-    find_cut,
-    find_cyclic_axis,
-    find_rotation,
-)
+from studies.fe_models.from_files.selections import Selections, find_clamped, find_cut, find_surfaces
+from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_cyclic_axis, find_rotation
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
-from studies.fe_models.model_files import ModelFiles, Units, find_units
+from studies.fe_models.model_files import ModelFiles, Units, file_digest, find_units
+from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, RowMotion, SetMotion
-from studies.finite_element.pairing import ContactPairs, match_nodes
-from studies.finite_element.reduced_joint import Progress, silent
+from studies.finite_element.joint_model import (
+    JointDefinition,
+    MatrixModel,
+    MeshModel,
+    ReductionOptions,
+    Retainer,
+    RowMotion,
+    SetMotion,
+)
+from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
+from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
-from studies.finite_element.surfaces import loops_of_faces, pressure_forces
+from studies.finite_element.surfaces import describe_mesh, loops_of_faces, pressure_forces
+from studies.scene import SurfaceMesh, build_compliant
 from studies.scene_error import SceneError
 
 
@@ -54,29 +56,70 @@ class LoadedModel:
     omega_squared_held: float | None
 
 
+def checked(parameters: BaseModel) -> Parameters:
+    """Parameters that are those of a finite-element model."""
+    assert isinstance(parameters, Parameters)
+    return parameters
+
+
 def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
     """The files of a model, whose names are relative to a folder.
 
     Raises SceneError where there are none of these names.
     """
-    mesh = folder / model
-    _check_there(mesh, "model")
-    if parameters.matrices is None:
-        if parameters.recovery is not None:
+    mesh, recovery = folder / model, None
+    matrices = () if parameters.matrices is None else find_matrix_files(folder / parameters.matrices)
+    if parameters.recovery is not None:
+        if not matrices:
             raise SceneError("recovery", parameters.recovery, "give it with `matrices`, over their rows")
-        return ModelFiles(mesh)
-    matrices = find_matrix_files(folder / parameters.matrices)
-    for path in matrices:
-        _check_there(path, "matrices")
-    recovery = None if parameters.recovery is None else folder / parameters.recovery
-    if recovery is not None:
-        _check_there(recovery, "recovery")
-    return ModelFiles(mesh, matrices, recovery)
+        recovery = folder / parameters.recovery
+    files = ModelFiles(mesh, matrices, recovery)
+    keys = ("model", *("matrices" for _ in matrices), "recovery")
+    for path, key in zip(files.all, keys, strict=False):
+        check_there(path, key)
+    return files
 
 
-def load_mesh(files: ModelFiles, parameters: Parameters) -> SolidMesh:
-    """The mesh alone. Raises SceneError."""
-    return build_solid_mesh(read_mesh_file(files.mesh), parameters, find_units(parameters.units))
+def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: Progress = silent) -> ReducedModel:
+    """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see.
+
+    Raises SceneError where the files or parameters describe no possible joint.
+    """
+    own = checked(parameters)
+
+    def reduced() -> ReducedModel:
+        return reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model
+
+    if own.contact_stiffness is None:
+        return reduced()
+    what = [describe_origin(files, own), own.model_dump_json(exclude={"contact_stiffness"}), n_harmonics]
+    return build_compliant(json.dumps(what), own.contact_stiffness, reduced)
+
+
+def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, progress: Progress = silent) -> FeScene:
+    """Reduced model of a loaded one. Raises SceneError."""
+    options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
+    return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress)
+
+
+def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:
+    """Outer faces of the mesh. Raises SceneError."""
+    own = checked(parameters)
+    return describe_mesh(build_solid_mesh(read_mesh_file(files.mesh), own, find_units(own.units)))
+
+
+def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
+    """Attributes of a scene or result file: the files with their SHA-256, their units, and what reduced them.
+
+    Raises SceneError or OSError where a file cannot be read.
+    """
+    mesh, *others = files.all
+    paths = (mesh, *(mesh.parent / name for name in read_mesh_file(mesh).included), *others)
+    return {
+        "model_files": ", ".join(f"{path.name} sha256:{file_digest(path)}" for path in paths),
+        "model_units": checked(parameters).units,
+        "model_reduced_by": f"fretwear {metadata.version('fretwear')}",
+    }
 
 
 def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = silent) -> LoadedModel:
@@ -88,25 +131,23 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     progress(f"reading {files.mesh.name}")
     deck = read_mesh_file(files.mesh)
     mesh = build_solid_mesh(deck, parameters, units)
-    selections = Selections(deck, mesh)
+    selections = Selections(deck, mesh, parameters, units)
     if not files.matrices:
         _check_assembled(deck, units)
-    rotation = find_rotation(deck, parameters, units)
-    axis = find_cyclic_axis(deck, parameters, units)
-    surfaces = find_surfaces(selections, parameters, units, axis)
-    cut, clamped = find_cut(selections, parameters, axis, surfaces.contacts), find_clamped(selections, parameters)
+    rotation, axis = find_rotation(deck, parameters, units), find_cyclic_axis(deck, parameters, units)
+    contacts, ties = find_surfaces(selections, axis)
+    cut, clamped = find_cut(selections, axis, contacts), find_clamped(selections)
     on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
     imported = None
     if files.matrices:
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
-        imported = import_matrices(files, parameters, deck, mesh, surfaces, units, rotation)
-    numbers = mesh.numbers if imported is None else imported.nodal.model.numbers
+        imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
+    numbers = mesh.numbers if imported is None else imported.model.numbers
     if clamped is not None:
         clamped = np.pad(clamped, ((0, len(numbers) - len(clamped)), (0, 0)))
     supported = find_constraints(deck, numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
-    preload = _preload(selections, parameters, units, supported)
-    gravity = None if deck.gravity is None else deck.gravity * units.length
+    preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
     responses: dict[str, SetMotion | RowMotion] = {
         name: _motion(selections, each, f"response.{name}.set") for name, each in parameters.responses.items()
     }
@@ -114,27 +155,26 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     if imported is None:
         model = MeshModel(mesh, rotation, parameters.stress_stiffening, preload, gravity, extra=supported.extra)
     else:
-        matrices, nodal = imported.matrices, imported.nodal
-        if deck.contact_nodes is not None:
-            check_table(deck, matrices, parameters, mesh.numbers[on_cut])
-            preload = preload + constant_forces(matrices, nodal, units, len(supported.held))
-        else:
+        if imported.matrices.load is not None:
+            preload[imported.place] += imported.matrices.load[:, 0] * units.force
+        if deck.contact_nodes is None:
             free = mesh.numbers[~supported.own[: mesh.n_nodes].all(axis=1)]
-            check_nodes_have_dofs(matrices, free, "the mesh without its clamps")
-        supported.held[: len(nodal.missing)] |= nodal.missing
-        model = replace(nodal.model.with_nodes(supported.extra), rotation=rotation, preload=preload, gravity=gravity)
+            check_nodes_have_dofs(imported.matrices, free, "the mesh without its clamps")
+        supported.held[: len(imported.missing)] |= imported.missing
+        model = imported.model.with_nodes(supported.extra)
+        model = replace(model, rotation=rotation, preload=preload, gravity=gravity)
         if files.recovery is not None:
-            responses |= read_recovery(files.recovery, matrices, nodal, units, responses)
+            responses |= read_recovery(files.recovery, imported, units, responses)
     joint = JointDefinition(
-        contacts=surfaces.contacts,
+        contacts=contacts,
         held=supported.held,
         load=_motion(selections, parameters.load, "load.set"),
         responses=responses,
         cut=cut,
         retainer=_retainer(parameters, None if cut is None else cut.axis.axis, rotation),
-        ties=surfaces.ties,
+        ties=ties,
         constraints=supported.constraints,
-        pairs=_pairs_of_table(deck, model, surfaces, units, axis),
+        pairs=_pairs_of_table(selections, model, contacts, axis),
     )
     return LoadedModel(deck, units, mesh, model, joint, None if imported is None else imported.omega_squared_held)
 
@@ -144,64 +184,54 @@ def _check_assembled(deck: Deck, units: Units) -> None:
     if deck.contact_nodes is not None:
         raise SceneError("matrices", "missing", f"give the matrices of the nodes of {deck.path}")
     check_units(deck, None, units)
-    for found in deck.unassembled:
+    if deck.unassembled:
         remedy = "use solid elements, of one material in a .cdb, or give `matrices` of another program"
-        raise SceneError("model", found, remedy)
+        raise SceneError("model", deck.unassembled[0], remedy)
 
 
 def _pairs_of_table(
-    deck: Deck, model: MeshModel | MatrixModel, surfaces: Surfaces, units: Units, axis: CyclicAxis | None
+    selections: Selections,
+    model: MeshModel | MatrixModel,
+    contacts: tuple[ContactSurfaces, ...],
+    axis: CyclicAxis | None,
 ) -> ContactPairs | None:
     """Pairs of a table of nodes; None of a mesh, whose facets make them."""
-    if deck.contact_nodes is None:
+    table, length = selections.deck.contact_nodes, selections.units.length
+    if table is None:
         return None
-    others = len(model.numbers) - len(deck.node_numbers)
-    scales = (deck.contact_nodes.area * units.length**2, deck.contact_nodes.gap * units.length)
-    area, gap = (np.pad(each, (0, others), constant_values=np.nan) for each in scales)
-    normals = np.pad(deck.contact_nodes.normals, ((0, others), (0, 0)), constant_values=np.nan)
-    return match_nodes(model.coordinates, model.numbers, surfaces.contacts, (area, normals, gap), axis)
+    others = len(model.numbers) - len(table.area)
+    area, gap = (
+        np.pad(each, (0, others), constant_values=np.nan) for each in (table.area * length**2, table.gap * length)
+    )
+    normals = np.pad(table.normals, ((0, others), (0, 0)), constant_values=np.nan)
+    return match_nodes(model.coordinates, model.numbers, contacts, (area, normals, gap), axis)
 
 
-def _preload(selections: Selections, parameters: Parameters, units: Units, supported: Supported) -> FloatArray:
-    """Constant nodal forces (3 n_nodes,), N: those of the study, else of the deck."""
-    n_nodes = len(supported.held)
-    if not parameters.preload:
-        return np.asarray(supported.forces + _pressed(selections.deck, selections.mesh, n_nodes, units))
-    rows = [each.force * _motion(selections, each, "preload.set").row(n_nodes) for each in parameters.preload]
-    return np.asarray(np.sum(rows, axis=0))
-
-
-def _check_there(path: Path, key: str) -> None:
-    try:
-        exists = path.is_file()
-    except (OSError, ValueError):
-        exists = False
-    if not exists:
-        raise SceneError(key, f"there is no file {path.name}", "give a path relative to the study file")
+def _preload(selections: Selections, supported: Supported) -> FloatArray:
+    """Constant nodal forces (3 n_nodes,), N: those of the study, else forces and pressures of the deck."""
+    n_nodes, given, mesh = len(supported.held), selections.parameters.preload, selections.mesh
+    if given:
+        rows = [each.force * _motion(selections, each, "preload.set").row(n_nodes) for each in given]
+        return np.asarray(np.sum(rows, axis=0))
+    forces = np.zeros(3 * n_nodes)
+    for each in selections.deck.pressures:
+        kept = np.isin(each.elements, np.concatenate([group.numbers for group in mesh.groups]))
+        loops, _ = loops_of_faces(mesh, each.place, each.elements[kept], each.faces[kept])
+        pressure = each.value * selections.units.stress
+        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, loops, pressure)
+    return np.asarray(supported.forces + forces)
 
 
 def _motion(selections: Selections, given: SetDirection, key: str) -> SetMotion:
     return SetMotion(selections.nodes(given.set, key), np.array(given.direction))
 
 
-def _pressed(deck: Deck, mesh: SolidMesh, n_nodes: int, units: Units) -> FloatArray:
-    """Nodal forces (3 n_nodes,), N, of the pressures of a deck."""
-    forces = np.zeros(3 * n_nodes)
-    for each in deck.pressures:
-        kept = np.isin(each.elements, np.concatenate([group.numbers for group in mesh.groups]))
-        loops, _ = loops_of_faces(mesh, each.place, each.elements[kept], each.faces[kept])
-        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, loops, each.value * units.stress)
-    return forces
-
-
 def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:
     if parameters.retention_stiffness == 0.0:
         return None
-    direction = parameters.retention_direction
-    if direction is not None:
-        return Retainer(parameters.retention_stiffness, np.array(direction))
-    if axis is None and rotation is not None:
-        axis = rotation.axis
-    if axis is None:
+    direction: object = parameters.retention_direction
+    if direction is None:
+        direction = axis if axis is not None or rotation is None else rotation.axis
+    if direction is None:
         raise SceneError("retention_direction", "missing", "give it: the model has no axis")
-    return Retainer(parameters.retention_stiffness, axis)
+    return Retainer(parameters.retention_stiffness, np.array(direction))

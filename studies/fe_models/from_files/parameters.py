@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
-from studies.contact_compliance import ContactStiffness
+from studies.scene import ContactStiffness
 from studies.scene_error import SceneError
 
 

@@ -13,7 +13,6 @@ from solver.model import FloatArray
 from studies.fe_models.from_files.model import LoadedModel
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduced_joint import FeScene
-from studies.finite_element.surfaces import Surface
 
 _MOST_NUMBERS = 150
 _COLOURS = ("tab:red", "tab:green", "tab:blue")  # normal, first and second tangent
@@ -43,7 +42,7 @@ def _draw_surface(
     moving, opposite = pairs.moving_name[place], pairs.opposite_name[place]
     both = {each.name: each for each in (contact.first, contact.second)}
     for name, colour in zip((opposite, moving), _SHADES[::-1], strict=True):
-        facets = _facets(both[name], loaded.mesh.coordinates)
+        facets = loaded.mesh.coordinates[both[name].facets]
         drawn = Poly3DCollection(facets, facecolors=colour, edgecolors=colour, alpha=0.15, label=f"facets of {name}")
         axes.add_collection3d(drawn)
     points = position + pairs.distance[own, None] * pairs.frames[own, 0]
@@ -63,11 +62,6 @@ def _draw_surface(
     axes.set(**limits, box_aspect=(1, 1, 1))
     _look_at(axes, _ASIDE @ np.average(pairs.frames[own], axis=0, weights=pairs.area[own]))
     axes.legend(fontsize=7, loc="upper right")
-
-
-def _facets(surface: Surface, coordinates: FloatArray) -> list[FloatArray]:
-    """Corners of the facets of a surface."""
-    return [coordinates[facet] for facets in (surface.triangles, surface.quads) for facet in facets]
 
 
 def _look_at(axes: Any, direction: FloatArray) -> None:

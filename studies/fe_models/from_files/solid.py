@@ -1,24 +1,32 @@
-"""The mesh of a deck in SI units, each element with its material; rotation, cut faces and clamps."""
+"""The mesh of a deck in SI units, each element with its material; its rotation and its axis; what units it can have."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
-from solver.model import BoolArray, FloatArray, IntArray
-from studies.fe_models.checks import rotation_of_deck
+from solver.model import FloatArray, IntArray
 from studies.fe_models.deck.contents import Deck
-from studies.fe_models.from_files.parameters import AxisTable, MaterialTable, Parameters
-from studies.fe_models.from_files.selections import Selections
+from studies.fe_models.from_files.parameters import MaterialTable, Parameters
 from studies.fe_models.model_files import Units
-from studies.finite_element.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
+from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.element_matrices import Material
-from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.scene_error import SceneError
 
-_NONE = Material(0.0, 0.0, 0.0)  # of a mesh whose matrices come from elsewhere
+SPEED_AGREES = 1e-3
+"""Relative difference of two speeds that are the same."""
+
+_LEAST_DENSITY, _LARGEST_DENSITY = 1e-2, 3e4
+"""kg/m3 over the box around a model: from a blade thin and oblique in its box to solid metal."""
+
+_SOFTEST, _STIFFEST = 5e5, 2e12
+"""Young's moduli, Pa, from rubber to diamond. One of several materials may be stiffer, to stand for what is rigid."""
+
+_NOTHING = Material(0.0, 0.0, 0.0)  # of a mesh whose matrices come from elsewhere
 
 
 def build_solid_mesh(deck: Deck, parameters: Parameters, units: Units) -> SolidMesh:
@@ -53,37 +61,31 @@ def build_solid_mesh(deck: Deck, parameters: Parameters, units: Units) -> SolidM
 
 def _materials(deck: Deck, parameters: Parameters, units: Units) -> Iterator[tuple[str, IntArray, Material]]:
     """Label, element numbers and material; where an element has several the last one holds."""
-    given, everything = parameters.material, np.concatenate([block.numbers for block in deck.blocks])
-    needed = parameters.matrices is None and not isinstance(given, MaterialTable)
-    if not needed:
-        whole = _own(given) if isinstance(given, MaterialTable) else _NONE
-        yield "", everything, whole
+    given, whole = parameters.material, None
+    if isinstance(given, MaterialTable):
+        whole = _own(given)
+    elif parameters.matrices is not None:
+        whole = _NOTHING
+    if whole is not None:
+        yield "", np.concatenate([block.numbers for block in deck.blocks]), whole
     for section in deck.sections:
-        found = deck.materials.get(section.material)
-        values = None if found is None else (found.young, found.poisson, found.density)
-        if needed and found is not None and found.problem and not isinstance(given, dict):
-            raise SceneError("model", found.problem, "give one isotropic law, or `material` in the study")
-        elements = deck.element_sets[section.element_set]
-        if not needed:
-            yield section.element_set, elements, whole
-        elif values is not None and None not in values:
-            young, poisson, density = (float(value or 0.0) for value in values)
-            yield section.element_set, elements, Material(young * units.stress, poisson, density * units.density)
+        found = deck.materials[section.material]
+        if whole is not None:
+            yield section.name, section.elements, whole
+        elif found.young is not None and found.poisson is not None and found.density is not None and not found.problem:
+            values = found.young * units.stress, found.poisson, found.density * units.density
+            yield section.name, section.elements, Material(*values)
         elif not isinstance(given, dict):
-            raise SceneError(
-                "material",
-                f"{section.material} in {deck.path} lacks Young's modulus, Poisson's ratio or density",
-                "give *ELASTIC and *DENSITY in the deck, or `material` in the study",
-            )
-    if isinstance(given, dict):
-        for name, table in given.items():
-            elements = deck.element_sets.get(name.strip().upper(), np.empty(0, dtype=np.int64))
-            if elements.size == 0:
-                known = ", ".join(sorted(deck.element_sets)[:6]) or "none"
-                raise SceneError(
-                    "material", f'there is no set of elements "{name}" in {deck.path}', f"give one of {known}"
-                )
-            yield name.strip().upper(), elements, _own(table)
+            lacks = f"{section.material} in {deck.path} lacks Young's modulus, Poisson's ratio or density"
+            remedy = "give one isotropic law and a density in the deck, or `material` in the study"
+            raise SceneError("material", found.problem or lacks, remedy)
+    for name, table in given.items() if isinstance(given, dict) else ():
+        elements = deck.element_sets.get(name.strip().upper(), np.empty(0, dtype=np.int64))
+        if elements.size == 0:
+            known = ", ".join(sorted(deck.element_sets)[:6]) or "none"
+            found_none = f'there is no set of elements "{name}" in {deck.path}'
+            raise SceneError("material", found_none, f"give one of {known}")
+        yield name.strip().upper(), elements, _own(table)
 
 
 def _own(table: MaterialTable) -> Material:
@@ -108,6 +110,28 @@ def find_rotation(deck: Deck, parameters: Parameters, units: Units) -> Rotation 
     return Rotation(omega_squared, *axis)
 
 
+def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
+    """The rotation, SI, of the centrifugal loads, None where there is none.
+
+    Raises SceneError where parts of the model turn differently, or not at all.
+    """
+    loads = deck.centrifugal
+    if not loads:
+        return None
+    for one, other in pairwise(loads):
+        same = math.isclose(one.omega_squared, other.omega_squared, rel_tol=SPEED_AGREES)
+        if not same or abs(one.axis @ other.axis) < 1 - 1e-9:
+            speeds = " and ".join(f"{math.sqrt(each.omega_squared):g} rad/s" for each in (one, other))
+            found = f"{other.place} turns otherwise than before: {speeds}"
+            raise SceneError("model", found, "give all of the model one speed and one axis")
+    elements = np.concatenate([block.numbers for block in deck.blocks] or [np.empty(0, dtype=np.int64)])
+    turning = np.unique(np.concatenate([load.elements for load in loads]))
+    if turning.size and turning.size < elements.size:
+        found = f"{deck.path}: {turning.size} of {elements.size} elements have a centrifugal load"
+        raise SceneError("model", found, "give it to all of them")
+    return Rotation(loads[0].omega_squared, loads[0].point * units.length, loads[0].axis)
+
+
 def find_cyclic_axis(deck: Deck, parameters: Parameters, units: Units) -> CyclicAxis | None:
     """Axis and number of sectors that the study gives, else those of the deck; None of no sector.
 
@@ -130,53 +154,39 @@ def find_cyclic_axis(deck: Deck, parameters: Parameters, units: Units) -> Cyclic
     return CyclicAxis(n_sectors, *found)
 
 
-def find_cut(
-    selections: Selections, parameters: Parameters, axis: CyclicAxis | None, contacts: Sequence[ContactSurfaces]
-) -> CutFaces | None:
-    """Cut faces that the study names, else those of the deck, else all nodes that are images; None of no sector.
-
-    contacts: nodes of those with the next sector are on no cut face that is found.
-
-    Raises SceneError where they are not one sector apart.
-    """
-    if axis is None:
-        return None
-    deck, mesh = selections.deck, selections.mesh
-    places = mesh.coordinates, mesh.numbers, mesh.bodies
-    names = _cut_names(deck) if parameters.cut_faces is None else [parameters.cut_faces]
-    if not names:
-        across = [surface.nodes for each in contacts if each.sector for surface in (each.first, each.second)]
-        return find_cut_faces(*places, axis, np.concatenate([np.empty(0, dtype=np.int64), *across]))
-    sides = ([selections.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
-    first, second = (np.unique(np.concatenate(each)) for each in sides)
-    return match_cut_faces(*places, axis, first, second)
-
-
-def find_clamped(selections: Selections, parameters: Parameters) -> BoolArray | None:
-    """Displacements (n_nodes, 3) of the nodes that the study clamps; None where the deck says what is held.
-
-    Raises SceneError where a set does not exist.
-    """
-    if parameters.clamp is None:
-        return None
-    held = np.zeros((selections.mesh.n_nodes, 3), dtype=np.bool_)
-    for name in parameters.clamp:
-        held[selections.nodes(name, "clamp")] = True
-    return held
-
-
 def _axis(deck: Deck, parameters: Parameters, units: Units) -> tuple[FloatArray, FloatArray] | None:
     """Point, m, and direction of the axis, of unit length, that the study or the cyclic deck gives."""
-    given: AxisTable | None = parameters.axis
-    if given is not None:
-        direction = np.array(given.direction)
-        return np.array(given.point), direction / np.linalg.norm(direction)
-    if deck.cyclic is None:
+    if parameters.axis is not None:
+        point, along = np.array(parameters.axis.point), np.array(parameters.axis.direction)
+    elif deck.cyclic is not None:
+        point, end = deck.cyclic.axis * units.length
+        along = end - point
+    else:
         return None
-    start, end = deck.cyclic.axis * units.length
-    return start, (end - start) / np.linalg.norm(end - start)
+    return point, along / np.linalg.norm(along)
 
 
-def _cut_names(deck: Deck) -> list[tuple[str, str]]:
-    named = () if deck.cyclic is None else deck.cyclic.ties
-    return [(tie.dependent, tie.independent) for tie in deck.ties if tie.cyclic and (not named or tie.name in named)]
+def check_units(deck: Deck, mass: float | None, units: Units) -> None:
+    """Raises SceneError where mass and extent, density or modulus are of no real material.
+
+    mass: of the model, in units of the file; None where only the density of the deck is known. units: of the files
+    according to the user.
+    """
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in deck.blocks] or [deck.node_numbers]))
+    sides = np.ptp(deck.coordinates[deck.rows_of_nodes(used)], axis=0)
+    extent = float(sides.max())
+    known = [material.density for material in deck.materials.values() if material.density is not None]
+    if mass is not None:
+        density = mass / math.prod(np.maximum(sides, 1e-6 * extent)) if extent > 0 else math.inf
+        found = f"mass {mass:.2g} {units.label_of_mass}, extent {extent:.3g} {units.label_of_length}"
+    elif known:
+        density = max(known)
+        found = f"density {density:.3g} {units.label_of_mass}/{units.label_of_length}3"
+    else:
+        return
+    real = _LEAST_DENSITY <= density * units.density <= _LARGEST_DENSITY
+    moduli = [material.young * units.stress for material in deck.materials.values() if material.young is not None]
+    if real and mass is None and moduli and (min(moduli) > _STIFFEST or max(moduli) < _SOFTEST):
+        real, found = False, f"Young's moduli {min(moduli):.3g} to {max(moduli):.3g} Pa"
+    if not real:
+        raise SceneError("units", f"{found}: not {units.name}", 'give `units` that fit, "SI" or "mm-t-s"')

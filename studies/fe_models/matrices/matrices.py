@@ -21,8 +21,8 @@ from studies.scene_error import SceneError
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-LARGEST_FILE = 2**32
-"""Bytes of one file with a matrix."""
+NAMES = ("stiffness", "mass", "damping", "load")
+"""Matrices of a model, and constant forces."""
 
 _LARGEST_DOFS = 5_000_000
 _MOST_NODES = 2**40  # numbers that fit into a label, negative ones as well
@@ -88,9 +88,8 @@ def of_table(file: str, matrix: object, labels: IntArray) -> Entries:
         found = found.T.tocoo()
     if found.shape[0] != labels.size or found.shape[1] not in (1, labels.size):
         shape = " x ".join(str(length) for length in found.shape)
-        wrong(
-            file, f"{shape} entries for {labels.size} rows", "give node and dof of each row, in the order of the rows"
-        )
+        remedy = "give node and dof of each row, in the order of the rows"
+        wrong(file, f"{shape} entries for {labels.size} rows", remedy)
     if np.iscomplexobj(found.data):
         remedy = "give real matrices of the sector and its cut faces, or a scene file with nd/<k>"
         wrong(file, "complex numbers", remedy)

@@ -1,4 +1,4 @@
-"""Matrices without labels: MATLAB (.mat), MatrixMarket and Harwell-Boeing files, OP4 of Nastran; .full of ANSYS.
+"""Matrices without labels: MATLAB (.mat), MatrixMarket and Harwell-Boeing files; .full of ANSYS.
 
 Node and dof of each row, in the order of the rows, are the variable `rows` (n, 2) of a .mat file, or stand beside the
 files in job_rows.csv with the columns node and dof; dof 0 is a coordinate of no place, as of a mode.
@@ -15,62 +15,46 @@ import numpy as np
 import pandas as pd
 from scipy import io, sparse
 
-from studies.fe_models.library_errors import library_errors
-from studies.fe_models.matrices.matrices import IntArray, Matrices, assemble, label, of_table, wrong
-from studies.fe_models.matrices.nastran import names_of_matrices
-from studies.fe_models.matrices.op4 import read_op4
-
-NAMES = ("stiffness", "mass", "damping", "load")
-"""Variables of a .mat file, and ends of the names of files with one matrix each."""
-
-ONE_EACH = (".mtx", ".hb", ".rb")
-"""Endings of these files: MatrixMarket, Harwell-Boeing."""
+from studies.fe_models.matrices.matrices import NAMES, IntArray, Matrices, assemble, label, of_table, wrong
+from studies.fe_models.text import library_errors
 
 
-def rows_of(job: Path) -> Path:
-    """The table of the rows that belongs to matrices of a name."""
-    return job.with_name(f"{job.name}_rows.csv")
-
-
-def read_tables(files: Mapping[str, Path], rows: Path) -> Matrices:
-    """Matrices of files by name; rows: the table of their rows. Raises SceneError about "matrices"."""
+def read_tables(files: Mapping[str, Path]) -> Matrices:
+    """Matrices of files with one each. Raises SceneError about "matrices"."""
     found = {}
-    for name, path in files.items():
+    for name in [name for name in NAMES if name in files]:
+        path = files[name]
         with library_errors(path, "scipy.io", "scipy", "matrices"):
             found[name] = io.mmread(path) if path.suffix.lower() == ".mtx" else io.hb_read(path)
-    return _labelled(found, _read_rows(rows), {name: path.name for name, path in files.items()})
+    return matrices_of_tables(found, files)
 
 
-def read_matlab(path: Path) -> Matrices:
+def read_matlab(files: Mapping[str, Path]) -> Matrices:
     """Matrices of a .mat file of any version, by the variables NAMES and `rows`. Raises SceneError about "matrices"."""
+    path = files["matrices"]
     with library_errors(path, "scipy.io", "scipy", "matrices"):
         with path.open("rb") as file:
             newest = file.read(10) == b"MATLAB 7.3" or h5py.is_hdf5(path)
         found = _read_v73(path) if newest else io.loadmat(path, variable_names=[*NAMES, "rows"])
-    if "rows" not in found:
-        labels = _read_rows(rows_of(path.with_suffix("")))
-    else:
+    labels = None
+    if "rows" in found:
         table = np.asarray(found["rows"])
         if table.ndim != 2 or table.shape[1] != 2 or table.dtype.kind not in "iuf":
             wrong(path.name, f"rows have the shape {table.shape}", "give node and dof of each row of the matrices")
         labels = label(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), path.name)
-    own_names = {name: found[name] for name in NAMES if name in found}
-    return _labelled(own_names, labels, dict.fromkeys(NAMES, path.name))
+    return matrices_of_tables({name: found[name] for name in NAMES if name in found}, files, labels)
 
 
-def read_nastran_op4(path: Path) -> Matrices:
-    """Matrices of an OP4 file by the names of Nastran. Raises SceneError about "matrices"."""
-    found = read_op4(path)
-    names = names_of_matrices(found, path.name)
-    own = {name: found[each] for name, each in names.items()}
-    return _labelled(own, _read_rows(rows_of(path.with_suffix(""))), dict.fromkeys(names, path.name))
-
-
-def _labelled(found: Mapping[str, Any], labels: IntArray, files: Mapping[str, str]) -> Matrices:
+def matrices_of_tables(found: Mapping[str, Any], files: Mapping[str, Path], labels: IntArray | None = None) -> Matrices:
+    """Matrices by name whose rows have labels, or a table of them among the files. Raises SceneError."""
+    names = {name: files[name if name in files else "matrices"].name for name in found}
+    if labels is None and "rows" not in files:
+        wrong(next(iter(names.values())), "no table of its rows", "give job_rows.csv with node and dof of each row")
+    labels = _read_rows(files["rows"]) if labels is None else labels
     if np.unique(labels).size < labels.size:
-        wrong(next(iter(files.values())), "a dof has two rows", "give node and dof of each row once")
-    parts = {name: of_table(files[name], matrix, labels) for name, matrix in found.items()}
-    return assemble(parts, tuple(dict.fromkeys(files[name] for name in found)), "table")
+        wrong(next(iter(files.values())).name, "a dof has two rows", "give node and dof of each row once")
+    parts = {name: of_table(names[name], matrix, labels) for name, matrix in found.items()}
+    return assemble(parts, tuple(dict.fromkeys(names.values())), "table")
 
 
 def _read_rows(path: Path) -> IntArray:
@@ -86,9 +70,7 @@ def _read_v73(path: Path) -> dict[str, Any]:
     """Variables of a .mat file of version 7.3, which is HDF5 and holds arrays transposed."""
     found: dict[str, Any] = {}
     with h5py.File(path) as file:
-        for name in (*NAMES, "rows"):
-            if name not in file:
-                continue
+        for name in {*NAMES, "rows"} & set(file):
             item = file[name]
             if isinstance(item, h5py.Group):  # a sparse matrix, column by column
                 places, starts = (item[part][()].astype(np.int64) for part in ("ir", "jc"))
@@ -100,8 +82,9 @@ def _read_v73(path: Path) -> dict[str, Any]:
     return found
 
 
-def read_ansys(path: Path) -> Matrices:
+def read_ansys(files: Mapping[str, Path]) -> Matrices:
     """Matrices of a .full file, without the rows that ANSYS holds. Raises SceneError about "matrices"."""
+    path = files["matrices"]
     with library_errors(path, "ansys.mapdl.reader", "ansys-mapdl-reader", "matrices"):
         from ansys.mapdl import reader
 
@@ -111,12 +94,10 @@ def read_ansys(path: Path) -> Matrices:
             what = "lumped" if "lumped" in str(error) else "not symmetric"
             remedy = "write them consistent and symmetric: LUMPM,OFF and no CORIOLIS"
             wrong(path.name, f"the matrices are {what}", remedy)
-        if not hasattr(file, "load_km"):
-            wrong(path.name, "this is no .full file", "write one: HBMAT or WRFULL before the solution")
-        reference, stiffness, mass = file.load_km()
+        reference, stiffness, mass = file.load_km() if hasattr(file, "load_km") else (None, None, None)
         if stiffness is None or mass is None:
-            missing = "stiffness" if stiffness is None else "mass"
-            wrong(path.name, f"the file has no {missing}", "write the file of a modal analysis")
+            remedy = "write the .full file of a modal analysis: HBMAT or WRFULL before the solution"
+            wrong(path.name, "no stiffness and mass", remedy)
         held = np.array([[node, direction] for node, direction in file.const], dtype=np.int64).reshape(-1, 2)
     reference = np.asarray(reference, dtype=np.int64)
     labels = label(reference[:, 0], reference[:, 1] + 1, path.name)

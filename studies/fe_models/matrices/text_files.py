@@ -15,27 +15,29 @@ repeated.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from studies.fe_models.matrices.matrices import LARGEST_FILE, Entries, IntArray, Matrices, assemble, label, wrong
-from studies.fe_models.text import check_file, shown
+from studies.fe_models.matrices.matrices import Entries, IntArray, Matrices, assemble, label, wrong
+from studies.fe_models.text import LARGEST_FILE, check_file, shown
 
 _OF_TYPE = {"STIFFNESS": "stiffness", "MASS": "mass", "VISCOUSDAMPING": "damping"}
 
 
-def read_calculix(stiffness: Path, mass: Path, dofs: Path) -> Matrices:
+def read_calculix(files: Mapping[str, Path]) -> Matrices:
     """Matrices of a .sti, a .mas and a .dof file. Raises SceneError about "matrices"."""
+    dofs = files["dofs"]
     node, direction = _read_columns(dofs, ".", (int, int))
     labels, n_dof = label(node, direction, dofs.name), node.size
     if np.unique(labels).size < n_dof:
-        known, count = np.unique(labels, return_counts=True)
-        at = int(np.flatnonzero(labels == known[count > 1][0])[0])
+        at = np.setdiff1d(np.arange(n_dof), np.unique(labels, return_index=True)[1])[0]
         wrong(dofs.name, f"dof {direction[at]} of node {node[at]} has two rows", "export the matrices again")
     parts = {}
-    for name, path in (("stiffness", stiffness), ("mass", mass)):
+    for name in ("stiffness", "mass"):
+        path = files[name]
         rows, columns, values = _read_columns(path, " ", (int, int, float))
         size = int(max(rows.max(), columns.max()))
         if size == 2 * n_dof:
@@ -45,14 +47,13 @@ def read_calculix(stiffness: Path, mass: Path, dofs: Path) -> Matrices:
             found = f"{size} rows for {n_dof} dofs in {dofs.name}"
             wrong(path.name, found, "give the three files of one run, each of them whole")
         parts[name] = Entries(path.name, labels[rows - 1], labels[columns - 1], values)
-    return assemble(parts, (stiffness.name, mass.name, dofs.name), "calculix")
+    return assemble(parts, tuple(path.name for path in files.values()), "calculix")
 
 
-def read_abaqus(files: dict[str, Path]) -> Matrices:
+def read_abaqus(files: Mapping[str, Path]) -> Matrices:
     """Matrices of .mtx files by name, in the format of *MATRIX INPUT. Raises SceneError about "matrices"."""
     parts = {}
     for name, path in files.items():
-        _check_format(path, name)
         kinds = (int, int, float) if name == "load" else (int, int, int, int, float)
         *labels, values = _read_columns(path, ",", kinds, "*")
         if any((node == 0).any() for node in labels[::2]):
@@ -63,18 +64,9 @@ def read_abaqus(files: dict[str, Path]) -> Matrices:
     return assemble(parts, tuple(path.name for path in files.values()), "abaqus")
 
 
-def _check_format(path: Path, name: str) -> None:
-    """Raises SceneError where the lines are "row column value" (FORMAT=COORDINATE), without nodes."""
-    check_file(path, LARGEST_FILE, "matrices")
-    with path.open(encoding="latin-1") as file:
-        first = next((text for text in file if text.strip() and not text.startswith(("*", "%"))), "")
-    if name != "load" and len(first.replace(",", " ").split()) == 3:
-        found = "lines have a row, a column and a value (FORMAT=COORDINATE), and no node"
-        wrong(path.name, found, "write *MATRIX OUTPUT, STIFFNESS, MASS, FORMAT=MATRIX INPUT")
-
-
-def read_substructure(path: Path) -> Matrices:
+def read_substructure(files: Mapping[str, Path]) -> Matrices:
     """Matrices of a substructure in the format of a user element. Raises SceneError about "matrices"."""
+    path = files["matrices"]
     check_file(path, LARGEST_FILE, "matrices")
     nodes: list[int] = []
     dofs: list[list[int]] = []
@@ -100,9 +92,8 @@ def read_substructure(path: Path) -> Matrices:
             except ValueError:
                 wrong(path.name, f"line {number} is {shown(text)!r}", "write OUTPUT FILE=USER DEFINED")
     if not nodes or not dofs:
-        wrong(
-            path.name, "no *USER ELEMENT with its nodes", "write *SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED"
-        )
+        remedy = "write *SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED"
+        wrong(path.name, "no *USER ELEMENT with its nodes", remedy)
     labels = _labels(nodes, dofs, path.name)
     column, row = np.tril_indices(labels.size)
     parts = {}
@@ -157,8 +148,9 @@ def _read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: 
                 engine="c",
             )
     except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
-        what = " ".join("whole number" if kind is int else "value" for kind in kinds)
-        wrong(path.name, f"a line is no row of numbers ({shown(str(error))})", f"give lines of {what!r}")
+        what = f"give lines of {kinds.count(int)} whole numbers and {kinds.count(float)} values"
+        remedy = what + (", of Abaqus FORMAT=MATRIX INPUT" if separator == "," else "")
+        wrong(path.name, f"a line is no row of numbers ({shown(str(error))})", remedy)
     columns = [frame[name].to_numpy() for name in names]
     if not columns[0].size:
         wrong(path.name, "no entries in the file", "export it again")

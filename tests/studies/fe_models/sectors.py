@@ -70,10 +70,6 @@ class Sector:
         self.blade_faces = faces_where(self.mesh, of_blade & (np.abs(x - 0.2) < 1e-9))
 
     @property
-    def places(self):
-        return self.mesh.coordinates, self.mesh.numbers, self.mesh.bodies
-
-    @property
     def surfaces(self):
         blade = surface_of_faces(self.mesh, "BLADES", *self.blade_faces)
         return blade, surface_of_faces(self.mesh, "DISKS", *self.disk_faces)
@@ -88,7 +84,7 @@ class Sector:
             "held": held,
             "load": tip,
             "responses": {"tip": tip},
-            "cut": match_cut_faces(*self.places, axis, self.left, self.right),
+            "cut": match_cut_faces(self.mesh, axis, self.left, self.right),
         }
         return JointDefinition(**(given | changes))
 

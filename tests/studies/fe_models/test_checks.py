@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from studies.fe_models.checks import (
+from studies.fe_models.deck.read import read_deck
+from studies.fe_models.from_files.export_mistakes import (
     check_contact_removed,
     check_mass,
     check_mesh_is_of_matrices,
     check_nodes_have_dofs,
     check_speed,
-    check_units,
     mass_of,
     omega_squared_of,
-    rotation_of_deck,
 )
-from studies.fe_models.deck.read import read_deck
+from studies.fe_models.from_files.solid import check_units, rotation_of_deck
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.model_files import find_units
@@ -98,7 +97,7 @@ def test_contact_still_in_the_stiffness(tmp_path):
             check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), units)
     removed = "*MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE\nBLADES,DISKS\n*EQUATION,REMOVE ALL"
     deck, matrices = exported(tmp_path, changed("*EQUATION,REMOVE ALL", removed, text))
-    assert len(deck.ties) == 1  # what a step removes that writes matrices belongs to the model
+    assert len(deck.contact_pairs) == 1  # what a step removes that writes matrices belongs to the model
     check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), SI)
 
 

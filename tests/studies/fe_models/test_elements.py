@@ -149,5 +149,5 @@ def test_inverted_element_is_named():
     nodes[3] = nodes[3, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
     wrong = SolidMesh(mesh.coordinates, mesh.numbers, (ElementGroup("C3D10", nodes, group.numbers, STEEL),))
     check_elements(mesh)
-    with pytest.raises(SceneError, match=r"element 4 \(C3D10\) is turned inside out"):
+    with pytest.raises(SceneError, match=r"element 4 is turned inside out"):
         check_elements(wrong)

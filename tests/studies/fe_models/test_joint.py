@@ -1,5 +1,7 @@
 """Surfaces, pairing, cut faces: each against closed forms, and what is said of wrong ones."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -60,15 +62,15 @@ def test_closest_points_against_a_search(kind):
     surface = surface_where(mesh, "OUTSIDE", reference[:, 0] == 1.0)
     rng = np.random.default_rng(1)
     points = tube(np.column_stack([1.1 + 0.0 * rng.random(12), rng.uniform(-0.1, 1.1, 12), rng.uniform(-0.1, 1.1, 12)]))
-    found = closest_points(points, surface, mesh.coordinates)
+    weights, distances = closest_points(points, surface, mesh.coordinates)
 
     def on_quad(place, corners):
         (a, b, c, d), (x, y) = corners, place
         return (1 - x) * (1 - y) * a + x * (1 - y) * b + x * y * c + (1 - x) * y * d
 
-    for point, distance in zip(points, found.distance, strict=True):
+    for point, distance in zip(points, distances, strict=True):
         best = np.inf
-        for facet in [*surface.triangles[:, [0, 1, 2, 2]], *surface.quads]:
+        for facet in surface.facets:
             corners = mesh.coordinates[facet]
 
             def away(place, corners=corners, point=point):
@@ -76,12 +78,9 @@ def test_closest_points_against_a_search(kind):
 
             best = min(best, minimize(away, [0.4, 0.4], bounds=[(0, 1)] * 2, tol=1e-14).fun)
         assert distance == pytest.approx(np.sqrt(best), abs=1e-6)
-    assert np.allclose(found.weights.sum(axis=1), 1.0)
-    known = found.nodes >= 0
-    assert (found.weights[~known] == 0.0).all()
+    assert np.allclose(weights.sum(axis=1), 1.0)
     # the point on the curved face is the foot of the perpendicular where that is inside
-    places = np.einsum("pn,pnj->pj", found.weights, mesh.coordinates[np.where(known, found.nodes, 0)])
-    assert (np.linalg.norm(places - points, axis=1) < found.distance + 0.08).all()
+    assert (np.linalg.norm(weights @ mesh.coordinates - points, axis=1) < distances + 0.08).all()
 
 
 def blocks_on_each_other(lower, upper, lower_divisions, upper_divisions, lift=0.0):
@@ -147,18 +146,18 @@ def test_cut_faces_are_matched_and_found():
     mesh = sector.mesh
     axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
     shuffled = np.random.default_rng(0).permutation(sector.left)
-    cut = match_cut_faces(*sector.places, axis, sector.right, shuffled)
+    cut = match_cut_faces(mesh, axis, sector.right, shuffled)
     turned = mesh.coordinates[cut.left] @ cut.rotation.T
     assert np.allclose(turned, mesh.coordinates[cut.right], atol=1e-10)
     assert np.array_equal(np.sort(cut.left), sector.left)
-    found = find_cut_faces(*sector.places, axis, NONE)
+    found = find_cut_faces(mesh, axis, NONE)
     assert dict(zip(found.left, found.right, strict=True)) == dict(zip(cut.left, cut.right, strict=True))
     # about another axis through another point
     frame = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
     frame *= np.linalg.det(frame)
     moved = mesh.coordinates @ frame.T + [1.0, 2.0, 3.0]
     tilted = CyclicAxis(N_SECTORS, np.array([1.0, 2.0, 3.0]), frame @ Z)
-    again = match_cut_faces(moved, mesh.numbers, mesh.bodies, tilted, sector.left, sector.right)
+    again = match_cut_faces(replace(mesh, coordinates=moved), tilted, sector.left, sector.right)
     assert np.array_equal(again.left[np.argsort(again.left)], np.sort(cut.left))
     assert np.allclose(again.rotation @ frame, frame @ cut.rotation, atol=1e-12)
 
@@ -168,11 +167,11 @@ def test_wrong_cut_faces_are_named():
     mesh = sector.mesh
     axis = CyclicAxis(47, np.zeros(3), Z)
     with pytest.raises(SceneError, match=r"cut faces are 30 degrees apart, 47 sectors need 7\.66"):
-        match_cut_faces(*sector.places, axis, sector.left, sector.right)
+        match_cut_faces(mesh, axis, sector.left, sector.right)
     with pytest.raises(SceneError, match=r"no node has an image under rotation by 7\.66 degrees"):
-        find_cut_faces(*sector.places, axis, NONE)
+        find_cut_faces(mesh, axis, NONE)
     axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
     coordinates = mesh.coordinates.copy()
     coordinates[sector.left[2]] += [1e-3, 0.0, 0.0]
     with pytest.raises(SceneError, match=f"1 nodes of one cut face have no image .*: {mesh.numbers[sector.left[2]]}"):
-        match_cut_faces(coordinates, mesh.numbers, mesh.bodies, axis, sector.left, sector.right)
+        match_cut_faces(replace(mesh, coordinates=coordinates), axis, sector.left, sector.right)

@@ -7,16 +7,14 @@ import pytest
 
 from studies.fe_models.from_files.check import describe_model
 from studies.fe_models.from_files.imported import order_by_nodes
-from studies.fe_models.from_files.model import find_files, load_model
+from studies.fe_models.from_files.model import find_files, load_model, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.from_files.scene import reduce_model
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.model_files import find_units
 from studies.finite_element.joint_model import ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
-from studies.scenes import shrouded_sector
 from tests.studies.fe_models.decks import listed_frequencies
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
 from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, needs_ccx, node_set, run_ccx
@@ -89,7 +87,7 @@ def test_matrices_of_calculix(kind, tmp_path):
     model = replace(ordered.model, rotation=rotation)
     scene = build_fe_scene(model, sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
     expected = calculix_frequencies(tmp_path, lines, (0, 3, 6), "*STEP, PERTURBATION")
-    own = np.array([scene.summary.glued_frequencies[k] for k in (0, 3, 6)])
+    own = np.array([scene.glued_frequencies[k] for k in (0, 3, 6)])
     assert np.abs(own / expected - 1.0).max() < 2e-5
     # the mesh says the same
     other = build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
@@ -103,7 +101,7 @@ def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
     """The same matrices as the bundled scene; its shrouds, one sector apart, are no cut faces. The order of the names
     does not matter.
     """
-    model, joint = shrouded_sector.define_sector(stubby(N_SECTORS))
+    model, joint = stubby(N_SECTORS).define_sector()
     (contact,), lines = joint.contacts, deck_lines(model.mesh)
     sets = {"BORE": np.flatnonzero(joint.held[:, 0]), "LEAD": contact.first.nodes, "TRAIL": contact.second.nodes}
     for name, rows in sets.items():
@@ -130,7 +128,7 @@ def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
 
 def test_stuck_shrouds_are_those_of_calculix(tmp_path):
     """With elements that are the same in both programs: incompatible modes of twisted elements are not."""
-    model, joint = shrouded_sector.define_sector(stubby(N_SECTORS))
+    model, joint = stubby(N_SECTORS).define_sector()
     groups = tuple(replace(each, kind="C3D8") for each in model.mesh.groups)
     model = replace(model, mesh=replace(model.mesh, groups=groups))
     (contact,) = joint.contacts

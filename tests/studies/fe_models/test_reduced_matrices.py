@@ -9,15 +9,13 @@ from scipy.linalg import eigh
 from solver import build_model
 from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
 from studies.fe_models.from_files.check import describe_model
-from studies.fe_models.from_files.model import find_files, load_model
+from studies.fe_models.from_files.model import find_files, load_model, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.from_files.scene import reduce_model
 from studies.finite_element.pairing import local_frames
 from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
-from studies.scene_answers import stuck_frequencies
+from studies.scene import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scene_file import read_scene, write_scene
-from studies.scenes import shrouded_sector
 from tests.studies.fe_models.matrix_files import REDUCED
 from tests.studies.shrouded_ring import stubby
 
@@ -43,7 +41,7 @@ class Sector:
     """
 
     def __init__(self):
-        model, self.joint = shrouded_sector.define_sector(PARAMETERS)
+        model, self.joint = PARAMETERS.define_sector()
         self.mesh, contact, cut = model.mesh, self.joint.contacts[0], self.joint.cut
         loose = ~self.joint.held.any(axis=1)
         self.left, self.right = cut.left[loose[cut.left]], cut.right[loose[cut.right]]

@@ -13,9 +13,8 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from studies.finite_element.pairing import ContactPairs
-from studies.scene_answers import SurfaceMesh
-from studies.scenes.dovetail_parameters import Parameters
-from studies.scenes.dovetail_sector import define_sector, describe_mesh
+from studies.scene import SurfaceMesh
+from studies.scenes.dovetail_sector import Parameters
 from studyrunner.report.contents import FIGURES
 from studyrunner.report.drawing import COLUMN_WIDTH, Drawing, fit_into_column, plotted_values, style
 from studyrunner.result.view import Result
@@ -68,9 +67,9 @@ def check_print(figure: Figure, width_in_print: float, name: str) -> None:
 def dovetail(density: int = 1) -> tuple[ContactPairs, SurfaceMesh]:
     """Pairs and mesh of the dovetail sector. density: of its mesh."""
     parameters = Parameters(friction_coefficient=0.5, mesh=density)
-    pairs = define_sector(parameters)[1].pairs
+    pairs = parameters.define_sector()[1].pairs
     assert pairs is not None
-    return pairs, describe_mesh(parameters)
+    return pairs, parameters.describe_mesh()
 
 
 def dovetail_file(density: int = 1, **options: Any) -> xr.Dataset:

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing
 from studyrunner.report.figures.flanks import find_flanks

@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 
-from studies.scene_answers import SurfaceMesh
+from studies.scene import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.page.data import build_page_data, build_root_numbers

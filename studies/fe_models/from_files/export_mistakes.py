@@ -1,4 +1,4 @@
-"""Mistakes in the export of a model: one function for each mistake, from the deck and the matrices alone.
+"""Mistakes in the export of matrices: one function for each, from the deck and the matrices alone.
 
 Each function raises SceneError with one sentence where the mistake was made, and otherwise returns what it has found.
 """
@@ -6,13 +6,13 @@ Each function raises SceneError with one sentence where the mistake was made, an
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from studies.fe_models.deck.contents import Deck
+from studies.fe_models.from_files.solid import SPEED_AGREES
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.model_files import Units
 from studies.fe_models.text import FloatArray, IntArray
@@ -53,9 +53,6 @@ _REMEDIES = {
 _COUPLED = 1e-9
 """Relative stiffness between two surfaces above which they are coupled."""
 
-_SPEED_AGREES = 1e-3
-"""Relative difference of two speeds that are the same."""
-
 _ROUNDING = 1e-13
 """Of an entry in a file: 14 digits, and what the code itself rounds."""
 
@@ -64,12 +61,6 @@ _MASS_AGREES = 0.02
 
 _LEAST_SHARE = 0.1
 """Of the mass that matrices without the fixed nodes have at least."""
-
-_LEAST_DENSITY, _LARGEST_DENSITY = 1e-2, 3e4
-"""kg/m3 over the box around a model: from a blade thin and oblique in its box to solid metal."""
-
-_SOFTEST, _STIFFEST = 5e5, 2e12
-"""Young's moduli, Pa, from rubber to diamond. One of several materials may be stiffer, to stand for what is rigid."""
 
 
 def check_translations(matrices: Matrices) -> None:
@@ -152,7 +143,7 @@ def mass_by_density(deck: Deck) -> float | None:
         for section in deck.sections:
             found = deck.materials.get(section.material)
             if found is not None and found.density is not None:
-                density[np.isin(block.numbers, deck.element_sets[section.element_set])] = found.density
+                density[np.isin(block.numbers, section.elements)] = found.density
         places = deck.coordinates[deck.rows_of_nodes(block.nodes)]
         mass += float(density @ element_volumes(ELEMENT_KINDS[block.kind], places))
     return None if math.isnan(mass) else mass
@@ -175,29 +166,6 @@ def check_mesh_is_of_matrices(deck: Deck, matrices: Matrices) -> None:
     if not np.isin(matrices.node, deck.node_numbers).any():
         found = f"{matrices.files[0]} and {deck.path} have no node in common"
         raise SceneError("matrices", found, "give the mesh that the matrices were made of")
-
-
-def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
-    """The rotation, SI, of the centrifugal loads, None where there is none.
-
-    Raises SceneError where parts of the model turn differently, or not at all.
-    """
-    loads = deck.centrifugal
-    if not loads:
-        return None
-    for one, other in pairwise(loads):
-        if not math.isclose(one.omega_squared, other.omega_squared, rel_tol=_SPEED_AGREES):
-            speeds = [f"{load.name} at {math.sqrt(load.omega_squared):g} rad/s" for load in (one, other)]
-            raise SceneError("model", f"{deck.path}: {' and '.join(speeds)}", "give all of the model one speed")
-        if abs(one.axis @ other.axis) < 1 - 1e-9:
-            found = f"{deck.path}: {one.name} and {other.name} turn about axes that differ"
-            raise SceneError("model", found, "give all of the model one axis")
-    elements = np.concatenate([block.numbers for block in deck.blocks] or [np.empty(0, dtype=np.int64)])
-    turning = np.unique(np.concatenate([load.elements for load in loads]))
-    if turning.size and turning.size < elements.size:
-        found = f"{deck.path}: {turning.size} of {elements.size} elements have a centrifugal load"
-        raise SceneError("model", found, "give it to all of them")
-    return Rotation(loads[0].omega_squared, loads[0].point * units.length, loads[0].axis)
 
 
 def omega_squared_of(deck: Deck, matrices: Matrices, axis: FloatArray) -> float | None:
@@ -228,7 +196,7 @@ def check_speed(deck: Deck, matrices: Matrices, rotation: Rotation, *, of_study:
     rotation: SI. Raises SceneError where it has another speed. of_study: whether the study gives it, not the deck.
     """
     held = omega_squared_of(deck, matrices, rotation.axis)
-    if held is None or math.isclose(held, rotation.omega_squared, rel_tol=2.0 * _SPEED_AGREES):
+    if held is None or math.isclose(held, rotation.omega_squared, rel_tol=2.0 * SPEED_AGREES):
         return held
     speed, own = math.sqrt(rotation.omega_squared), math.sqrt(held)
     if of_study:
@@ -236,40 +204,3 @@ def check_speed(deck: Deck, matrices: Matrices, rotation: Rotation, *, of_study:
         raise SceneError("rotation_speed", found, "export the matrices at this speed, or leave it out")
     found = f"the deck spins at {speed:.6g} rad/s, the stiffness holds {own:.6g}"
     raise SceneError("matrices", found, _REMEDIES[matrices.code][2] if held == 0 else "give the files of one run")
-
-
-def check_units(deck: Deck, mass: float | None, units: Units) -> None:
-    """Tests that mass and extent are those of a body of real material.
-
-    mass: of the model, in units of the file; None where only the density of the deck is known. units: of the files
-    according to the user.
-    """
-    used = np.unique(np.concatenate([block.nodes.ravel() for block in deck.blocks] or [deck.node_numbers]))
-    points = deck.coordinates[deck.rows_of_nodes(used)]
-    sides = np.ptp(points, axis=0)
-    extent = float(sides.max())
-    if mass is not None:
-        density = mass / math.prod(np.maximum(sides, 1e-6 * extent)) if extent > 0 else math.inf
-        found = f"mass {mass:.2g} {units.label_of_mass}, extent {extent:.3g} {units.label_of_length}"
-    else:
-        densities = [material.density for material in deck.materials.values() if material.density is not None]
-        if not densities:
-            return
-        density = max(densities)
-        found = f"density {density:.3g} {units.label_of_mass}/{units.label_of_length}3"
-    if not _LEAST_DENSITY <= density * units.density <= _LARGEST_DENSITY:
-        raise SceneError("units", f"{found}: not {units.name}", 'give `units` that fit, "SI" or "mm-t-s"')
-    if mass is None:
-        _check_moduli(deck, units)
-
-
-def _check_moduli(deck: Deck, units: Units) -> None:
-    """Tests that a material has a possible modulus."""
-    moduli = [(material.young, name) for name, material in deck.materials.items() if material.young is not None]
-    if not moduli:
-        return
-    (softest, soft), (stiffest, stiff) = min(moduli), max(moduli)
-    if softest * units.stress > _STIFFEST or stiffest * units.stress < _SOFTEST:
-        young, name = (softest, soft) if softest * units.stress > _STIFFEST else (stiffest, stiff)
-        found = f"Young's modulus of {name} is {young * units.stress:.3g} Pa: not {units.name}"
-        raise SceneError("units", found, 'give `units` that fit, "SI" or "mm-t-s"')

@@ -1,0 +1,207 @@
+"""What a scene is: its parameters, its reduced model, and what it can tell beside the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, with_contact_stiffness
+from solver.contact.wear_law import ARCHARD, WearLaw
+from solver.model import FloatArray, IntArray, ReducedModel
+from studies.scene_error import SceneError
+
+N_MODES = 6
+"""Number of natural frequencies that are given for each nodal diameter."""
+
+
+@dataclass(frozen=True)
+class SurfaceMesh:
+    """Outer faces of a finite-element mesh, for pictures.
+
+    nodes (n_nodes, 3): m. quads (n_quads, 4): nodes of each face, anticlockwise as seen from outside. parts: label of
+    the part that each face belongs to, e.g. "blade".
+    """
+
+    nodes: FloatArray
+    quads: IntArray
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class NaturalFrequencies:
+    """Natural frequencies with the joint stuck, undamped.
+
+    nodal_diameters: ascending; 0 only where the structure is no cyclic sector. frequencies (n_nodal_diameters,
+    N_MODES): Hz, ascending; NaN where there are fewer modes.
+    """
+
+    nodal_diameters: tuple[int, ...]
+    frequencies: FloatArray
+
+
+@dataclass(frozen=True)
+class ExpectedWear:
+    """What a study wears at most.
+
+    amplitude: largest excitation amplitude. per_slip_work: largest `k_w N`, m3/J: volume worn over slip work of a
+    cycle; inf where cycles have no end. volume, m3, and depth, m: at which the wear ends, inf where they end nothing.
+    """
+
+    amplitude: float
+    per_slip_work: float
+    volume: float = math.inf
+    depth: float = math.inf
+
+
+@dataclass(frozen=True)
+class WearQuestion:
+    """What an exact answer is asked for: wear and vibration at one frequency and excitation amplitude.
+
+    frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts. law: wear
+    law. worn_depth: m, of each pair at the count 0. changed: keys of a study that differ from their defaults, as
+    "wear.law"; there is no answer where a closed form does not know one of them.
+    """
+
+    frequency: float
+    excitation_amplitude: float
+    wear_coefficients: FloatArray
+    cycles: FloatArray
+    law: WearLaw = ARCHARD
+    worn_depth: float = 0.0
+    changed: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class ExactAnswer:
+    """Exact answer to a `WearQuestion`, NaN where it does not hold.
+
+    worn_volume (n_wear, n_cycles): m3, since the count 0. response_amplitude (n_wear, n_cycles, n_response):
+    amplitude of the first harmonic, m.
+    """
+
+    worn_volume: FloatArray
+    response_amplitude: FloatArray
+
+
+def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
+    """Lowest frequencies of every nodal diameter of a model with its joint stuck: no relative displacement moves.
+
+    Raises SceneError where nothing else moves, or nothing holds the stuck structure.
+    """
+    from scipy.linalg import LinAlgError, eigh  # where it is used: it takes a while to load
+
+    dofs = model.contact.dofs
+    frequencies = np.full((len(model.linear), N_MODES), np.nan)
+    for row, (k, linear) in enumerate(sorted(model.linear.items())):
+        free = np.setdiff1d(np.arange(len(linear.stiffness)), dofs[dofs >= 0])
+        if len(free) == 0:
+            raise SceneError("variables", "natural_frequency", "leave it out: nothing moves where the joint sticks")
+        held = np.ix_(free, free)
+        try:
+            # M x = K x / w^2: a displacement without mass has no frequency, which is 0 here
+            inverse = eigh(linear.mass[held], linear.stiffness[held], eigvals_only=True)[::-1]
+        except LinAlgError:
+            remedy = f"leave it out: nothing holds the stuck structure at nodal diameter {k}"
+            raise SceneError("variables", "natural_frequency", remedy) from None
+        moving = inverse[inverse > np.finfo(np.float64).eps * len(free) * inverse[0]][:N_MODES]
+        frequencies[row, : len(moving)] = 1.0 / (2.0 * np.pi * np.sqrt(moving))
+    return NaturalFrequencies(tuple(sorted(model.linear)), frequencies)
+
+
+ContactStiffness = Annotated[
+    float | None,
+    Field(
+        gt=0,
+        le=LARGEST_CONTACT_STIFFNESS,
+        description="normal stiffness per area of rough surfaces; rigid if not given, N/m3",
+    ),
+]
+
+
+class Scene(BaseModel):
+    """Parameters of a bundled scene, and what follows from them. Units stand in the descriptions.
+
+    FRICTION_IN_MODEL: whether the reduced model depends on the friction coefficient. OFFERS: what a study may ask for
+    among `outputs.variables` that not every scene knows: "mesh", "exact".
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    FRICTION_IN_MODEL: ClassVar[bool] = False
+    OFFERS: ClassVar[tuple[str, ...]] = ()
+
+    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, 1")
+    contact_stiffness: ContactStiffness = None
+
+    def build(self, n_harmonics: int) -> ReducedModel:
+        """Reduced model without its contact stiffness, with all nodal diameters that the harmonics 0..n_harmonics see.
+
+        Raises SceneError where the parameters describe no possible structure.
+        """
+        del n_harmonics
+        return self.reduced_model()
+
+    def reduced_model(self) -> ReducedModel:
+        """The same of a scene whose harmonics all see one structure."""
+        raise NotImplementedError
+
+    def natural_frequencies(self, model: ReducedModel) -> NaturalFrequencies:
+        """Those that the scene knows; model: its reduced model. Raises SceneError."""
+        return stuck_frequencies(model)
+
+    def describe_mesh(self) -> SurfaceMesh:
+        """Outer faces of its mesh, of a scene that offers one. Raises SceneError."""
+        raise NotImplementedError
+
+    def exact_answer(self, asked: WearQuestion) -> ExactAnswer:
+        """The exact answer of a scene that offers one."""
+        raise NotImplementedError
+
+    def with_room_for_wear(self, expected: ExpectedWear) -> Scene:
+        """The scene with room for what it wears, where its pairs end at an artificial edge; else as it is."""
+        del expected
+        return self
+
+
+def as_scene(parameters: BaseModel) -> Scene:
+    """Parameters of a bundled scene; TypeError where they belong to another one."""
+    if not isinstance(parameters, Scene):
+        raise TypeError(f"{type(parameters).__qualname__} is no bundled scene")
+    return parameters
+
+
+_last_rigid: dict[str, ReducedModel] = {}
+
+
+def build_compliant(key: str, contact_stiffness: float | None, build: Callable[[], ReducedModel]) -> ReducedModel:
+    """A model with its contact stiffness, N/m3.
+
+    build: gives the model without it. The last of these models is kept under the key, which names all that the model
+    depends on: a study with many contact stiffnesses reduces its finite-element model once.
+    """
+    if contact_stiffness is None:
+        return build()
+    if key not in _last_rigid:
+        _last_rigid.clear()
+        _last_rigid[key] = build()
+    return with_contact_stiffness(_last_rigid[key], contact_stiffness)
+
+
+def make_compliant(model: ReducedModel, contact_stiffness: float | None) -> ReducedModel:
+    """A model with a contact stiffness, N/m3; as it is without one."""
+    return model if contact_stiffness is None else with_contact_stiffness(model, contact_stiffness)
+
+
+def list_keys(parameters: type[BaseModel]) -> str:
+    """Markdown: a list of keys of [scene] with default, meaning and unit."""
+    lines = []
+    for name, field in parameters.model_fields.items():
+        shown = f"{field.default:g}" if isinstance(field.default, float) else str(field.default).lower()
+        default = "" if field.default is None or field.is_required() else f" = {shown}"
+        lines.append(f"- `{name}{default}`: {str(field.description).removesuffix(', 1').removesuffix(', -')}")
+    return "\n".join(lines)
