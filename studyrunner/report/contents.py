@@ -18,10 +18,7 @@ WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
 
 _BANDS, _BARS = "Bands: estimated errors", "Bars: estimated errors, none where they are smaller than the markers"
 _OTHERS = "Each point is another joint, which wore at its own value of the horizontal axis"
-_QUANTILES = (
-    "So much is worn at most in 5, 25, 50, 75 and 95 % of the samples. Dashed: 5 and 95 %, with every sample less or"
-    " more its numerical error"
-)
+_QUANTILES = "So much is worn at most in 5, 25, 50, 75 and 95 % of the samples, each less or more its numerical error"
 CAPTIONS = {
     "blocks": "Cycles of one mission. A passage whose rate is far below (zeta f)² wears as its steady states do",
     "block_shares": f"Above, shares of the blocks in the volume worn in one mission. {_BANDS}",

@@ -6,17 +6,17 @@ import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from studyrunner.result.certainty import ADVICE, certainty_of, first_ended
 from studyrunner.result.opening import as_history
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import COMPLETE_WORDS, Result
+from studyrunner.summary.certainty import ADVICE, certainty_of, first_ended
 from studyrunner.summary.findings import (
     Finding,
     compare_meshes,
@@ -85,7 +85,7 @@ def summarise(result: Result) -> Summary:
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
     findings += [*_failures(result), *(Finding("doubt", "beware", doubt) for doubt in doubts[:1])]
     if certainty := certainty_of(result, wore=wore):
-        findings.append(Finding("certainty", "certainty", certainty.sentence, asdict(certainty)))
+        findings.append(certainty)
     return Summary(result.computed.size, int(result.computed.sum()), tuple(findings))
 
 

@@ -9,8 +9,8 @@ from studyrunner.api import open_result
 from studyrunner.report.contents import draw_report
 from studyrunner.report.page.page import write_page
 from studyrunner.report.selection import choose
-from studyrunner.result.certainty import certainty_of
 from studyrunner.result.view import open_for_report
+from studyrunner.summary.certainty import certainty_of
 from studyrunner.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure
@@ -78,11 +78,11 @@ def test_the_certainty_stands_on_the_page(tmp_path):
     fail(result.dataset, 4, 6, 20_000.0, "the wear rate is known to 2.6 % only")
     fail(result.dataset, 5, 15, 20_000.0)
     known = certainty_of(result)
-    assert (known.n_points, known.n_known, known.n_less, known.n_short) == (8, 2, 4, 2)
-    assert (known.worst, known.where) == (0.02, "202 Hz, implicit scheme")
+    assert [known.values[name] for name in ("n_known", "n_less", "n_unknown")] == [2, 4, 0]
+    assert (known.values["worst"], known.values["where"]) == (0.02, "202 Hz, implicit scheme")
     write_page(result, [], tmp_path / "index.html")
     html = unescape((tmp_path / "index.html").read_text(encoding="utf-8"))
-    assert known.sentence in html
+    assert known.text in html
 
 
 def test_an_inaccurate_state_is_no_volume_above_rtol():
@@ -92,7 +92,7 @@ def test_an_inaccurate_state_is_no_volume_above_rtol():
     assert float(result.errors.flat[0]) < 0.01
     assert not result.above.flat[0]
     known = certainty_of(result)
-    assert (known.n_known, known.n_less) == (2, 6)
+    assert (known.values["n_known"], known.values["n_less"]) == (2, 6)
 
 
 def test_a_point_at_its_target_is_drawn_where_it_ended():
