@@ -57,7 +57,23 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
     """
     try:
         target = Path(os.path.realpath(path))
-        remedy = _obstacle(option, path, target, inputs)
+        # the libraries that write it are given a text, not bytes
+        str(target).encode(sys.getfilesystemencoding())
+        # what leads to a stream, or to a file without a name, exists although its target does not
+        is_there, is_file = os.path.lexists(target) or path.exists(), target.is_file()
+        progress = Target(target).progress
+        is_input = is_file and any(source.exists() and target.samefile(source) for source in inputs)
+        faults = (
+            (not target.parent.is_dir(), f"give a file in a folder that exists: there is no folder {path.parent}"),
+            (is_there and not is_file, "give the name of an ordinary file"),
+            (is_file and not os.access(target, os.W_OK), "give a file that may be written: this is write-protected"),
+            (is_input, f"give another file with {option}: this one is read by the run"),
+            (
+                os.path.lexists(progress) and (progress.is_symlink() or not progress.is_file()),
+                f"give another name: {progress.name}, which the run needs, is no plain file",
+            ),
+        )
+        remedy = next((text for is_wrong, text in faults if is_wrong), "")
         if not remedy:
             trial = new_partial(target)
             with trial.open("xb") as file:
@@ -73,26 +89,6 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
     if remedy:
         raise UserError("command line", option, str(path), remedy)
     return target
-
-
-def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> str:
-    """Remedy for what keeps a file from being written to `target`; "" for nothing. Raises OSError."""
-    # the libraries that write it are given a text, not bytes
-    str(target).encode(sys.getfilesystemencoding())
-    if not target.parent.is_dir():
-        return f"give a file in a folder that exists: there is no folder {path.parent}"
-    # what leads to a stream, or to a file without a name, exists although its target does not
-    if os.path.lexists(target) or path.exists():
-        if not target.is_file():
-            return "give the name of an ordinary file"
-        if not os.access(target, os.W_OK):
-            return "give a file that may be written: this one is write-protected"
-        if any(source.exists() and target.samefile(source) for source in inputs):
-            return f"give another file with {option}: this one is read by the run"
-    progress = Target(target).progress
-    if os.path.lexists(progress) and (progress.is_symlink() or not progress.is_file()):
-        return f"give another name: {progress.name}, which the run needs, is no plain file"
-    return ""
 
 
 def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
