@@ -291,6 +291,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
         elif (halvings := halvings + 1) > ATTEMPTS:
             return None
         else:
+            # past a corner at the resonance: without, half of the sweeps up to 212.6 Hz of the dovetail begin anew
             ahead.insert(0, 0.5 * (states[-1].parameter + ahead[0]))
     return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
 

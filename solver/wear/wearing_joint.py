@@ -137,8 +137,7 @@ class WearingJoint:
         """Case and joint of a state. The last ones are stored; others drop the factorisation."""
         last = self._last
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
-            case = replace(self.case, hold=state.hold)
-            case = case.at(state.resolution)
+            case = replace(self.case, hold=state.hold).at(state.resolution)
             self.drop_factor()
         elif state.omega != last[1].omega:
             case = last[0]
