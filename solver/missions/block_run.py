@@ -239,7 +239,7 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
     if start.state is None or nodes is None or way == "continue":
         return start, None
     passed = tuple(nodes.passed) if nodes.here is not None and start.branch == 0 else ()
-    return start, Begun(passed, start, nodes.state.nodes.resolution)
+    return start, Begun(passed, start, nodes.path.case.resolution)
 
 
 def _by_earlier_sweep(case: BlockCase, begun: Begun) -> StartState | None:

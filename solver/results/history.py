@@ -62,8 +62,8 @@ class StartState:
     resolution: Resolution
     response_error: float
     wear_rate_error: float
-    newton_iterations: int
-    run_time: float
+    newton_iterations: int = 0
+    run_time: float = 0.0
     branch: int = 0
     fold_frequency: float = math.nan
     message: str = ""

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import left_out
-from solver.accuracy.resolved_state import NOTHING, Estimate
+from solver.accuracy.resolved_state import NOTHING, Estimate, left_out
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
