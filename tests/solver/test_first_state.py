@@ -18,10 +18,10 @@ from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.structure.condensation import condense
 from solver.structure.joint import Joint, build_case
-from studies.finite_element.element_matrices import Material
-from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, mean_motion
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene
+from studies.finite_element.solid_mesh import Material
 from studies.finite_element.surfaces import surface_of_faces
 from tests.random_decks import equilibrium_possible, law_errors, random_deck, run_deck
 from tests.random_scenes import random_scene
@@ -73,11 +73,11 @@ def stacked(force, direction=(0.0, 0.0, -1.0), interference=None, edge=False):
     faces = [surface_of_faces(mesh, name, *faces_where(mesh, one)) for name, one in zip("UL", inside, strict=True)]
     held, top = np.zeros((mesh.n_nodes, 3), bool), upper & (z > above + 0.0049)
     held[(z < 1e-9) | top if interference is not None else ~upper & (x < 1e-9)] = True
-    pressed = SetMotion(np.flatnonzero(top & (y < 1e-9) if edge else top), np.array(direction))
-    tip = SetMotion(np.flatnonzero(upper & (x > 0.0399)), np.array([0.0, 1.0, 0.0]))
+    pressed = mean_motion(np.flatnonzero(top & (y < 1e-9) if edge else top), np.array(direction), mesh.n_nodes)
+    tip = mean_motion(np.flatnonzero(upper & (x > 0.0399)), np.array([0.0, 1.0, 0.0]), mesh.n_nodes)
     contact = ContactSurfaces(*faces, tolerance=1e-3, with_gaps=interference is not None)
     joint = JointDefinition((contact,), held, tip, {"tip": tip})
-    model = MeshModel(mesh, preload=pressed.row(mesh.n_nodes) * force)
+    model = FeModel(mesh, preload=pressed * force)
     return build_fe_scene(model, joint, ReductionOptions(n_modes=10), 1).model
 
 
