@@ -213,7 +213,7 @@ class Course:
 
 
 class SlowProblem(Protocol):
-    """What is integrated. The next step depends on the state alone; a state is frozen and packable.
+    """What is integrated. The next step depends on state and course alone; both are frozen and packable.
 
     name: tells apart histories that belong together. course: before the first step. budget: Newton iterations so far,
     and the deadline. iterations_per_save: iterations after which the progress is saved.
