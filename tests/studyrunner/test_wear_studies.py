@@ -34,7 +34,7 @@ def test_a_history_is_known_by_its_law_and_a_start_state_is_not():
     for wear in ((), ("wear.law=energy",), ("wear.surfaces={support=2.0}",), ("slow_time.until={wear_depth=1}",)):
         plan = plan_of(read_study("sdof_slider", (*SHORT, *wear)), FACTS.n_displacements)
         of = Identity((FACTS.digest,), "kind")
-        found.append((plan.sweeps[0].names(of), plan.results[0].names(of)))
+        found.append((plan.sweeps[0].hashes(of), plan.results[0].hashes(of)))
     starts, histories = map(set, zip(*found, strict=True))
     assert (len(starts), len(histories)) == (1, 4)
 
@@ -68,8 +68,8 @@ def test_points_end_at_their_target_each_at_its_own_count():
     assert 0.0 < errors[0] < 0.05 * counts[0]
     assert np.isnan([counts[2], errors[2]]).all()
     assert result.outcome.values.tolist() == [0, 0, 0]
-    life = summary(whole).life
-    assert (life.count.value, life.count.error, life.n_beyond) == (counts[0], errors[0], 1)
+    life = summary(whole).values["life"]
+    assert (life["count"], life["error"], life["n_beyond"]) == (counts[0], errors[0], 1)
     for message, words_of in zip(result.message.values, ("at its target", "at its target", "stays below"), strict=True):
         assert words_of in message
     assert result.worn_volume.isel(cycle=-1).isnull().values.tolist() == [True, True, False]

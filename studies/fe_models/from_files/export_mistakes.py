@@ -16,9 +16,8 @@ from studies.fe_models.from_files.solid import SPEED_AGREES
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.model_files import Units
 from studies.fe_models.text import FloatArray, IntArray
-from studies.finite_element.element_matrices import element_volumes
 from studies.finite_element.elements import ELEMENT_KINDS
-from studies.finite_element.solid_mesh import Rotation
+from studies.finite_element.solid_mesh import Rotation, volumes_of_points
 from studies.scene_error import SceneError
 
 _PAIR, _CONTACT = "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair", "remove the contact between them"
@@ -118,7 +117,7 @@ def check_mass(deck: Deck, matrices: Matrices, units: Units) -> None:
         for section in deck.sections:
             density[np.isin(block.numbers, section.elements)] = deck.materials[section.material].density
         places = deck.coordinates[deck.rows_of_nodes(block.nodes)]
-        expected += float(density @ element_volumes(ELEMENT_KINDS[block.kind], places))
+        expected += float((density @ volumes_of_points(ELEMENT_KINDS[block.kind], places)).sum())
     whole = np.isin(np.concatenate([block.nodes.ravel() for block in deck.blocks]), matrices.node).all()
     least = 1 - _MASS_AGREES if whole else _LEAST_SHARE
     # of a deck that lacks a density nothing is known

@@ -13,8 +13,7 @@ from studies.fe_models.deck.contents import Deck
 from studies.fe_models.from_files.parameters import MaterialTable, Parameters
 from studies.fe_models.model_files import Units
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.element_matrices import Material
-from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
+from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.scene_error import SceneError
 
 SPEED_AGREES = 1e-3
