@@ -17,7 +17,7 @@ from studies.fe_models.from_files.export_mistakes import check_nodes_have_dofs
 from studies.fe_models.from_files.imported import import_matrices, read_recovery
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import Selections, find_clamped, find_cut, find_surfaces
-from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_cyclic_axis, find_rotation
+from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
 from studies.fe_models.model_files import UNITS, ModelFiles, Units, file_digest
@@ -114,7 +114,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     selections = Selections(deck, mesh, parameters, units)
     if not files.matrices:
         _check_assembled(deck, units)
-    rotation, axis = find_rotation(deck, parameters, units), find_cyclic_axis(deck, parameters, units)
+    rotation, axis = find_axes(deck, parameters, units)
     contacts, ties = find_surfaces(selections, axis)
     cut, clamped = find_cut(selections, axis, contacts), find_clamped(selections)
     on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
