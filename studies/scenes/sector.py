@@ -15,10 +15,10 @@ from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis
-from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
+from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh
 from studies.scene import N_MODES, Scene, SurfaceMesh, lowest
 from studies.scene_error import SceneError

@@ -21,8 +21,8 @@ from pydantic import Field
 
 from solver.model import FloatArray
 from studies.finite_element import surfaces
-from studies.finite_element.joint_model import FeModel, JointDefinition
 from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.structure import FeModel, JointDefinition
 from studies.scenes.sector import SectorParameters, block_of, graded, mesh_of_bodies
 
 

@@ -22,9 +22,9 @@ from pydantic import Field
 
 from solver.model import FloatArray
 from studies.finite_element import surfaces
-from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Material
+from studies.finite_element.structure import FeModel, JointDefinition, Retainer
 from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
 
 
