@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from solver.continuation.first_state import solve_static_state
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import Failure, State
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -221,6 +221,6 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
     possible = equilibrium_possible(structure.static_stiffness, structure.static_force, deck.friction)
     exists = {True: "possible", False: "impossible", None: "at the limit"}[possible]
     point = solve_static_state(joint, np.zeros(joint.contact.n_contact), Run(settings.tolerance))
-    if isinstance(point, Outcome):
-        return exists, point, {}
+    if isinstance(point, Failure):
+        return exists, point.outcome, {}
     return exists, Outcome.CONVERGED, law_errors(joint, point)

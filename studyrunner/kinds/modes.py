@@ -50,7 +50,7 @@ class Mode(JointTask):
         """Indices of the amplitudes in the order in which they are computed."""
         return up_or_down(len(self.amplitudes), self.direction)
 
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
         own = (identity.joint(self.joint), self.mode, self.direction, self.settings, identity.record)
         return tuple(digest("mode", *own, amplitude) for amplitude in self.amplitudes)
@@ -73,7 +73,7 @@ class Mode(JointTask):
                 "outcome": int(found.outcome),
             }
             values = named((*self.variables, *OF_A_MODE_POINT), own, found)
-            yield PointResult(self.points(wanted[place]), values, wanted[place])
+            yield PointResult(values, wanted[place])
 
     def describe(self, place: int) -> str:
         """Where along the amplitude."""
@@ -81,13 +81,13 @@ class Mode(JointTask):
 
 
 def build_tasks(
-    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[ContactChange]
+    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
 ) -> TaskPlan:
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
     amplitudes = study.axes.modal_amplitude or ()
     ascending = sorted(range(len(amplitudes)), key=lambda place: amplitudes[place])
     modes: dict[Mode, list[dict[str, int]]] = {}
-    for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
+    for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         joint = joint_of(part.study, scene, contact)
         of_part = dict(zip(study.axes_of_parts, part.place, strict=True))
         for at in grid(study, "mode", "sweep"):

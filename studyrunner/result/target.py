@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.hdf5 import is_hdf5, open_hdf5, read_attribute
+from studies.hdf5 import open_hdf5, read_attribute
 from studies.scene_error import SceneError
-from studies.scene_file import read_mesh
 from studyrunner.checkpoint.store import read_study
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.study.text import read_toml
@@ -113,18 +112,11 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
 
 
 def check_scene_file(option: str, path: Path, study: Study) -> Path:
-    """As `check_output`, of a scene file. Raises UserError also where a file exists that is no scene file."""
+    """As `check_output`, of a scene file. Raises UserError also where there is a file that holds anything."""
     target = check_output(option, path, study.files)
-    with contextlib.suppress(*_UNREADABLE):
-        if not target.exists() or target.stat().st_size == 0:
-            return target
-        if is_hdf5(target):
-            read_mesh(target)  # raises where there is anything but a scene
-            with open_hdf5(target) as file:
-                if read_attribute(file, "study") is None:
-                    return target
-    remedy = "give another name: this is no scene file, and is left as it is"
-    raise UserError("command line", option, str(target), remedy)
+    if target.exists() and target.stat().st_size:
+        raise UserError("command line", option, str(target), "give another name: there is such a file")
+    return target
 
 
 def _read_result(option: str, path: Path) -> tuple[str | None, bool]:

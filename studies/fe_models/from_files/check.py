@@ -65,8 +65,10 @@ def describe_model(
     progress("reduction with twice the modes")
     rows.append(("reduction", _reduction_error(loaded, scene.model, parameters)))
     rows.append(("rigid", f"{count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
-    if count_free_motions(scene.model):
-        rows.append(("warning", "motions are held by friction alone: give retention_stiffness"))
+    held = count_free_motions(scene.model)
+    if held:
+        verb = "motion is" if held == 1 else "motions are"
+        rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
     total = prepared.static_load.reshape(-1, 3)[placed].sum(axis=0)
     rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
     progress("state at rest")

@@ -34,12 +34,11 @@ from studies.scene_error import SceneError
 @dataclass(frozen=True)
 class NodalMatrices:
     """Matrices of another program, and forms of them by name with displacements node by node in x, y, z: nodes of the
-    mesh, then those of the matrices alone.
+    mesh, then those of the matrices alone, then rows of no place, as modal coordinates, three by three.
 
-    Rows that are no displacement of a node, as modal coordinates, stand three by three at the end, as if of nodes
-    without a place. missing (n_nodes, 3): displacements that the matrices do not have, which must be held. place
-    (n_dof,): of each row of the matrices in the displacements of the model. omega_squared_held: square of the speed at
-    which they were made, rad2/s2; None where they do not tell.
+    missing (n_nodes, 3): displacements that the matrices do not have, which must be held. place (n_dof,): of each row
+    of the matrices in the displacements of the model. omega_squared_held: square of the speed at which they were made,
+    rad2/s2; None where they do not tell.
     """
 
     matrices: Matrices

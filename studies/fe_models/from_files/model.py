@@ -20,7 +20,7 @@ from studies.fe_models.from_files.selections import Selections, find_clamped, fi
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_cyclic_axis, find_rotation
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
-from studies.fe_models.model_files import ModelFiles, Units, file_digest, find_units
+from studies.fe_models.model_files import UNITS, ModelFiles, Units, file_digest
 from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
@@ -55,10 +55,7 @@ def checked(parameters: BaseModel) -> Parameters:
 
 
 def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
-    """The files of a model, whose names are relative to a folder.
-
-    Raises SceneError where there are none of these names.
-    """
+    """The files of a model, whose names are relative to a folder. Raises SceneError where one is missing."""
     mesh, recovery = folder / model, None
     matrices = () if parameters.matrices is None else find_matrix_files(folder / parameters.matrices)
     if parameters.recovery is not None:
@@ -73,10 +70,7 @@ def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
 
 
 def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: Progress = silent) -> ReducedModel:
-    """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see.
-
-    Raises SceneError where the files or parameters describe no possible joint.
-    """
+    """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see. Raises SceneError."""
     own = checked(parameters)
 
     def reduced() -> ReducedModel:
@@ -97,14 +91,11 @@ def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, 
 def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:
     """Outer faces of the mesh. Raises SceneError."""
     own = checked(parameters)
-    return describe_mesh(build_solid_mesh(read_mesh_file(files.mesh), own, find_units(own.units)))
+    return describe_mesh(build_solid_mesh(read_mesh_file(files.mesh), own, UNITS[own.units]))
 
 
 def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
-    """Attributes of a scene or result file: the files with their SHA-256, their units, and what reduced them.
-
-    Raises SceneError or OSError where a file cannot be read.
-    """
+    """Attributes of a scene or result file: the files with their SHA-256, their units, and what reduced them."""
     mesh, *others = files.all
     paths = (mesh, *(mesh.parent / name for name in read_mesh_file(mesh).included), *others)
     return {
@@ -115,11 +106,8 @@ def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
 
 
 def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = silent) -> LoadedModel:
-    """Reads the files and puts the model together.
-
-    Raises SceneError where a file cannot be read, the study names what is not there, or what was exported is of no use.
-    """
-    units = find_units(parameters.units)
+    """Reads the files and puts the model together. Raises SceneError."""
+    units = UNITS[parameters.units]
     progress(f"reading {files.mesh.name}")
     deck = read_mesh_file(files.mesh)
     mesh = build_solid_mesh(deck, parameters, units)

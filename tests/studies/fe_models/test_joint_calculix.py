@@ -10,7 +10,7 @@ from studies.fe_models.from_files.imported import order_by_nodes
 from studies.fe_models.from_files.model import find_files, load_model, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.matrices.read import read_matrices
-from studies.fe_models.model_files import find_units
+from studies.fe_models.model_files import UNITS
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import Rotation
 from studies.finite_element.structure import FeModel, ReductionOptions
@@ -82,7 +82,7 @@ def test_matrices_of_calculix(kind, tmp_path):
     run_ccx(tmp_path, [*lines, "*STEP, PERTURBATION", "*BOUNDARY, OP=NEW", *EXPORT])
     rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
     given = read_matrices(tmp_path / "job")
-    ordered = order_by_nodes(given, find_units("SI"), sector.mesh)
+    ordered = order_by_nodes(given, UNITS["SI"], sector.mesh)
     assert not ordered.missing.any()
     model = FeModel(ordered.mesh, rotation, forms=ordered.forms)
     scene = build_fe_scene(model, sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
