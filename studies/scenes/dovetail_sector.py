@@ -110,6 +110,7 @@ class Parameters(SectorParameters):
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """As `SectorParameters.impossible`."""
+        yield from super().impossible()
         (bottom_radius, bottom_half_width), neck = self.flank_bottom, self.flank_top_half_width
         low = bottom_radius <= self.slot_bottom_radius + self.root_clearance
         remedy = "shorten the flanks or lower slot_bottom_radius, so that they end above the slot bottom"

@@ -66,19 +66,13 @@ class SectorParameters(Scene):
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """Whether parameters that are fine one by one do not go together, which one, and what would be right."""
-        raise NotImplementedError
+        for inner, outer in pairwise(self.ASCENDING):
+            below = getattr(self, inner)
+            yield below >= getattr(self, outer), outer, f"make it larger than {inner} = {below}"
 
     def check(self) -> None:
         """Raises SceneError where parameters do not go together."""
-        radii = (
-            (
-                getattr(self, inner) >= getattr(self, outer),
-                outer,
-                f"make it larger than {inner} = {getattr(self, inner)}",
-            )
-            for inner, outer in pairwise(self.ASCENDING)
-        )
-        for wrong, key, remedy in (*radii, *self.impossible()):
+        for wrong, key, remedy in self.impossible():
             if wrong:
                 raise SceneError(key, str(getattr(self, key)), remedy)
 

@@ -62,6 +62,7 @@ class Parameters(SectorParameters):
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """As `SectorParameters.impossible`."""
+        yield from super().impossible()
         wide = self._blade_half_angle(self.rim_radius, self.root_angle) > 0.9 * self.half_pitch
         remedy = "make it thinner, or use fewer blades, so that there is room between the blades"
         yield wide, "blade_thickness", remedy

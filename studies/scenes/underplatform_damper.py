@@ -84,6 +84,7 @@ class Parameters(SectorParameters):
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """As `SectorParameters.impossible`."""
+        yield from super().impossible()
         half, room = self.damper_half_width, 0.95 * self.half_pitch * self.platform_radius
         yield 0.5 * self.platform_gap >= half, "platform_gap", "make it smaller than the wedge is wide"
         remedy = "make it smaller, or use fewer blades, so that the wedge has room beside the shank"
