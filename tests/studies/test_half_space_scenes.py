@@ -12,19 +12,8 @@ from solver.settings import SolverSettings
 from studies import build_scene
 from studies.scene import ExpectedWear
 from studies.scenes import scene_parameters
-from studies.scenes.cylinder_on_flat import (
-    line_half_width,
-    line_stick_under_stroke,
-    line_stick_width,
-    line_worn_depth,
-)
-from studies.scenes.half_space import (
-    composite_modulus,
-    patch_compliance,
-    round_up,
-    strip_compliance,
-    worn_edge,
-)
+from studies.scenes.cylinder_on_flat import line_half_width, line_stick_under_stroke, line_stick_width, line_worn_depth
+from studies.scenes.half_space import composite_modulus, patch_compliance, round_up, strip_compliance, worn_edge
 from studies.scenes.sphere_on_flat import point_radius, point_stick_radius, point_stick_under_stroke, point_worn_depth
 from tests.studies.half_space_twin import compliances, limit_depth, pressed, solve_pressed
 
