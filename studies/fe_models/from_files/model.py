@@ -23,10 +23,10 @@ from studies.fe_models.meshes import read_mesh_file
 from studies.fe_models.model_files import UNITS, ModelFiles, Units, file_digest
 from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
 from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
 from studies.scene import SurfaceMesh, build_compliant
 from studies.scene_error import SceneError
