@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from studies.hdf5 import is_hdf5, open_hdf5, read_attribute
 from studies.scene_error import SceneError
-from studies.scene_file import has_mesh
+from studies.scene_file import read_mesh
 from studyrunner.checkpoint.store import read_study
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.study.text import read_toml
@@ -119,7 +119,7 @@ def check_scene_file(option: str, path: Path, study: Study) -> Path:
         if not target.exists() or target.stat().st_size == 0:
             return target
         if is_hdf5(target):
-            has_mesh(target)  # raises where there is anything but a scene
+            read_mesh(target)  # raises where there is anything but a scene
             with open_hdf5(target) as file:
                 if read_attribute(file, "study") is None:
                     return target

@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.scene import ExactAnswer, WearQuestion, as_scene, stuck_frequencies
+from studies.scene import as_scene, stuck_frequencies
 from studies.scene_error import SceneError
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build
@@ -69,10 +69,11 @@ def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
     bundled = scene.is_bundled and as_scene(scene.parameters)
     found = bundled.natural_frequencies(model) if bundled else stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()
-    labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
-    yield SmallArray("natural_frequency", entry.dimensions, found.frequencies, entry)
-    for name, values in labels.items():
-        yield SmallArray(name, (name,), np.array(values, dtype=np.int32), COORDINATES[name])
+    values = np.array(list(found.values()))
+    labels = {"nodal_diameter": list(found), "mode": range(1, values.shape[1] + 1)}
+    yield SmallArray("natural_frequency", entry.dimensions, values, entry)
+    for name, numbers in labels.items():
+        yield SmallArray(name, (name,), np.array(numbers, dtype=np.int32), COORDINATES[name])
 
 
 @dataclass(frozen=True)
@@ -164,15 +165,12 @@ def _answers(study: Study) -> dict[str, np.ndarray]:
     (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
     counts, given = np.array(study.output_counts), np.array(axes.wear_coefficient)
 
-    def answer(frequency: float, amplitude: float) -> ExactAnswer:
-        asked = WearQuestion(frequency, amplitude, given, counts, study.wear.as_law, depth, changed)
-        return as_scene(study.scene.parameters).exact_answer(asked)
-
-    answers = [[answer(one, other) for other in axes.excitation_amplitude] for one in axes.frequency]
-    others = (1,) * (len(study.own_axes) - 3)
+    scene: Any = study.scene.parameters
+    rest, others = (given, counts, study.wear.as_law, depth, changed), (1,) * (len(study.own_axes) - 3)
+    answers = [[scene.exact_answer(one, other, *rest) for other in axes.excitation_amplitude] for one in axes.frequency]
     found = {}
-    for name in SCENE["exact"]:
-        values = np.array([[getattr(each, name.removeprefix("exact_")) for each in row] for row in answers])
+    for place, name in enumerate(("exact_worn_volume", "exact_response_amplitude")):
+        values = np.array([[each[place] for each in row] for row in answers])
         # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
         values = np.swapaxes(values, 1, 2)
         found[name] = values.reshape(*values.shape[:3], *others, *values.shape[3:])

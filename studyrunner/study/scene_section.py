@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
 
 from studies.fe_models.model_files import ModelFiles
+from studies.fe_models.text import check_there
 from studies.scene import ContactStiffness, as_scene
 from studies.scene_error import SceneError
 from studies.scenes import scene_parameters
@@ -155,6 +156,9 @@ def check_scene(table: Mapping[str, Any], origin: Origin) -> SceneSection:
             raise UserError(origin.source, f"scene.{key}", table[key], "unknown key, give model")
     kind = parameters_of(model, origin.source)
     assert isinstance(model, str)
+    if _names_model(model) and origin.archived is None:  # a file that is missing is named before keys that are
+        with scene_errors(origin.source, None):
+            check_there(origin.path.parent / model)
     given = {key: value for key, value in table.items() if key not in ("model", "worn")}
     mistakes, worn = Mistakes(origin.source), None
     with mistakes.collecting():
@@ -205,10 +209,10 @@ def _find_scene(model: str, parameters: BaseModel, given: Mapping[str, Any], ori
 
 def _in_file(path: Path, group: str, origin: Origin) -> dict[str, Any]:
     """Where the scene stands and what it offers, once it is known that it can be read at all."""
-    from studies.scene_file import has_mesh
+    from studies.scene_file import read_mesh
 
     with scene_errors(origin.source, path):
-        return {"path": path, "group": group, "offers": ("mesh",) if has_mesh(path, group) else ()}
+        return {"path": path, "group": group, "offers": ("mesh",) if read_mesh(path, group) is not None else ()}
 
 
 class _OfResult(Section):
