@@ -179,8 +179,7 @@ def _describe(study: Study, options: argparse.Namespace) -> int:
     """What the options --plan, --check and --write-scene print and write."""
     from studyrunner.plan import plan_lines
     from studyrunner.result.target import check_output, check_scene_file
-    from studyrunner.scene.answers import check_study_model
-    from studyrunner.scene.scene import write_study_scene
+    from studyrunner.scene.answers import check_study_model, write_study_scene
     from studyrunner.system.progress import ProgressDisplay
 
     step = ProgressDisplay().step

@@ -6,7 +6,6 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
 
 from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
@@ -17,7 +16,7 @@ from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import SceneFacts, values_of_point
-from studyrunner.scene.scene_set import PlannedScenes, SceneSet, plan_scenes
+from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import MISSIONS, MODES, Study
 from studyrunner.system.progress import count, format_seconds
@@ -43,7 +42,7 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     none, or blocks of a mission differ in their pairs.
     """
     n_displacements = [each.n_displacements for each in facts]
-    contacts: Any = contact_changes(study, scenes, facts)
+    contacts = contact_changes(study, scenes, facts)
     if study.kind is MISSIONS:
         return missions.build_tasks(study, scenes, n_displacements, contacts)
     if study.kind is MODES:
@@ -72,27 +71,28 @@ def describe_tasks(tasks: Sequence[Task]) -> str:
 def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     """The plan of a study in lines. say: takes a line on the next step. Raises UserError where a scene is wrong."""
     before = largest_memory()
-    planned = plan_scenes(study, say)
+    scenes, facts, seconds_left = plan_scenes(study, say)
     built_with = largest_memory() - before
-    plan = build_tasks(study, planned.scenes, planned.facts)
-    seconds = time.process_time() + planned.seconds_left
+    plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
+    seconds = time.process_time() + seconds_left
     rows = [
-        *_of_study(study, planned, plan),
-        *_of_effort(study, planned.largest, plan, built_with, seconds),
+        *_of_study(study, facts, plan),
+        *_of_effort(study, largest, plan, built_with, seconds),
         *remarks_of_study(study),
-        *(("note", doubt) for doubt in doubts_of_study(study, planned.largest)),
+        *(("note", doubt) for doubt in doubts_of_study(study, largest)),
     ]
     return [f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows]
 
 
-def _of_study(study: Study, planned: PlannedScenes, plan: TaskPlan) -> Iterator[tuple[str, str]]:
-    facts, tasks = planned.largest, (*plan.sweeps, *plan.results)
+def _of_study(study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan) -> Iterator[tuple[str, str]]:
+    facts, tasks = merge_facts(of_scenes), (*plan.sweeps, *plan.results)
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
     contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
     yield "study", f"{study.study.name}: {study.study.title}".rstrip(": ")
     yield "scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"
-    if scenes := planned.describe():
-        yield "scenes", scenes
+    if len(of_scenes) > 1:
+        fewest = min(len(each.area) for each in of_scenes)
+        yield "scenes", f"{len(of_scenes)}, built once each, with {fewest} to {len(facts.area)} contact pairs"
     yield "points", f"{plan.n_points}" + (f" = {shape}" if shape else "")
     if study.follow is not None:
         what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import NotNegative, Positive, Section, Whole, Wrong
@@ -23,6 +23,7 @@ Of = Literal["all pairs", "each surface", "each pair"]
 OF_PAIRS = ("area", "friction_coefficient", "gap")
 """Inputs that may differ between the contact pairs; named as in a scene file."""
 
+_OF_ALL = ("friction_coefficient", "all pairs")
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
 _NOT_BELOW_ZERO = ("friction_coefficient", "surfaces_", "threshold", "wear_coefficient")
 
@@ -42,12 +43,11 @@ class Distribution(Section):
     LOCATION: ClassVar[str]
     WIDTHS: ClassVar[tuple[tuple[str, ...], ...]]
 
-    @model_validator(mode="after")
-    def _check(self) -> Distribution:
-        given = {key for key in type(self).model_fields if getattr(self, key) is not None} - {self.LOCATION}
-        if given not in [{*keys} - {self.LOCATION} for keys in self.WIDTHS]:
-            raise ValueError(f"give either {', or '.join(' and '.join(keys) for keys in self.WIDTHS)}")
-        return self
+    def rules(self) -> Iterator[Wrong]:
+        """One of the widths is given."""
+        given = self.model_dump(exclude_none=True)
+        if given.keys() - {self.LOCATION} not in [{*keys} - {self.LOCATION} for keys in self.WIDTHS]:
+            yield Wrong("", given, f"give either {', or '.join(' and '.join(keys) for keys in self.WIDTHS)}")
 
     @property
     def is_absolute(self) -> bool:
@@ -104,12 +104,12 @@ class Uniform(Distribution):
     high: float | None = None
     half_width: NotNegative | None = None
 
-    @model_validator(mode="after")
-    def _check_ends(self) -> Uniform:
+    def rules(self) -> Iterator[Wrong]:
+        """With both ends, in their order, or none."""
+        yield from super().rules()
         ends = [each for each in (self.low, self.high) if each is not None]
         if len(ends) == 1 or (ends and ends[0] >= ends[1]):
-            raise ValueError("give a low, and a high above it")
-        return self
+            yield Wrong("", self.model_dump(exclude_none=True), "give a low, and a high above it")
 
     def at(self, own: Array, score: Array) -> Array:
         """As `Distribution.at`."""
@@ -129,13 +129,11 @@ class Scattered(Section):
     of: Of = "all pairs"
     correlation_length: Positive | None = Field(None, description="m")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _has_one_distribution(cls, table: object) -> object:
-        if not isinstance(table, Mapping) or len(table.keys() & {"normal", "lognormal", "uniform"}) != 1:
-            remedy = "give a table with one distribution, normal or lognormal or uniform, as {normal = {std = 0.03}}"
-            raise ValueError(remedy)
-        return table
+    def rules(self) -> Iterator[Wrong]:
+        """It has one distribution."""
+        if sum(each is not None for each in (self.normal, self.lognormal, self.uniform)) != 1:
+            remedy = "give one distribution, normal or lognormal or uniform, as {normal = {std = 0.03}}"
+            yield Wrong("", self.model_dump(exclude_unset=True), remedy)
 
     @property
     def distribution(self) -> Distribution:
@@ -177,12 +175,18 @@ class ScatterSection(Section):
         return {name: extra[name] for name in sorted(extra, key=lambda name: (order.index(extra[name].of), name))}
 
     @property
+    def of_pairs(self) -> tuple[str, ...]:
+        """Inputs that belong to contact pairs: gaps, areas, a friction coefficient with draws of its own."""
+        inputs = self.inputs.items()
+        return tuple(name for name, each in inputs if name in OF_PAIRS and (name, each.of) != _OF_ALL)
+
+    @property
     def rows_a_sample(self) -> int:
         """Rows of the design for each of `samples`: A, B, and A with one input from B after the other (Saltelli)."""
         return 2 + len(self.inputs) if self.method == "saltelli" else 1
 
     @property
-    def realisations(self) -> int:
+    def n_rows(self) -> int:
         """Length of the dimension `sample`."""
         return self.samples * self.rows_a_sample
 
@@ -207,45 +211,39 @@ class ScatteredPairs:
     position: Array
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """What the samples draw of an input: standard normal scores (samples,), or (samples, n_pairs) where pairs differ,
-    of its distribution.
-    """
+def draw(
+    section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ScatteredPairs | None = None
+) -> dict[str, Array]:
+    """What the samples draw of each input that is the same for all pairs, (samples,) or (n_values, samples) of an axis;
+    with pairs of each input that belongs to them, (samples, n_pairs). Without width the study's own values, exactly.
 
-    score: Array
-    distribution: Distribution
-
-    def apply(self, own: ArrayLike) -> Array:
-        """The input (samples,) or (samples, n_pairs) of the study's own value, equal to it without width."""
-        own = np.asarray(own, dtype=np.float64)
-        score = self.score if own.ndim == 0 or self.score.ndim == 2 else self.score[:, None]
-        return np.zeros_like(own + score) + self.distribution.at(own, score)
-
-
-def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ScatteredPairs) -> dict[str, Drawn]:
-    """What the samples draw of each input that scatters, in the order of `section.inputs`.
-
-    own_values: of the study: a number, (n_pairs,), or (n_values, 1) for an axis; not needed for an absolute
+    own_values: of the study: a number, (n_values, 1) of an axis, (n_pairs,) of pairs; not needed for an absolute
     distribution. Raises WrongValueError, with its key, where physics forbids a draw, positions are missing, or a width
     is a share of 0.
     """
     from scipy.special import ndtri
 
-    inputs = section.inputs
-    labels = tuple(dict.fromkeys(pairs.surface))
-    widths = {"all pairs": 1, "each surface": len(labels), "each pair": len(pairs.surface)}
-    groups = [widths[each.of] for each in inputs.values()]
+    labels = () if pairs is None else tuple(dict.fromkeys(pairs.surface))
+    widths = {"each surface": len(labels), "each pair": 0 if pairs is None else len(pairs.surface)}
+    groups = [widths.get(each.of) or 1 for each in section.inputs.values()]
     design = unit_design(section.method, section.seed, section.samples, sum(groups), groups)
     scores = np.split(ndtri(design), np.cumsum(groups)[:-1], axis=1)
     found = {}
-    for (name, scattered), score in zip(inputs.items(), scores, strict=True):
-        if scattered.of == "each surface":
-            score = score[:, [labels.index(label) for label in pairs.surface]]
-        elif scattered.correlation_length is not None:
-            score = score @ _field(name, scattered.correlation_length, pairs).T
-        found[name] = Drawn(score if scattered.of != "all pairs" else score[:, 0], scattered.distribution)
-        _check(name, scattered, found[name], own_values.get(name, 0.0))
+    for (name, scattered), score in zip(section.inputs.items(), scores, strict=True):
+        if (name in section.of_pairs) == (pairs is None):
+            continue
+        own = np.asarray(own_values.get(name, 0.0), dtype=np.float64)
+        shape: tuple[int, ...] = (*own.shape[:-1], len(score))
+        if pairs is None:
+            score = score[:, 0]
+        else:
+            shape = (len(score), len(pairs.surface))
+            if scattered.of == "each surface":
+                score = score[:, [labels.index(label) for label in pairs.surface]]
+            elif scattered.correlation_length is not None:
+                score = score @ _field(name, scattered.correlation_length, pairs).T
+        found[name] = np.zeros(shape) + scattered.distribution.at(own, score)
+        _check(name, scattered.distribution, own, found[name])
     return found
 
 
@@ -260,21 +258,20 @@ def _field(name: str, length: float, pairs: ScatteredPairs) -> Array:
     distance = np.linalg.norm(pairs.position[:, None] - pairs.position[None], axis=2)
     surface = np.array(pairs.surface)
     covariance = np.where(surface[:, None] == surface, np.exp(-0.5 * (distance / length) ** 2), 0.0)
-    from scipy.linalg import cholesky  # here and below where they are used: they take a while to load
+    from scipy.linalg import cholesky  # where it is used: it takes a while to load
 
     covariance = (1.0 - _NUGGET) * covariance + _NUGGET * np.eye(len(covariance))
     return np.asarray(cholesky(covariance, lower=True))
 
 
-def _check(name: str, scattered: Scattered, draw: Drawn, own: ArrayLike) -> None:
-    """Refuses draws that physics forbids. own: numbers, or rows of values of all pairs."""
-    rows = np.atleast_2d(np.asarray(own, dtype=np.float64))
-    distribution = scattered.distribution
+def _check(name: str, distribution: Distribution, own: Array, values: Array) -> None:
+    """Refuses draws that physics forbids, and those that are a share of nothing."""
     shown = distribution.model_dump(exclude_none=True)
-    if not distribution.is_absolute and not rows.any() and not draw.apply(0.0).any() and draw.apply(1.0).std() > 0.0:
+    varies = distribution.at(np.array(1.0), np.array([-1.0, 1.0])).std() > 0.0
+    if not distribution.is_absolute and not own.any() and not values.any() and varies:
         remedy = "give a width in the unit of the input: the study's own value is 0, of which a share is nothing"
         raise WrongValueError(shown, remedy, f"scatter.{name}")
-    smallest = min(float(draw.apply(row).min()) for row in rows)
+    smallest = float(values.min())
     if (smallest < 0.0 and name.startswith(_NOT_BELOW_ZERO)) or (smallest <= 0.0 and name in _ABOVE_ZERO):
         remedy = f"give less width, or lognormal: a sample draws {smallest:.3g}, which {name} cannot be"
         raise WrongValueError(shown, remedy, f"scatter.{name}")

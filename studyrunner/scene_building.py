@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -21,17 +21,11 @@ from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.mapped_file import MappedFile, ranks_that_see, write_mapped
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
-from studyrunner.scene.answers import (
-    KeptScene,
-    SmallArray,
-    build_scene_variables,
-    exact_answers,
-    join_scene_variables,
-    scene_to_keep,
-)
-from studyrunner.scene.scene import InMemory, SceneFacts, build_study_scene, describe_scene, model_key
+from studyrunner.scene import answers
+from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, model_key
 from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
-from studyrunner.study.scene_axes import keys_as_given
+from studyrunner.study.mistakes import keys_as_given
+from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
 from studyrunner.system.files import new_partial
 from studyrunner.user_error import UserError
@@ -40,29 +34,21 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel
 
 
-MODELS_A_RANK = 2
+_MODELS_A_RANK = 2
 """Models, or sets of models of the blocks of a mission, that a rank holds where a study has several scenes."""
 
 Models = TypeVar("Models")
+ModelCache = OrderedDict[tuple[int, ...], Models]
+"""The models that a rank has computed with last, by the numbers of the scenes that a task needs. Rank 0 keeps such a
+list for each rank, without models."""
 
 
-class ModelCache(OrderedDict[tuple[int, ...], Models]):
-    """The models that a rank has computed with last, by the numbers of the scenes that a task needs.
-
-    Rank 0 keeps such a list for each rank, without models.
-    """
-
-    def use(self, scenes: tuple[int, ...]) -> bool:
-        """Whether the models are there; they are then the last to be removed."""
-        if scenes in self:
-            self.move_to_end(scenes)
-        return scenes in self
-
-    def add(self, scenes: tuple[int, ...], models: Models) -> None:
-        """Adds models; removes those that were not used for longest where there are too many."""
-        self[scenes] = models
-        if len(self) > MODELS_A_RANK:
-            self.popitem(last=False)
+def hold_models(cache: ModelCache[Models], scenes: tuple[int, ...], models: Models) -> None:
+    """Adds models, or uses them again; removes those that were not used for longest where there are too many."""
+    cache[scenes] = models
+    cache.move_to_end(scenes)
+    if len(cache) > _MODELS_A_RANK:
+        cache.popitem(last=False)
 
 
 class SceneModels:
@@ -78,10 +64,11 @@ class SceneModels:
 
     def with_model(self, rank: int, task: Task) -> Task:
         """The task as a rank gets it: with the models that the rank does not have."""
-        own = self._of_ranks.setdefault(rank, ModelCache())
-        if own.use(task.scenes):
+        own = self._of_ranks.setdefault(rank, OrderedDict())
+        is_there = task.scenes in own
+        hold_models(own, task.scenes, None)
+        if is_there:
             return task
-        own.add(task.scenes, None)
         used = {number for each in self._of_ranks.values() for scenes in each for number in scenes}
         for number in self._files.keys() - used:
             self._files.pop(number).remove()
@@ -99,11 +86,11 @@ class SceneModels:
 
 @dataclass(frozen=True)
 class SceneTask:
-    """One scene to build. study: of this scene alone. known: its model from an earlier run, by `model_key`."""
+    """One scene to build. study: of this scene alone. known: its model from an earlier run."""
 
     number: int
     study: Study
-    known: Mapping[str, Packed]
+    known: Packed | None = None
     cost: float = 1.0
     n_results: int = 1
     gives_starts: bool = False
@@ -119,7 +106,7 @@ class SceneBuilt:
     """
 
     facts: SceneFacts | None
-    variables: tuple[SmallArray, ...] = ()
+    variables: tuple[answers.SmallArray, ...] = ()
     model: Packed | None = None
     error: UserError | None = None
 
@@ -134,8 +121,8 @@ class Scenes:
 
     scenes: SceneSet
     facts: tuple[SceneFacts, ...]
-    variables: tuple[SmallArray, ...]
-    kept: KeptScene | None
+    variables: tuple[answers.SmallArray, ...]
+    kept: answers.KeptScene | None
     notes: tuple[str, ...]
     models: SceneModels
 
@@ -148,32 +135,23 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
     """
     scenes = find_scenes(study)
     seeing = ranks_that_see(ranks, new_partial(store.path))
-    kept, notes = None, tuple[str, ...]()
-    with keys_as_given(study.scene_axes):
+    building = _Building(scenes, store, say)
+    with keys_as_given(keys_below_axes(study.scene_axes)):
         if len(scenes.studies) > 1:
-            building = _Building(scenes, store, say)
             serve_tasks(ranks, building, build_scene_task)
-            store.flush()
-            built = [building.found[number] for number in range(len(scenes.studies))]
-            for each in built:
-                if each.error is not None:
-                    raise each.error
-            facts = tuple(each.facts for each in built if each.facts is not None)
-            variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
-            read = building.read
         else:
-            one = scenes.studies[0] if study.mission else study
-            model = build_study_scene(one, say, store)
-            if "natural_frequency" in study.scene_variables:
-                say("finding the natural frequencies of the scene")
-            facts, variables = (describe_scene(model),), build_scene_variables(one, model)
-            kept = scene_to_keep(one, model)
-
-            def read(number: int) -> ReducedModel:  # noqa: ARG001
-                return model
-
-    models = SceneModels(read, seeing, store.path)
-    return Scenes(at_ratios(scenes, facts), facts, (*variables, *exact_answers(study)), kept, notes, models)
+            (task,) = building.begin()
+            building.take(task, next(build_scene_task(task, say)))
+        store.flush()
+        built = [building.found[number] for number in range(len(scenes.studies))]
+        for each in built:
+            if each.error is not None:
+                raise each.error
+        facts = tuple(each.facts for each in built if each.facts is not None)
+        variables, notes = answers.join_scene_variables(study, scenes, [each.variables for each in built])
+        kept = answers.scene_to_keep(scenes.studies[0], building.read(0)) if len(built) == 1 else None
+    models = SceneModels(building.read, seeing, store.path)
+    return Scenes(at_ratios(scenes, facts), facts, (*variables, *answers.exact_answers(study)), kept, notes, models)
 
 
 class _Building(Office):
@@ -189,14 +167,16 @@ class _Building(Office):
 
     def begin(self) -> Iterator[SceneTask]:
         for number, (study, key) in enumerate(zip(self._studies, self._keys, strict=True)):
-            model = self._store.read_computed(key)
-            yield SceneTask(number, study, {} if model is None else {key: model})
+            yield SceneTask(number, study, self._store.read_computed(key))
 
     def take(self, task: SceneTask, result: SceneBuilt) -> Sequence[SceneTask]:
         if result.model is not None:
             self._store.keep_computed(self._keys[task.number], result.model)
-        self.found[task.number] = replace(result, model=None)
-        self._say(f"{len(self.found)} of {len(self._studies)} scenes are built")
+        # a single model may be too large for the file
+        several = len(self._studies) > 1
+        self.found[task.number] = replace(result, model=None) if several else result
+        if several:
+            self._say(f"{len(self.found)} of {len(self._studies)} scenes are built")
         return ()
 
     def tick(self, running: object) -> None:  # noqa: ARG002
@@ -204,21 +184,25 @@ class _Building(Office):
 
     def read(self, number: int) -> ReducedModel:
         """The model of a scene. Raises RuntimeError where it is no longer there."""
-        packed = self._store.read_computed(self._keys[number])
+        packed = self.found[number].model or self._store.read_computed(self._keys[number])
         if packed is None:
             raise RuntimeError(f"the model of scene {number} has gone")
         return unpack_model(packed)
 
 
-def build_scene_task(task: SceneTask, _: Callable[[object], None]) -> Iterator[SceneBuilt]:
-    """Builds one scene, or takes its model from an earlier run."""
+def build_scene_task(task: SceneTask, progress: Callable[[str], None]) -> Iterator[SceneBuilt]:
+    """Builds one scene, or takes its model from an earlier run, which is equal to the last bit (`solver.packing`)."""
+    known = None
+    # what is damaged, or of another version, is built again
+    with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
+        known = None if task.known is None else unpack_model(task.known)
     try:
-        model = build_study_scene(task.study, computed=InMemory(task.known))
-        variables = build_scene_variables(task.study, model)
+        model = build_study_scene(task.study, progress, known)
+        variables = answers.build_scene_variables(task.study, model, progress)
     except UserError as error:
         yield SceneBuilt(None, error=error)
         return
-    packed = None if task.known else pack_model(model)
-    if packed is None and not task.known:
+    packed = pack_model(model) if known is None else None
+    if known is None and packed is None:
         raise ValueError(f"the matrices of {task.study.scene.model} are not stored by rows")
     yield SceneBuilt(describe_scene(model), variables, packed)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections import Counter, defaultdict
+from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Keep, PointResult, Result, StartResult, Task
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Office, Run
-from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task
+from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task, hold_models
 from studyrunner.system.machine import MachineFaultError, tells_of_machine
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
@@ -40,16 +40,18 @@ def evaluator() -> Run:
 
     A task that breaks off gives failed results; the other tasks go on. A fault of the machine raises MachineFaultError.
     """
-    models: ModelCache[tuple[ReducedModel, ...]] = ModelCache()
+    models: ModelCache[tuple[ReducedModel, ...]] = OrderedDict()
 
     def own_models(task: Task) -> Models:
         # first of all: rank 0 sends the models once, also where the task breaks off
         if task.models:
-            given = (open_mapped(each) if isinstance(each, MappedFile) else each for each in task.models)
-            models.add(task.scenes, tuple(given))
-        elif not models.use(task.scenes):
+            given = tuple(open_mapped(each) if isinstance(each, MappedFile) else each for each in task.models)
+        elif task.scenes in models:
+            given = models[task.scenes]
+        else:
             raise RuntimeError(f"no model of scene {task.scenes} for {task}")
-        return dict(zip(task.scenes, models[task.scenes], strict=True))
+        hold_models(models, task.scenes, given)
+        return dict(zip(task.scenes, given, strict=True))
 
     def evaluate(task: Task | SceneTask, keep: Callable[[object], None]) -> Iterator[Result | SceneBuilt]:
         if isinstance(task, SceneTask):

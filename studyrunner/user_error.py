@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import date, time
 from pathlib import Path
 
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
@@ -83,7 +84,7 @@ class WrongValueError(ValueError):
     """A value that a check of one key refuses; the reader of the study adds the file and the key.
 
     value: the offending part of what stands there. remedy: what would be right.
-    key: dotted name where the check knows it better than the reader (a rule between two keys).
+    key: dotted name below that key, where a rule between keys refuses it.
     """
 
     def __init__(self, value: object, remedy: str, key: str | None = None) -> None:
@@ -112,6 +113,8 @@ def toml_value(value: object) -> str:
         return "{" + ", ".join(items) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(toml_value, value)) + "]"
+    if isinstance(value, date | time):
+        return value.isoformat()
     return json.dumps(value, ensure_ascii=False) if isinstance(value, bool | str) else repr(value)
 
 

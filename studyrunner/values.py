@@ -8,9 +8,9 @@ from __future__ import annotations
 import decimal
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from studyrunner.user_error import WrongValueError
 
@@ -23,7 +23,7 @@ _LARGEST_WHOLE = 2.0**53
 
 
 class Wrong(NamedTuple):
-    """What a rule between keys refuses: dotted key, the value that stands there, what would be right."""
+    """What a rule between keys refuses: dotted key, "" for the whole table, its value, what would be right."""
 
     key: str
     value: object
@@ -42,8 +42,14 @@ class Section(BaseModel):
     EXTRA: ClassVar[type[BaseModel] | None] = None
 
     def rules(self) -> Iterator[Wrong]:
-        """Rules between the keys of the table, whose values are all right by themselves: what breaks them."""
+        """What breaks a rule between the keys of the table, whose values are all right by themselves."""
         return iter(())
+
+    @model_validator(mode="after")
+    def _keep_rules(self) -> Self:
+        for key, value, remedy in self.rules():
+            raise WrongValueError(value, remedy, key)
+        return self
 
 
 def _no_text(value: object) -> object:
@@ -75,31 +81,34 @@ def ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def spread(value: object) -> tuple[Any, ...]:
-    """The values of an axis: one, a list of them or {start, stop, num}. Raises ValueError."""
+def read_axis(value: object) -> tuple[Any, ...]:
+    """The values of an axis, each once: one, a list of them or {start, stop, num}. Raises ValueError.
+
+    A range between whole numbers whose values are whole numbers gives whole numbers.
+    """
+    values = tuple(listed(value))
     if isinstance(value, dict):
         if value.keys() - {"spacing"} != {"start", "stop", "num"}:
             raise ValueError("give a number, a list or {start, stop, num}")
-        return Range.model_validate(value).values
-    if isinstance(value, list | tuple) and not value:
-        raise ValueError("give at least one value")
-    return tuple(listed(value))
+        values = Range.model_validate(value).values
+        if isinstance(value["start"], int) and isinstance(value["stop"], int):
+            values = tuple(int(each) if each == int(each) else each for each in values)
+    if not 0 < len(values) <= LONGEST_AXIS:
+        raise ValueError(f"give at least one value, and at most {LONGEST_AXIS}")
+    for each in values:
+        if not isinstance(each, bool | int | float | str):
+            raise WrongValueError(each, "give a number, true, false or a name, a list of them or {start, stop, num}")
+    return once(values)
 
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-Cycles = Annotated[float, Field(ge=0, allow_inf_nan=True)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 Whole = Annotated[int, Field(strict=False), BeforeValidator(_no_text)]
 """A whole number; 5.0 and 1e4 are whole numbers, too, true and "5" are not."""
-Mode = Annotated[Whole, Field(ge=1, le=1000)]
-Harmonics = Mode | Literal["auto"]
-Samples = Annotated[Whole, Field(ge=4, le=100_000)] | Literal["auto"]
-Scheme = Literal["implicit", "explicit", "adaptive", "final"]
-Sweep = Literal["up", "down", "ramp"]
 Listed = Annotated[tuple[T, ...], Field(strict=False)]
 """A list."""
-Axis = Annotated[tuple[T, ...], BeforeValidator(spread), AfterValidator(once)]
+Axis = Annotated[tuple[T, ...], BeforeValidator(read_axis)]
 """Values of an axis in the order in which they are given, at least one and each once."""
 
 
@@ -129,19 +138,3 @@ class Range(Section):
             first, last = (first.ln(), last.ln()) if is_log else (first, last)
             inner = (((num - 1 - place) * first + place * last) / (num - 1) for place in range(1, num - 1))
             return (start, *(float(value.exp() if is_log else value) for value in inner), stop)
-
-
-def read_axis(value: object) -> tuple[Any, ...]:
-    """Values of an axis of any kind: numbers, flags or names, each once. Raises ValueError.
-
-    A range between whole numbers whose values are whole numbers gives whole numbers.
-    """
-    values = spread(value)
-    for each in values:
-        if not isinstance(each, bool | int | float | str):
-            raise WrongValueError(each, "give a number, true, false or a name, a list of them or {start, stop, num}")
-    if isinstance(value, dict) and isinstance(value["start"], int) and isinstance(value["stop"], int):
-        values = tuple(int(each) if each == int(each) else each for each in values)
-    if len(values) > LONGEST_AXIS:
-        raise WrongValueError(len(values), f"give at most {LONGEST_AXIS} values")
-    return once(values)

@@ -81,13 +81,13 @@ class Mode(JointTask):
 
 
 def build_tasks(
-    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[ContactChange]
+    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
 ) -> TaskPlan:
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
     amplitudes = study.axes.modal_amplitude or ()
     ascending = sorted(range(len(amplitudes)), key=lambda place: amplitudes[place])
     modes: dict[Mode, list[dict[str, int]]] = {}
-    for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
+    for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         joint = joint_of(part.study, scene, contact)
         of_part = dict(zip(study.axes_of_parts, part.place, strict=True))
         for at in grid(study, "mode", "sweep"):

@@ -65,7 +65,7 @@ _Starts = dict[float, dict[WearLaw, list[_Point]]]
 
 
 def build_tasks(
-    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[ContactChange]
+    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
 ) -> TaskPlan:
     """Tasks of a study of wear.
 
@@ -95,11 +95,11 @@ def build_tasks(
     return TaskPlan(tuple(histories), left_out, study.n_points, tuple(sweeps))
 
 
-def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) -> dict[_Case, _Starts]:
+def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet) -> dict[_Case, _Starts]:
     """Points that one sweep reaches."""
     cases, own_axes = dict[_Case, _Starts](), study.own_axes
     lines = [(at, settings_at(study, at)) for at in grid(study, "excitation_amplitude", "sweep")]
-    for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
+    for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
         sizes = (range(len(getattr(axes, name))) for name in _OF_HISTORY)
         choices = [dict(zip(_OF_HISTORY, choice, strict=True)) for choice in itertools.product(*sizes)]

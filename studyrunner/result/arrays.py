@@ -12,15 +12,8 @@ from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.scene.answers import SmallArray
 from studyrunner.scene.pairs import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import (
-    PairArrays,
-    SceneSet,
-    frequencies_of_ratios,
-    merge_facts,
-    pair_arrays,
-    stuck_frequencies_of,
-)
-from studyrunner.study.realisation import block_of_input, draw_inputs
+from studyrunner.scene.scene_set import PairArrays, SceneSet, along_axes, merge_facts, pair_arrays
+from studyrunner.study.parts import block_of_input, draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
@@ -51,11 +44,13 @@ def small_arrays(
     study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SmallArray] = ()
 ) -> list[SmallArray]:
     """Coordinates of the file, and its variables that no task computes. of_scene: what the study asks of the scene."""
-    hertz = frequencies_of_ratios(study, facts, scenes)
+    names, stuck = along_axes(study, scenes, [np.array(each.stuck_frequency) for each in facts])
+    ratios = study.axes.frequency_ratio
+    hertz = [] if ratios is None else [(("frequency_ratio", *names), np.multiply.outer(ratios, stuck))]
     return [
-        *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
+        *(SmallArray("frequency", *each, COORDINATES["frequency"]) for each in hertz),
         *coordinates(study, merge_facts(facts), pair_arrays(study, facts, scenes)),
-        SmallArray("stuck_frequency", *stuck_frequencies_of(study, facts, scenes), STUCK_FREQUENCY),
+        SmallArray("stuck_frequency", names, stuck, STUCK_FREQUENCY),
         *_worn_coordinate(study, facts),
         *sample_coordinates(study, facts, scenes),
         *of_scene,

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.scene import as_scene, stuck_frequencies
-from studies.scene_error import SceneError
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.scene.scene import build_mesh, describe_origin, harmonics_to_build
-from studyrunner.scene.scene_set import SceneSet, axes_of_difference
+from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
+from studyrunner.scene.scene_set import SceneSet, along_axes, find_scenes
 from studyrunner.study.mistakes import scene_errors
-from studyrunner.study.realisation import realise
+from studyrunner.study.parts import parts_of
 from studyrunner.study.study import Study
-from studyrunner.user_error import UserError, show_text
+from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import Variable
 
 if TYPE_CHECKING:
@@ -41,20 +40,22 @@ class SmallArray:
     over_axes: bool = False
 
 
-def build_scene_variables(study: Study, model: ReducedModel) -> tuple[SmallArray, ...]:
-    """What the study asks of its scene, but exact answers. Natural frequencies of a bundled sector take some seconds.
-
-    Raises UserError where the scene cannot give them.
-    """
+def build_scene_variables(study: Study, model: ReducedModel, progress: Callable[[str], None]) -> tuple[SmallArray, ...]:
+    """What the study asks of its scene, but exact answers. Raises UserError where the scene cannot give them."""
+    found: list[SmallArray] = []
     with scene_errors(study.source, None):
-        of_mesh = tuple(_mesh(study)) if "mesh" in study.scene_variables else ()
-        return of_mesh + (tuple(_frequencies(study, model)) if "natural_frequency" in study.scene_variables else ())
+        if "mesh" in study.scene_variables:
+            found += _mesh(study)
+        if "natural_frequency" in study.scene_variables:
+            # of a bundled sector they take some seconds
+            progress("finding the natural frequencies of the scene")
+            found += _frequencies(study, model)
+    return tuple(found)
 
 
 def _mesh(study: Study) -> Iterator[SmallArray]:
     mesh = build_mesh(study)
-    if mesh is None:
-        raise SceneError("variables", "mesh", "leave it out: the scene has none")
+    assert mesh is not None, "asked of scenes that offer it"
     values: dict[str, NDArray[np.generic]] = {
         **{f"mesh_{axis}": mesh.nodes[:, column] for column, axis in enumerate("xyz")},
         "mesh_quad": mesh.quads.astype(np.int32),
@@ -99,6 +100,27 @@ def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
         return KeptScene(scene_attributes(model), datasets, describe_origin(study))
 
 
+def write_study_scene(study: Study, path: Path, progress: Callable[[str], None]) -> None:
+    """Writes the scene of a study as a scene file, as a whole or not at all.
+
+    Raises UserError where the scene is wrong, or there are several.
+    """
+    from studies.scene_file import write_scene
+
+    first, *others = find_scenes(study).studies
+    if others:
+        found = Verbatim(f"{len(others) + 1} scenes")
+        raise UserError(study.source, "scene", found, "give each key one value: a scene file holds one scene")
+    model = build_study_scene(first, progress)
+    with scene_errors(study.source, first.scene.path):
+        mesh, origin = build_mesh(first), describe_origin(first)
+    try:
+        write_scene(model, path, mesh, origin)
+    except OSError as error:
+        remedy = f"give a file that can be written: {error.strerror or error}"
+        raise UserError("command line", "--write-scene", str(path), remedy) from None
+
+
 def join_scene_variables(
     study: Study, scenes: SceneSet, of_scenes: Sequence[Sequence[SmallArray]]
 ) -> tuple[tuple[SmallArray, ...], tuple[str, ...]]:
@@ -113,11 +135,8 @@ def join_scene_variables(
         if len({each.values.shape for each in variables}) > 1:
             left_out.append(first.name)
             continue
-        names, numbers = axes_of_difference(study, scenes, [each.values.tobytes() for each in variables])
-        if names:
-            values = np.stack([each.values for each in variables])[numbers]
-            first = replace(first, dimensions=(*names, *first.dimensions), values=values)
-        joined.append(first)
+        names, values = along_axes(study, scenes, [each.values for each in variables])
+        joined.append(replace(first, dimensions=(*names, *first.dimensions), values=values))
     notes = [f"{', '.join(left_out)}: left out of the result, as the scenes differ in their sizes"] if left_out else []
     return tuple(joined), tuple(notes)
 
@@ -129,13 +148,14 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     """
     if "exact" not in study.outputs.variables:
         return ()
-    parts = [_answers(part.study) for part in realise(study)]
-    shape = [len(values) for values in study.axes_of_parts.values()]
-    own = len(study.own_axes)
+    answers = [_answers(part.study) for part in parts_of(study)]
+    others = (*(1,) * (len(study.own_axes) - 3), *(len(values) for values in study.axes_of_parts.values()))
     variables = []
-    for name, entry in SCENE["exact"].items():
-        values = np.stack([part[name] for part in parts], axis=own)
-        values = values.reshape(*values.shape[:own], *shape, *values.shape[own + 1 :])
+    for place, (name, entry) in enumerate(SCENE["exact"].items()):
+        values = np.array([[[each[place] for each in row] for row in part] for part in answers])
+        # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
+        values = np.moveaxis(values, (1, 3, 2), (0, 1, 2))
+        values = values.reshape(*values.shape[:3], *others, *values.shape[4:])
         variables.append(SmallArray(name, (*study.dimensions, *entry.dimensions), values, entry, over_axes=True))
     return tuple(variables)
 
@@ -160,21 +180,15 @@ def _changed(study: Study) -> frozenset[str]:
     return frozenset(changed)
 
 
-def _answers(study: Study) -> dict[str, np.ndarray]:
+def _answers(study: Study) -> list[list[Any]]:
+    """Exact answers of a part of a study, for all wear coefficients, by frequency and excitation amplitude."""
     axes, changed = study.axes, _changed(study)
     (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
     counts, given = np.array(study.output_counts), np.array(axes.wear_coefficient)
 
     scene: Any = study.scene.parameters
-    rest, others = (given, counts, study.wear.as_law, depth, changed), (1,) * (len(study.own_axes) - 3)
-    answers = [[scene.exact_answer(one, other, *rest) for other in axes.excitation_amplitude] for one in axes.frequency]
-    found = {}
-    for place, name in enumerate(("exact_worn_volume", "exact_response_amplitude")):
-        values = np.array([[each[place] for each in row] for row in answers])
-        # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
-        values = np.swapaxes(values, 1, 2)
-        found[name] = values.reshape(*values.shape[:3], *others, *values.shape[3:])
-    return found
+    rest = given, counts, study.wear.as_law, depth, changed
+    return [[scene.exact_answer(one, other, *rest) for other in axes.excitation_amplitude] for one in axes.frequency]
 
 
 def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
@@ -193,10 +207,7 @@ def check_study_model(study: Study, picture: Path, progress: Callable[[str], Non
     """
     files = study.scene.files
     if files is None:
-        what = f"{study.scene.model} is none"
-        if study.scene.group:
-            what = f"the result holds the reduced scene of {study.scene.model}"
-        remedy = f"give a study of a finite-element model: {what}; --plan shows what is computed"
+        remedy = f"give a study file of a finite-element model, which {study.scene.model} here is not"
         raise UserError("command line", "--check", study.source, remedy)
     # what reads and reduces it is loaded where there is one
     from studies.fe_models.from_files.check import describe_model

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from studyrunner.scatter import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import draw_pairs, is_of_pairs
+from studyrunner.study.parts import draw_inputs
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
 
@@ -22,49 +22,43 @@ _Values = dict[str, NDArray[np.float64]]
 
 def contact_changes(
     study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]
-) -> tuple[ContactChange, ...] | tuple[tuple[ContactChange, ...], ...]:
-    """What differs from the pairs of the scene, for each part of a study (`realise`); in a study of missions by block.
+) -> tuple[tuple[ContactChange, ...], ...]:
+    """What differs from the pairs of the scene, for each part of a study (`parts_of`) by block, or the only vibration.
 
     facts: of each scene. Raises UserError where a sample draws a value that is none, or blocks differ in their pairs.
     """
-    if not study.mission:
-        return _of_parts(study, scenes, facts)
     for numbers in scenes.of_blocks:
-        for block, number in zip(study.mission, numbers, strict=True):
+        for block, number in zip(study.mission, numbers, strict=False):
             if facts[numbers[0]].pairs != facts[number].pairs:
                 remedy = f"give parameters with which it has the contact pairs of {study.mission[0].name}, which wear"
                 raise UserError(study.source, f"mission.{block.name}", None, remedy)
     of_blocks = []
-    for place in range(len(study.mission)):
-        variants = tuple(variant.block_studies[place] for variant in study.variants or (study,))
-        at_block = study.model_copy(update={"variants": variants})
-        of_blocks.append(_of_parts(at_block, scenes.at_block(place), facts))
+    for place in range(len(study.mission)) if study.mission else (None,):
+        changes: list[ContactChange] = []
+        for variant, own, of_sample in drawn_pairs(study, scenes, facts, place):
+            if variant.scene.worn is not None:
+                # wear opens a pair as a gap does, Eq. (7)
+                of_sample["gap"] = of_sample.get("gap", own.gap) + worn_depth(variant, own)
+            changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
+        of_blocks.append(changes)
     return tuple(zip(*of_blocks, strict=True))
 
 
-def _of_parts(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> tuple[ContactChange, ...]:
-    changes: list[ContactChange] = []
-    for variant, own, of_sample in drawn_pairs(study, scenes, facts):
-        if variant.scene.worn is not None:
-            # wear opens a pair as a gap does, Eq. (7)
-            of_sample["gap"] = of_sample.get("gap", own.gap) + worn_depth(variant, own)
-        changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
-    return tuple(changes)
-
-
 def drawn_pairs(
-    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]
+    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], block: int | None = None
 ) -> Iterator[tuple[Study, SceneFacts, _Values]]:
     """For each part of a study its variant, its scene, and drawn values (n_contact,) of the inputs of pairs.
 
-    facts: of each scene. Raises UserError where a sample draws a value that is none.
+    facts: of each scene. block: place of the block in a mission; None for the study as it is. Raises UserError where a
+    sample draws a value that is none.
     """
-    n_samples = 1 if study.scatter is None else study.scatter.realisations
-    for place, variant in enumerate(study.variants or (study,)):
+    of_parts = iter(scenes.of_blocks)
+    for whole in study.variants or (study,):
+        variant = whole if block is None else whole.block_studies[block]
         # scenes of samples mostly have the same pairs, and then the same draws
         drawn: dict[Hashable, _Values] = {}
-        for sample, number in enumerate(scenes.numbers[place * n_samples : (place + 1) * n_samples]):
-            own = facts[number]
+        for sample in range(1 if study.scatter is None else study.scatter.n_rows):
+            own = facts[next(of_parts)[block or 0]]
             values = own.gap, own.friction_coefficient
             key = own.pairs, *(None if each is None else each.tobytes() for each in values)
             if key not in drawn:
@@ -74,7 +68,7 @@ def drawn_pairs(
 
 def scatters_pairs(study: Study) -> bool:
     """Whether samples draw values of contact pairs."""
-    return study.scatter is not None and any(is_of_pairs(name, each) for name, each in study.scatter.inputs.items())
+    return study.scatter is not None and bool(study.scatter.of_pairs)
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
@@ -93,4 +87,4 @@ def _pair_values(study: Study, facts: SceneFacts) -> _Values:
     if friction is None:
         friction = np.full(len(facts.area), np.nan if of_all is None else of_all)
     own = {"gap": facts.gap, "area": facts.area, "friction_coefficient": friction}
-    return draw_pairs(study, own, ScatteredPairs(facts.surface, facts.position))
+    return draw_inputs(study, ScatteredPairs(facts.surface, facts.position), own)

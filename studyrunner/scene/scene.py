@@ -1,47 +1,36 @@
-"""The scene of a study: builds or reads the reduced model and describes the scene for the runner.
-
-A model that takes long to build is the same in each run of a study: it is kept for later runs.
-"""
+"""The scene of a study: builds or reads the reduced model and describes the scene for the runner."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import math
-import time
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
-from solver.packing import Packed, pack_model, unpack_model
 from studies.fe_models.model_files import file_digest
 from studies.scene import as_scene, make_compliant, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.study.mistakes import scene_errors
+from studyrunner.study.mistakes import raise_wrong, scene_errors
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
-from studyrunner.user_error import UserError
+from studyrunner.values import Wrong
 from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from studies.scene import SurfaceMesh
-    from studyrunner.checkpoint.store import Store
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
-
-LEAST_SECONDS = 2.0
-"""Time, s, above which a model is kept. Shorter times are not worth the space in the file."""
 
 
 @dataclass(frozen=True)
@@ -75,32 +64,26 @@ class SceneFacts:
         return self.surface, self.position.tobytes(), self.area.tobytes()
 
 
-class InMemory(dict[str, Packed]):
-    """Stands for the file of a run in commands that leave nothing behind: values by hash of their inputs."""
-
-    keep_computed = dict.__setitem__
-    read_computed = dict.get
-
-
 def _silent(_: str) -> None: ...
 
 
 def build_study_scene(
-    study: Study, progress: Callable[[str], None] = _silent, computed: Store | InMemory | None = None
+    study: Study, progress: Callable[[str], None] = _silent, known: ReducedModel | None = None
 ) -> ReducedModel:
     """Reduced model of the scene for the largest number of harmonics of the study and those that show the error.
 
     With automatic harmonics a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE; a scene file may hold
-    fewer, see `largest_harmonics`. progress: takes a line on the next step, where a step may take long. computed: holds
-    the model of an earlier run.
-
-    Raises UserError where the parameters or the scene file are wrong, or the scene lacks what the study asks for.
+    fewer, see `largest_harmonics`. progress: takes a line on the next step, where a step may take long. known: the
+    model from an earlier run. Raises UserError where the parameters or the scene file are wrong, or the scene lacks
+    what the study asks for.
     """
     scene = study.scene
     # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
     with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
-        if scene.path is None:
-            model = _build_once(study, progress, InMemory() if computed is None else computed)
+        if known is not None:
+            model = known
+        elif scene.path is None:
+            model = _build_here(study, progress)
         else:
             # h5py is loaded for scene files only: the bundled scenes do without it.
             from studies.scene_file import read_scene
@@ -109,24 +92,10 @@ def build_study_scene(
             # a scene in a result file is the one that was computed with
             if not scene.group:
                 model = make_compliant(model, dict(scene.parameters)["contact_stiffness"])
-    _check_pairs(study, model)
-    _check_outputs(study, model)
-    return model
-
-
-def _build_once(study: Study, progress: Callable[[str], None], computed: Store | InMemory) -> ReducedModel:
-    """The model of a scene that is not read from a scene file, built or from an earlier run, which is equal to the last
-    bit (`solver.packing`).
-    """
-    key = model_key(study)
-    if (known := computed.read_computed(key)) is not None:
-        # what is damaged, or of another version, is built again
-        with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
-            return unpack_model(known)
-    began = time.monotonic()
-    model = _build_here(study, progress)
-    if time.monotonic() > began + LEAST_SECONDS and (packed := pack_model(model)) is not None:
-        computed.keep_computed(key, packed)
+    raise_wrong(study.source, _wrong_beside(study, model))
+    if "natural_frequency" in study.scene_variables:
+        with scene_errors(study.source, None):
+            stuck_frequencies(model)
     return model
 
 
@@ -141,17 +110,8 @@ def model_key(study: Study) -> str:
     """Hash under which the model of a scene is kept: of its parameters and files, and of the source of the scenes."""
     sources = [package_digest(package) for package in ("studies", "solver")]
     content = None if study.scene.path is None else file_digest(study.scene.path)
-    own = study.scene.model, scene_parameters_of(study), describe_origin(study), content, harmonics_to_build(study)
+    own = study.scene.model, study.scene.of_model, describe_origin(study), content, harmonics_to_build(study)
     return hashlib.sha256(json.dumps((sources, own), sort_keys=True).encode()).hexdigest()[:32]
-
-
-def scene_parameters_of(study: Study) -> dict[str, object]:
-    """Parameters that the model of a scene depends on: mostly without one friction coefficient for all pairs."""
-    given: dict[str, object] = study.scene.parameters.model_dump(mode="json")
-    depends = study.scene.is_bundled and as_scene(study.scene.parameters).FRICTION_IN_MODEL
-    if not depends and not isinstance(given["friction_coefficient"], dict):
-        del given["friction_coefficient"]
-    return given
 
 
 def describe_origin(study: Study) -> dict[str, str]:
@@ -184,42 +144,34 @@ def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
         raise SceneError("model", what, "give parameters of a possible structure") from None
 
 
-def _check_pairs(study: Study, model: ReducedModel) -> None:
-    """Raises UserError where friction is given twice or not at all, or wear factors are of surfaces without pairs."""
-    key, own, value = "scene.friction_coefficient", model.contact.friction_coefficient, study.friction_coefficient
-    if own is None and value is None and study.scene.path is not None:
-        raise UserError(study.source, key, None, "missing: give it, or contact/friction_coefficient in the scene file")
-    if own is not None and value is not None and study.scene.path is not None:
-        remedy = "remove it: the scene file gives each pair its own in contact/friction_coefficient"
-        raise UserError(study.source, key, value, remedy)
+def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
+    """What of a study does not fit to the pairs of its scene."""
+    contact, friction, loops = model.contact, study.friction_coefficient, study.outputs.loops
+    given = contact.friction_coefficient is not None
+    if study.scene.path is not None and given == (friction is not None):
+        file = "contact/friction_coefficient in the scene file"
+        remedy = f"leave it out: {file} gives each pair its own" if given else f"missing: give it, or {file}"
+        yield Wrong("scene.friction_coefficient", friction, remedy)
     if study.wear.surfaces is not None:
         try:
-            surface_factors(model.contact.surface, study.wear.as_law.surfaces)
+            surface_factors(contact.surface, study.wear.as_law.surfaces)
         except ValueError as error:
-            raise UserError(study.source, "wear.surfaces", study.wear.surfaces, str(error)) from None
-
-
-def _check_outputs(study: Study, model: ReducedModel) -> None:
-    """Raises UserError where the study asks for loops of pairs or natural frequencies that the scene does not have."""
-    loops, n_contact = study.outputs.loops, model.contact.n_contact
-    for pair in loops:
-        if pair >= n_contact:
-            remedy = f"give indices from 0 to {n_contact - 1}, the contact pairs of the scene"
-            raise UserError(study.source, "outputs.loops", pair, remedy)
-    facts = SceneFacts(0, model.contact.position, model.contact.area, model.contact.surface, model.response_names, "")
+            yield Wrong("wear.surfaces", study.wear.surfaces, str(error))
+    if loops and max(loops) >= contact.n_contact:
+        remedy = f"give indices from 0 to {contact.n_contact - 1}, the contact pairs of the scene"
+        yield Wrong("outputs.loops", max(loops), remedy)
+    facts = SceneFacts(0, contact.position, contact.area, contact.surface, model.response_names, "")
     if (size := 8.0 * values_of_point(study, facts)) > _LARGEST_HISTORY:
-        remedy = f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
-        key = "outputs.loops" if loops else "slow_time.outputs"
-        raise UserError(study.source, key, list(loops) if loops else len(study.output_counts), remedy)
-    if "natural_frequency" in study.scene_variables:
-        with scene_errors(study.source, None):
-            stuck_frequencies(model)
+        key, value = ("outputs.loops", list(loops)) if loops else ("slow_time.outputs", len(study.output_counts))
+        yield Wrong(key, value, f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB")
 
 
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
     """Lengths of the dimensions after the axes."""
+    counted = {study.kind.counted: len(study.output_counts)} if study.kind.counted else {}
+    blocks = {"block": len(study.mission)} if study.mission else {}
     loops = {"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}
-    return {**study.sizes, "contact": len(facts.area), "response": len(facts.response_names), **loops}
+    return {**counted, **blocks, "contact": len(facts.area), "response": len(facts.response_names), **loops}
 
 
 def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple[int, ...]]]:
@@ -251,29 +203,6 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
     from studies.scene_file import read_mesh
 
     return read_mesh(scene.path, scene.group)
-
-
-def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] = _silent) -> None:
-    """Writes the scene of a study as a scene file, as a whole or not at all.
-
-    Raises UserError where the scene is wrong.
-    """
-    from studies.scene_file import write_scene
-
-    if study.variants:
-        names = ", ".join(f"axes.{axis.dotted}" for axis in study.scene_axes)
-        raise UserError(study.source, names, None, "give one value: a scene file holds one scene")
-    if len({json.dumps(scene_parameters_of(block), sort_keys=True) for block in study.block_studies}) > 1:
-        raise UserError(study.source, "mission", None, "give all blocks one scene: a scene file holds one")
-    study = next(iter(study.block_studies), study)
-    model = build_study_scene(study, progress)
-    with scene_errors(study.source, study.scene.path):
-        mesh, origin = build_mesh(study), describe_origin(study)
-    try:
-        write_scene(model, path, mesh, origin)
-    except OSError as error:
-        remedy = f"give a file that can be written: {error.strerror or error}"
-        raise UserError("command line", "--write-scene", str(path), remedy) from None
 
 
 def describe_scene(model: ReducedModel) -> SceneFacts:

@@ -8,19 +8,15 @@ import math
 import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.scene.scene import (
-    SceneFacts,
-    build_study_scene,
-    describe_scene,
-    harmonics_to_build,
-    scene_parameters_of,
-)
-from studyrunner.study.realisation import Realisation, realise
-from studyrunner.study.scene_axes import keys_as_given
+from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, harmonics_to_build
+from studyrunner.study.mistakes import keys_as_given
+from studyrunner.study.parts import Part, parts_of
+from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
 
@@ -31,20 +27,18 @@ _MOST_PLANNED = 8
 class SceneSet:
     """The different scenes of a study.
 
-    studies: for each scene a study without axes of the scene, from which the scene is built.
-    parts: of the study (`realise`). numbers: number of the scene of each part; of its first block in a study of
-        missions.
-    of_blocks: for each part the numbers of the scenes of its blocks, or of its only vibration.
+    studies: for each scene a study without axes of the scene, from which the scene is built. parts: of the study
+    (`parts_of`). of_blocks: for each part the numbers of the scenes of its blocks, or of its only vibration.
     """
 
     studies: tuple[Study, ...]
-    parts: tuple[Realisation, ...]
-    numbers: tuple[int, ...]
+    parts: tuple[Part, ...]
     of_blocks: tuple[tuple[int, ...], ...]
 
-    def at_block(self, place: int) -> SceneSet:
-        """The same with the scenes of one block. place: of the block in the mission."""
-        return replace(self, numbers=tuple(numbers[place] for numbers in self.of_blocks))
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Number of the scene of each part, of its first block in a study of missions."""
+        return tuple(numbers[0] for numbers in self.of_blocks)
 
 
 def find_scenes(study: Study) -> SceneSet:
@@ -52,26 +46,25 @@ def find_scenes(study: Study) -> SceneSet:
 
     Raises UserError where a result file is to keep the scene, and there are several.
     """
-    studies: dict[str, Study] = {}
-    parts, of_blocks = realise(study), []
+    parts, studies, keys = parts_of(study), dict[str, Study](), list[list[str]]()
     for part in parts:
-        by_key = [(_key(each), each) for each in part.study.block_studies or (part.study,)]
-        for key, each in by_key:
+        own = part.study.block_studies or (part.study,)
+        keys.append([_key(each) for each in own])
+        for key, each in zip(keys[-1], own, strict=True):
             studies.setdefault(key, each)
-        of_blocks.append([key for key, _ in by_key])
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
         raise UserError(study.source, "outputs.scene", True, remedy)
     number_of = {key: number for number, key in enumerate(studies)}
-    numbers = tuple(tuple(number_of[key] for key in keys) for keys in of_blocks)
-    return SceneSet(tuple(studies.values()), parts, tuple(own[0] for own in numbers), numbers)
+    of_blocks = tuple(tuple(number_of[key] for key in each) for each in keys)
+    return SceneSet(tuple(studies.values()), parts, of_blocks)
 
 
 def _key(study: Study) -> str:
     scene = study.scene
     files = None if scene.files is None else [str(path) for path in scene.files.all]
     where = None if scene.path is None else str(scene.path), scene.group, files
-    return json.dumps([scene.model, scene_parameters_of(study), where, harmonics_to_build(study)], sort_keys=True)
+    return json.dumps([scene.model, study.scene.of_model, where, harmonics_to_build(study)], sort_keys=True)
 
 
 def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
@@ -92,36 +85,11 @@ def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
     return replace(scenes, parts=tuple(parts))
 
 
-@dataclass(frozen=True)
-class PlannedScenes:
-    """Scenes of a study as `--plan` knows them.
+def plan_scenes(study: Study, say: Callable[[str], None]) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
+    """The scenes of a study, facts of each, or of one that is as large, and the time, s, for building the others.
 
-    facts: of each scene, or of one that is as large. seconds_left: time for building the others, s.
-    """
-
-    scenes: SceneSet
-    facts: tuple[SceneFacts, ...]
-    seconds_left: float
-
-    @property
-    def largest(self) -> SceneFacts:
-        """Facts of the scene with the most pairs."""
-        return max(self.facts, key=lambda each: len(each.area))
-
-    def describe(self) -> str:
-        """Number of scenes, and of their pairs; empty for one scene."""
-        if len(self.facts) == 1:
-            return ""
-        fewest, most = min(len(each.area) for each in self.facts), len(self.largest.area)
-        of_pairs = f"{most}" if fewest == most else f"{fewest} to {most}"
-        return f"{len(self.facts)}, built once each, with {of_pairs} contact pair{'' if of_pairs == '1' else 's'}"
-
-
-def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
-    """Builds some scenes of a study: those that may differ in their sizes, at most eight.
-
-    Scenes that differ only in numbers with a fraction are taken to have the same sizes, but for the blocks of a
-    mission. Raises UserError where a scene is wrong.
+    Scenes that differ only in numbers with a fraction are taken to have the same sizes; at most eight are built. Raises
+    UserError where a scene is wrong.
     """
     scenes, built = find_scenes(study), dict[str, SceneFacts]()
     began, facts = time.monotonic(), []
@@ -131,11 +99,11 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
         sizes = str([value for _, value in each.scene.parameters if is_block or not isinstance(value, float)])
         if sizes not in built and len(built) < _MOST_PLANNED:
             say(f"building scene {number + 1} of {len(scenes.studies)}")
-            with keys_as_given(study.scene_axes):
+            with keys_as_given(keys_below_axes(study.scene_axes)):
                 built[sizes] = describe_scene(build_study_scene(each, say))
         facts.append(built.get(sizes) or next(reversed(built.values())))
     left = (time.monotonic() - began) / len(built) * (len(facts) - len(built))
-    return PlannedScenes(at_ratios(scenes, facts), tuple(facts), left)
+    return at_ratios(scenes, facts), tuple(facts), left
 
 
 def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
@@ -185,23 +153,10 @@ def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | No
     return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
 
 
-def stuck_frequencies_of(
-    study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
-) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-    """First natural frequencies, Hz, with the joint stuck: axes along which they differ, and values along these."""
-    found = np.array([each.stuck_frequency for each in facts])
-    names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in found])
-    return names, found[numbers]
-
-
-def frequencies_of_ratios(
-    study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
-) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
-    """Excitation frequencies, Hz: their dimensions, the first one frequency_ratio; None where the study gives Hz."""
-    if study.axes.frequency_ratio is None:
-        return None
-    names, stuck = stuck_frequencies_of(study, facts, scenes)
-    return ("frequency_ratio", *names), np.multiply.outer(study.axes.frequency_ratio, stuck)
+def along_axes(study: Study, scenes: SceneSet, values: Sequence[NDArray[Any]]) -> tuple[tuple[str, ...], NDArray[Any]]:
+    """Axes along which arrays of the scenes differ, and these arrays along the axes. values: of each scene, alike."""
+    names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in values])
+    return names, np.stack(values)[numbers]
 
 
 def axes_of_difference(

@@ -39,10 +39,10 @@ _FEWEST_SPACINGS = 2  # in each group: with one a gap passes at ratios that no j
 
 @dataclass(frozen=True)
 class SampleValues:
-    """Samples of a quantity, n in the last dimension, at any number of points.
+    """Samples of a quantity, n in the last dimension.
 
-    low, high (..., n): the value, twice; of a sample without a value, or without one to be trusted, its bounds, where
-    high may be inf. error (..., n): absolute numerical error of a value, 0 or more.
+    low, high (..., n): the value, twice; without a value to be trusted its bounds, where high may be inf.
+    error (..., n): absolute numerical error of a value, 0 or more.
     """
 
     low: Array
@@ -80,10 +80,8 @@ def band_of(estimate: Estimate, values: SampleValues, inputs: Array | None = Non
     inputs (n, d): drawn values where the estimate is one of order. A sample without a value is then also as high within
     its bounds as each input, or its reverse, orders it. Without inputs the estimate rises or falls with every value.
     """
-    cases = [values.low]
     known = values.is_known
-    if not known.all():
-        cases.append(values.high)
+    cases = [values.low] if known.all() else [values.low, values.high]
     if not known.all() and inputs is not None:
         typical = np.where(known | ~known.any(axis=-1, keepdims=True), 0.5 * (values.low + values.high), np.nan)
         place = (rankdata(inputs, axis=0) - 0.5).T / len(inputs)
@@ -151,10 +149,9 @@ def rank_correlations(inputs: Array, values: SampleValues, confidence: float) ->
     return band_of(estimate, values.limited, inputs) if n >= FEWEST else _unknown(values, inputs.shape[1])
 
 
-def saltelli_indices(
-    inputs: Array, values: SampleValues, confidence: float
-) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """First and total Sobol' indices (..., d): share of the variance that an input decides alone, and with the others.
+def saltelli_indices(inputs: Array, values: SampleValues, confidence: float) -> tuple[Array, Array]:
+    """Sobol' indices (..., 2 d): d first ones, shares of the variance that an input decides alone, and d total ones,
+    with the others.
 
     inputs (n, d), values (..., n): 2 + d rows of each base sample, as `unit_design` has them. NaN as in
     `rank_correlations`, with base samples. Intervals by bootstrap of the base samples.
@@ -162,7 +159,7 @@ def saltelli_indices(
     d = inputs.shape[1]
     n_base = len(inputs) // (2 + d)
     if n_base < FEWEST:
-        return _unknown(values, d), _unknown(values, d)
+        return _unknown(values, 2 * d)
     rng = np.random.default_rng(_SEED)
     blocks = np.arange(len(inputs)).reshape(n_base, -1)
     resampled = [blocks[rng.integers(n_base, size=n_base)].ravel() for _ in range(_RESAMPLES)]
@@ -182,8 +179,7 @@ def saltelli_indices(
         ends = np.clip([found, found - margin, found + margin], 0.0, 1.0)
         return _where_varying(y, *ends.reshape(3, *y.shape[:-1], 2 * d))
 
-    ends, interval = band_of(estimate, values.limited, inputs)
-    return (ends[..., :d, :], interval[..., :d, :]), (ends[..., d:, :], interval[..., d:, :])
+    return band_of(estimate, values.limited, inputs)
 
 
 def _where_varying(y: Array, *estimates: Array) -> tuple[Array, Array, Array]:
@@ -201,7 +197,7 @@ def _unknown(values: SampleValues, d: int) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Groups:
-    """Two groups of samples with a gap between. lower_end, upper_end: of the gap, in the unit of the samples.
+    """Two groups of samples. lower_end, upper_end: of the gap between them, in the unit of the samples.
 
     is_upper (n,): whether a sample is in the upper group. is_placed (n,): whether it is known to be in one of them.
     """
@@ -218,14 +214,13 @@ class Groups:
 
 
 def two_groups(values: SampleValues) -> Groups | None:
-    """The two groups of samples (n,), None where one hill of any form may be what they are of.
+    """The two groups of samples (n,), None where one density with a single peak may be what they are of.
 
-    Where the density has one peak, it falls from every gap outwards on one side at least. The spacings there are then
-    longer than the gap by trend, and the ratio of the gap to the mean of these k spacings is above r with a probability
-    of at most (1 + r / k)^-k, the one of a uniform density. The gap is compared with the side on which the probability
-    is larger; that any of n gaps passes by chance has a probability below 0.5 %. The gap must be longer than the
-    numerical errors beside it. Of the gaps that pass the longest is taken. A sample whose error is more than half of
-    the range of all samples may lie on either side of a gap and counts as one without a value.
+    Such a density falls from every gap outwards on one side at least. The spacings there are longer than the gap by
+    trend, and the ratio of the gap to the mean of these k spacings is above r with a probability of at most
+    (1 + r / k)^-k, the one of a uniform density. The side with the larger probability counts; that any of n gaps passes
+    by chance has a probability below 0.5 %. Of the gaps that pass, and are longer than the numerical errors beside
+    them, the longest is taken. A sample whose error is above half of the range of all counts as one without a value.
     """
     known, wide = values.is_known, values.widened
     if known.any():
@@ -267,10 +262,8 @@ def density(values: SampleValues, groups: Groups | None, grid: Array) -> Array:
 
 
 def deciding_pair(depths: Array, groups: Groups) -> int | None:
-    """The pair that separates both groups best; None where the depths of each pair overlap.
-
-    depths (n, n_pairs): m, NaN where not known. Of the pairs whose depths in one group are all larger than those in the
-    other, the one with the largest distance of the means over the root of the mean of both variances.
+    """The pair whose depths are all larger in one group, with the largest distance of the means over the root of the
+    mean of both variances; None where the depths of each pair overlap. depths (n, n_pairs): m, NaN where not known.
     """
     known = groups.is_placed & np.isfinite(depths).all(axis=1)
     below, above = depths[known & ~groups.is_upper], depths[known & groups.is_upper]

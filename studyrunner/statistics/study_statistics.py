@@ -12,21 +12,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from studyrunner.scatter import ScatterSection
-from studyrunner.statistics.samples import (
-    CYCLE,
-    DRAWN,
-    FEWEST,
-    SAMPLE,
-    Array,
-    SampleValues,
-    deciding_pair,
-    density,
-    exceedance,
-    quantiles,
-    rank_correlations,
-    saltelli_indices,
-    two_groups,
-)
+from studyrunner.statistics import samples
+from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, SAMPLE, Array, SampleValues
 from studyrunner.units import show_percent
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show
@@ -172,9 +159,9 @@ def _of_values(
     """Quantiles of worn volumes, probabilities of larger volumes and depths, and their coordinates."""
     coords: dict[str, Any] = {"bound": ["lowest", "highest"]}
     coords["quantile"] = ("quantile", np.asarray(probabilities), _about("1", "probability"))
-    band = quantiles(values, probabilities, confidence)
+    band = samples.quantiles(values, probabilities, confidence)
     found = _bands("worn_volume_quantile", "quantile of worn volume", "m3", band, (*names, "quantile"))
-    moved = np.maximum(quantiles(values.widened, probabilities, confidence)[0], 0.0)
+    moved = np.maximum(samples.quantiles(values.widened, probabilities, confidence)[0], 0.0)
     about_error = _about("m3", "quantile of worn volume, with numerical error")
     found["worn_volume_quantile_error"] = ((*names, "quantile", "bound"), moved, about_error)
     found["n_samples"] = ((), np.int32(len(rows)), _about("1", "samples"))
@@ -191,7 +178,7 @@ def _of_values(
             even = np.linspace(0.0, float(own.low.max()) or 1.0, _N_THRESHOLDS)
             above = even if given is None else np.sort(np.atleast_1d(np.asarray(given, dtype=np.float64)))
             name, shown = variable.removesuffix("_max"), f"exceeded_{quantity}"
-            band = exceedance(own, above, confidence)
+            band = samples.exceedance(own, above, confidence)
             found |= _bands(f"{name}_exceedance", words, "1", band, (*own_names, shown))
             coords[shown] = (shown, above, _about(units, name.replace("_", " ")))
     return found, coords
@@ -210,12 +197,13 @@ def _of_inputs(
     drawn, dims = [dataset[f"{DRAWN}{name}"] for name in inputs], (*names, "input")
     table = np.stack([each.mean([d for d in each.dims if d != SAMPLE]).values for each in drawn], axis=1)
     if is_saltelli:
-        words = "share of the variance that the input decides"
-        first, total = saltelli_indices(table, values, confidence)
+        words, d = "share of the variance that the input decides", len(inputs)
+        both = samples.saltelli_indices(table, values, confidence)
+        first, total = ((both[0][..., part, :], both[1][..., part, :]) for part in (slice(d), slice(d, None)))
         found = _bands("first_index", f"{words} alone", "1", first, dims)
         return found | _bands("total_index", f"{words}, with the others", "1", total, dims)
     words = "rank correlation of the worn volume with the input"
-    found = _bands("rank_correlation", words, "1", rank_correlations(table, values, confidence), dims)
+    found = _bands("rank_correlation", words, "1", samples.rank_correlations(table, values, confidence), dims)
     # the mean over the pairs says nothing of what their own draws decide
     for _, ends, _ in found.values():
         ends[..., ["contact" in each.dims for each in drawn], :] = np.nan
@@ -234,16 +222,16 @@ def _of_groups(dataset: xr.Dataset, values: SampleValues, names: tuple[str, ...]
     sizes, gap = np.zeros((*shape, 2), dtype=np.int32), np.full((*shape, 2), np.nan)
     contact = np.full(shape, -1, dtype=np.int32)
     for point in np.ndindex(shape):
-        samples = at_last.at(point)
-        groups, known = two_groups(samples), samples.low[samples.is_known]
+        own = at_last.at(point)
+        groups, known = samples.two_groups(own), own.low[own.is_known]
         sizes[point] = (known.size, 0) if groups is None else groups.sizes
         if known.size:
             margin = 0.1 * float(np.ptp(known))
             grid[point] = np.linspace(max(known.min() - margin, 0.0), known.max() + margin, _N_DENSITY)
-            curve[point] = density(samples, groups, grid[point])
+            curve[point] = samples.density(own, groups, grid[point])
         if groups is not None:
             gap[point] = groups.lower_end, groups.upper_end
-            pair = None if depths is None else deciding_pair(depths.values[point], groups)
+            pair = None if depths is None else samples.deciding_pair(depths.values[point], groups)
             contact[point] = -1 if pair is None else dataset["contact"].values[pair]
     words = "density of the samples at the last count"
     return {
@@ -260,27 +248,21 @@ def _of_groups(dataset: xr.Dataset, values: SampleValues, names: tuple[str, ...]
 
 def describe_volumes(point: xr.Dataset) -> str:
     """Range, median and numerical error of the worn volumes of one point, and two groups where there are."""
-    ends = point["worn_volume_quantile"].values * _MM3
+    ends, error = (point[name].values * _MM3 for name in ("worn_volume_quantile", "worn_volume_quantile_error"))
     probabilities, n_without = point["quantile"].values, int(point["n_without_value"])
     share = 100.0 * (probabilities[-1] - probabilities[0])
     text = f"{share:.4g} % of {int(point['n_samples'])} samples wear {_range(ends[0, 0], ends[-1, 1])} mm3"
-    (n_lower, n_upper), (lower, upper) = point["group_size"].values.tolist(), point["group_gap"].values * _MM3
-    if 0.5 in probabilities:
-        middle = ends[probabilities == 0.5][0]
-        moved = point["worn_volume_quantile_error"].values[probabilities == 0.5][0] * _MM3
+    for middle, moved in zip(ends[probabilities == 0.5], error[probabilities == 0.5], strict=True):
         # how far the ends move, apart from what samples without a value may have
         finite = np.isfinite(middle)
-        by = np.abs(moved[finite] - middle[finite])
-        error = "not known"
-        if finite.any() and np.isfinite(by).all():
-            error = show_percent(float(by.sum() / middle[finite].sum()) if by.any() else 0.0)
-        between = "between two groups, " if n_upper and lower < middle.mean() < upper else ""
-        text += f", median {_range(*middle)} mm3 ({between}numerical error {error})"
+        by = np.abs(moved - middle)[finite]
+        relative = float(by.sum() / middle[finite].sum()) if by.any() else 0.0
+        shown = show_percent(relative) if finite.any() and math.isfinite(relative) else "not known"
+        text += f", median {_range(*middle)} mm3 (numerical error {shown})"
     text += f"; {n_without} have no volume that can be trusted" if n_without else ""
+    (n_lower, n_upper), (lower, upper) = point["group_size"].values.tolist(), point["group_gap"].values * _MM3
     if n_upper:
-        rest = int(point["n_samples"]) - n_without - n_lower - n_upper
         text += f"; two groups, {n_lower} samples up to {lower:.3g} mm3 and {n_upper} from {upper:.3g} mm3"
-        text += f" ({rest} known too badly to tell)" if rest > 0 else ""
         contact = int(point["deciding_contact"])
         text += "" if contact < 0 else f", which differ in the wear depth of contact pair {contact}"
     return text
@@ -296,20 +278,11 @@ def measure_of(statistics: xr.Dataset) -> str | None:
     return next((name for name in _MEASURES if name in statistics), None)
 
 
-def deciding_input(intervals: Array) -> int | None:
-    """Place of the input that decides most, from intervals (n_inputs, 2); None where the samples do not tell.
-
-    They tell where the interval of its strength, a correlation without sign, is above those of all others.
-    """
-    ends = np.nan_to_num(intervals)
-    least = np.where((ends[:, 0] < 0.0) & (ends[:, 1] > 0.0), 0.0, np.abs(ends).min(axis=1))
-    most = int(np.argmax(least))
-    others = np.delete(np.abs(ends).max(axis=1), most)
-    return most if least[most] > others.max(initial=0.0) else None
-
-
 def describe_ranking(point: xr.Dataset) -> str:
-    """The deciding input in words, or why none is known; "" where no input varies."""
+    """The deciding input in words, or why none is known; "" where no input varies.
+
+    One decides where the interval of its strength, a correlation without sign, is above those of all others.
+    """
     name = measure_of(point)
     if name is None:
         return ""
@@ -319,9 +292,8 @@ def describe_ranking(point: xr.Dataset) -> str:
         # two independent samples for each base sample
         too_few = n_samples < FEWEST * (2 if name == "first_index" else 1)
         return f"{n_samples} samples are too few to say which input decides" if too_few else ""
-    without = [word for word, row in zip(words, values, strict=True) if np.isnan(row).all()]
-    inputs = "input" if len(without) == 1 else "inputs"
-    more = f"; {inputs} not ranked: {', '.join(without)}" if without else ""
+    without = ", ".join(word for word, row in zip(words, values, strict=True) if np.isnan(row).all())
+    more = f"; not ranked: {without}" if without else ""
     most = int(np.argmax(np.abs(np.nan_to_num(values)).max(axis=1)))
     (low, high), (lowest, highest) = intervals[most], values[most].tolist()
     if name == "first_index":
@@ -329,6 +301,7 @@ def describe_ranking(point: xr.Dataset) -> str:
         shown = f"{share} % of the variance, interval {100.0 * low:.0f} to {100.0 * high:.0f} %"
     else:
         shown = f"rank correlation {_range(lowest, highest, '.2f')}, interval {low:.2f} to {high:.2f}"
-    if deciding_input(intervals) is None:
+    others = np.abs(np.nan_to_num(np.delete(intervals, most, axis=0))).max(initial=0.0)
+    if low < 0.0 < high or min(abs(low), abs(high)) <= others:
         return f"which input decides is not known: {words[most]} has the largest estimate ({shown}){more}"
     return f"{words[most]} decides most ({shown}){more}"

@@ -9,7 +9,7 @@ from typing import Literal, get_args, get_origin
 import numpy as np
 
 from studyrunner.study.mission import MissionBlock
-from studyrunner.study.mistakes import scene_errors
+from studyrunner.study.mistakes import check_tables, keys_as_given, scene_errors
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.sections import SECTIONS, StudySection
 from studyrunner.user_error import UserError, toml_value
@@ -57,16 +57,14 @@ def write_new_study(name: str, deck: Path | None = None) -> Path:
     """
     name = name.removesuffix(".toml")
     path = Path(f"{name}.toml")
+    with keys_as_given({"study.name": "--new"}):
+        check_tables({"study": StudySection}, {"study": {"name": name}}, "command line")
+    text = _new_study(name, _NEW if deck is None else {**_NEW, **_tables_of_deck(deck)})
     try:
-        StudySection.model_validate({"name": name})
-        text = _new_study(name, _NEW if deck is None else {**_NEW, **_tables_of_deck(deck)})
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
-    except ValueError:
-        raise UserError("command line", "--new", name, "give a name that can be a file name, without a slash") from None
     except OSError as error:
-        remedy = "give another name: there is such a file" if path.exists() else f"{error.strerror}: give another name"
-        raise UserError("command line", "--new", name, remedy) from None
+        raise UserError("command line", "--new", name, f"give another name: {error.strerror}") from None
     return path
 
 

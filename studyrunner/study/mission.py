@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from studyrunner.study.mistakes import Mistakes, check_table
-from studyrunner.study.sections import SOLVER_AXES, AxesSection
+from studyrunner.study.mistakes import check_tables, nearest_name, raise_wrong
+from studyrunner.study.sections import AxesSection
 from studyrunner.user_error import UserError
-from studyrunner.values import Positive, Section, Wrong, listed
+from studyrunner.values import Positive, Section, Wrong
 
 _NO_KEYS = ("model", "worn", "mesh")
 
@@ -28,10 +28,9 @@ def _check_passage(value: dict[str, float]) -> dict[str, float]:
 
 
 class MissionBlock(Section):
-    """One block of a mission.
+    """One block of a mission. Other keys are those of [scene] to which the block gives values of its own."""
 
-    parameters: keys of [scene] to which the block gives values of its own.
-    """
+    model_config = ConfigDict(extra="allow")
 
     name: Annotated[str, AfterValidator(_check_name)] = Field(description="of the block, a coordinate of the result")
     frequency: Positive | Annotated[dict[str, Positive], AfterValidator(_check_passage)] | None = Field(
@@ -46,22 +45,24 @@ class MissionBlock(Section):
         " block before",
     )
     excitation_amplitude: Positive | None = Field(None, description="N; or that of [axes]")
-    parameters: dict[str, Any] = Field(default_factory=dict, exclude=True)
 
     def rules(self) -> Iterator[Wrong]:
         """A block has one frequency and one duration."""
         if self.frequency is not None and self.engine_order is not None:
             yield Wrong("engine_order", self.engine_order, "leave it out, or frequency: give one of both")
-        durations = {key: getattr(self, key) for key in ("cycles", "seconds") if getattr(self, key) is not None}
+        durations = [key for key in ("cycles", "seconds") if getattr(self, key) is not None]
         if self.is_passage:
-            for key, value in durations.items():
-                yield Wrong(key, value, "leave it out: a passage takes as long as its rate says")
+            for key in durations:
+                yield Wrong(key, getattr(self, key), "leave it out: a passage takes as long as its rate says")
             if self.begin != "sweep":
                 yield Wrong("begin", self.begin, 'give "sweep", or leave it out: a passage is a sweep')
-        elif not durations:
-            yield Wrong("cycles", None, "missing: give cycles or seconds, the duration of the block in one mission")
-        elif len(durations) > 1:
-            yield Wrong("cycles", self.cycles, "leave it out, or seconds: give one, the duration of the block")
+        elif len(durations) != 1:
+            yield Wrong("cycles", self.cycles, "give either cycles or seconds, the duration of the block in a mission")
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Keys of [scene] to which the block gives values of its own."""
+        return self.model_extra or {}
 
     @property
     def is_passage(self) -> bool:
@@ -87,72 +88,37 @@ class MissionBlock(Section):
             return "passage from {start:g} to {stop:g} Hz at {rate:g} Hz/s, ".format(**self.frequency) + cycles
         return f"{frequency:g} Hz, {cycles}, {how[self.begin]}"
 
-    def as_table(self) -> dict[str, Any]:
-        """The block as the study file has it."""
-        own = {name: value for name, value in self.model_dump(mode="json").items() if value is not None}
-        return {**own, **self.parameters}
-
 
 OWN_AXES = tuple(name for name in AxesSection.model_fields if name in MissionBlock.model_fields)
 """Axes of a study that a block may give a value of its own."""
 
 
-def read_blocks(
-    given: object, axes: Mapping[str, Any], scene: type[BaseModel], found: Mistakes
-) -> tuple[MissionBlock, ...]:
-    """The blocks of a study file, checked one by one and against each other; none where one of them is wrong.
+def read_blocks(given: object, scene: type[BaseModel], source: str) -> tuple[MissionBlock, ...]:
+    """The blocks of a study file, each right in itself; values of keys of [scene] are not looked at.
 
-    given: what stands under `mission`. axes: table of the study file. scene: what [scene] of this model consists of.
+    given: what stands under `mission`. scene: what [scene] of this model consists of. Raises UserError.
     """
     if not isinstance(given, list) or not given or not all(isinstance(block, dict) for block in given):
-        found.add("mission", given, "give blocks in order, each under a line [[mission]]")
-        return ()
-    blocks: list[MissionBlock] = []
+        raise UserError(source, "mission", given, "give blocks in order, each under a line [[mission]]")
+    tables: dict[str, Any] = {}
     for number, table in enumerate(given):
         name = table.get("name")
         place = f"mission.{name if isinstance(name, str) and name.isprintable() and name else number}"
-        with found.collecting():
-            blocks.append(_read_block(table, place, scene, found))
-            if name in [block.name for block in blocks[:-1]]:
-                found.add("mission.name", name, "give each block a name of its own")
-    if len(blocks) < len(given):
-        return ()
-    for before, block in zip((blocks[-1], *blocks), blocks, strict=False):
-        for key, value, remedy in _wrong_beside(before, block, axes):
-            found.add(f"mission.{block.name}.{key}", value, remedy)
-    return tuple(blocks)
-
-
-def _read_block(table: Mapping[str, Any], place: str, scene: type[BaseModel], found: Mistakes) -> MissionBlock:
-    """A block; its parameters are looked at with those of the scene. Raises UserError."""
-    of_scene = {name: name for name in scene.model_fields if name not in _NO_KEYS}
-    own: dict[str, Any] = {"begin": "sweep"} if isinstance(table.get("frequency"), dict) else {}
-    parameters = {}
-    for key, value in table.items():
-        if key in of_scene:
-            if isinstance(value, list) or (isinstance(value, dict) and {"start", "stop", "num"} & value.keys()):
-                found.add(f"{place}.{key}", value, "give one value: a block has one")
-            parameters[key] = value
-        elif key == "sweep":
-            found.add(f"{place}.{key}", value, 'give begin = "sweep": its direction is that of axes.sweep')
-        elif key in _NO_KEYS or (key in (*AxesSection.model_fields, *SOLVER_AXES) and key not in OWN_AXES):
-            found.add(f"{place}.{key}", value, "leave it out: it is the same in all blocks")
-        else:
-            own[key if key != "parameters" else "parameter"] = value
-    return check_table(MissionBlock, {**own, "parameters": parameters}, found.source, place, of_scene)
-
-
-def _wrong_beside(before: MissionBlock, block: MissionBlock, axes: Mapping[str, Any]) -> Iterator[Wrong]:
-    if not block.gives("frequency") and "frequency" not in axes:
-        yield Wrong("frequency", None, "missing: give it here, or as axes.frequency for all blocks without one")
-    if block.begin == "continue":
-        theirs, ours = before.parameters, block.parameters
-        changed = [key for key in {**theirs, **ours} if theirs.get(key) != ours.get(key)]
-        if changed:
-            remedy = f'give "ramp": a block that continues has the {changed[0]} of the block before, {before.name}'
-            yield Wrong("begin", block.begin, remedy)
-    elif block.begin == "sweep" and not block.is_passage and "ramp" in listed(axes.get("sweep")):
-        yield Wrong("begin", block.begin, 'give "ramp", or axes.sweep = "up" or "down": a sweep has a direction')
+        if place in tables:
+            raise UserError(source, "mission.name", name, "give each block a name of its own")
+        tables[place] = {"begin": "sweep", **table} if isinstance(table.get("frequency"), dict) else table
+    blocks = check_tables(dict.fromkeys(tables, MissionBlock), tables, source)
+    known = [*MissionBlock.model_fields, *(name for name in scene.model_fields if name not in _NO_KEYS)]
+    raise_wrong(
+        source,
+        (
+            Wrong(f"{place}.{key}", value, f"unknown key of a block, give {nearest_name(key, known)}")
+            for place, block in blocks.items()
+            for key, value in block.parameters.items()
+            if key not in known
+        ),
+    )
+    return tuple(blocks.values())
 
 
 def engine_frequency(block: MissionBlock, parameters: BaseModel, source: str) -> float:

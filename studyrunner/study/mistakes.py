@@ -1,4 +1,4 @@
-"""What is wrong with the tables of a study: a sentence for each key that pydantic or a rule between keys refuses."""
+"""What is wrong with the tables of a study: one sentence for each key that pydantic or a rule between keys refuses."""
 
 from __future__ import annotations
 
@@ -7,54 +7,48 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, NamedTuple, get_args
 
 from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
 
 from studies.scene_error import SceneError, remedy_of
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
 from studyrunner.values import Section, Wrong
 
-Checked = TypeVar("Checked", bound=BaseModel)
+Details = dict[str, Any]
+"""One of the `errors()` of pydantic."""
 
 _SINGLE = ("float_type", "int_type", "bool_type", "string_type")
 
 
-class Mistakes:
-    """Collects the mistakes of a study file, so that the user reads all of them at once. source: the file."""
+def raise_wrong(source: str, wrong: Iterable[Wrong]) -> None:
+    """Raises UserError with all that is wrong, if anything is; the first counts of several under one key."""
+    _raise_all([UserError(source, *each) for each in wrong])
 
-    def __init__(self, source: str) -> None:
-        self.source = source
-        self._found: dict[str, UserError] = {}
 
-    def __contains__(self, key: str) -> bool:
-        return key in self._found
+def _raise_all(mistakes: Iterable[UserError]) -> None:
+    found: dict[str, UserError] = {}
+    for each in mistakes:
+        found.setdefault(each.key, each)
+    if found:
+        first, *others = found.values()
+        raise UserError(first.place, first.key, first.value, first.remedy, tuple(others))
 
-    def __len__(self) -> int:
-        return len(self._found)
 
-    def add(self, key: str, value: object, remedy: str) -> None:
-        """One mistake; the first one counts of several under one key."""
-        self._found.setdefault(key, UserError(self.source, key, value, remedy))
-
-    @contextmanager
-    def collecting(self, renamed: Mapping[str, str] | None = None) -> Iterator[None]:
-        """The mistakes of a UserError that is raised inside. renamed: keys that the user gave at another place."""
-        try:
-            yield
-        except UserError as error:
-            for each in error.mistakes:
-                key = (renamed or {}).get(each.key, each.key)
-                self._found.setdefault(key, UserError(each.place, key, each.value, each.remedy))
-
-    def raise_any(self, tables: Iterable[str] = ()) -> None:
-        """Raises UserError with all mistakes, if there are any, by table in the order of the study file."""
-        if self._found:
-            order = {name: place for place, name in enumerate(tables)}
-            names = sorted(self._found, key=lambda key: order.get(key.partition(".")[0], -1))
-            first, *others = (self._found[name] for name in names)
-            raise UserError(first.place, first.key, first.value, first.remedy, tuple(others))
+@contextmanager
+def keys_as_given(renamed: Mapping[str, str]) -> Iterator[None]:
+    """A UserError that is raised inside names keys as the user gave them. renamed: names of keys, or of their tables,
+    in the study and in its file.
+    """
+    try:
+        yield
+    except UserError as error:
+        mistakes = []
+        for each in error.mistakes:
+            whole = f"{each.key}."
+            names = (new + whole[len(old) : -1] for old, new in renamed.items() if whole.startswith(f"{old}."))
+            mistakes.append(UserError(each.place, next(names, each.key), each.value, each.remedy))
+        _raise_all(mistakes)
 
 
 @contextmanager
@@ -70,114 +64,98 @@ def scene_errors(source: str, path: Path | None) -> Iterator[None]:
         raise UserError(place, "the scene file", None, f"give a file that can be read: {error.strerror}") from None
 
 
-def check_table(
-    kind: type[Checked],
-    table: Mapping[str, object],
-    source: str,
-    prefix: str,
-    others: Mapping[str, str] | None = None,
-) -> Checked:
-    """`kind` from the table, whose keys stand under `prefix`. others: keys that are looked at elsewhere, and their
-    names there: a key itself where it stands in this table, "axes.step" in another one.
+def check_tables(kinds: Mapping[str, type[BaseModel]], tables: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """An object of its class for each table, from what the study file gives; a missing table has its defaults.
 
-    Raises UserError with all that is wrong in the table.
+    kinds: classes by the names of tables, which may be dotted. Raises UserError with all that is wrong.
     """
-    found = Mistakes(source)
-    wrong: Iterator[Wrong] = iter(())
-    try:
-        # tables of scenes are made for other callers as well, and take this from their caller
-        checked = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
-        wrong = checked.rules() if isinstance(checked, Section) else wrong
-    except ValidationError as error:
-        wrong = _wrong_keys(error, kind, table, others or {})
-    for key, value, remedy in wrong:
-        found.add(f"{prefix}.{key}" if key else prefix, value, remedy)
-    found.raise_any()
+    checked, wrong = {}, list[Wrong]()
+    elsewhere = {key: f"{name}.{key}" for name, kind in reversed([*kinds.items()]) for key in kind.model_fields}
+    for name, kind in kinds.items():
+        table = tables.get(name, {})
+        try:
+            # tables of scenes are made for other callers as well, and take this from their caller
+            checked[name] = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
+        except ValidationError as error:
+            for each in _wrong_keys(error, kind, table, elsewhere):
+                wrong.append(each._replace(key=f"{name}.{each.key}" if each.key else name))
+    raise_wrong(source, wrong)
     return checked
 
 
+class _Place(NamedTuple):
+    """Where an error is: keys that lead there, classes of the table with the last one, and what this key means."""
+
+    names: tuple[str, ...]
+    tables: list[type[BaseModel]]
+    meaning: str
+
+
+def _place_of(kind: type[BaseModel], table: object, details: Details) -> _Place:
+    """Without places in lists and the kinds of value that were tried on the way."""
+    names, around, meaning = list[str](), [kind], ""
+    inner, tables = table, [kind]
+    for number, part in enumerate(details["loc"], 1):
+        is_missing = number == len(details["loc"]) and details["type"] == "missing"
+        if isinstance(inner, Mapping) and (part in inner or is_missing):
+            names, around, inner = [*names, str(part)], tables, inner.get(part)
+            fields = [each.model_fields[part] for each in tables if part in each.model_fields]
+            extra = [each.EXTRA for each in tables if issubclass(each, Section) and each.EXTRA and not fields]
+            tables = [*(table for field in fields for table in tables_in(field.annotation)), *extra]
+            # a key without a description of its own is part of one with a description
+            meaning = next((field.description for field in fields if field.description), meaning)
+        elif isinstance(inner, list | tuple) and isinstance(part, int) and part < len(inner):
+            inner = inner[part]
+    return _Place(tuple(names), around, f" ({re.sub(', [-1]$', '', meaning)})" if meaning else "")
+
+
 def _wrong_keys(
-    error: ValidationError, kind: type[BaseModel], table: Mapping[str, object], others: Mapping[str, str]
+    error: ValidationError, kind: type[BaseModel], table: object, elsewhere: Mapping[str, str]
 ) -> Iterator[Wrong]:
-    """What is wrong in a table, once for each key; the keys are those below the table."""
-    of_keys: dict[str, list[dict[str, Any]]] = {}
-    for details in flat_errors(error):
-        places = _places(table, details)
-        details["names"] = [place for place in places if isinstance(place, str)]
-        key = "".join(f"[{place}]" if isinstance(place, int) else f".{place}" for place in places)[1:]
-        of_keys.setdefault(key, []).append(details)
-    unknown = [found[0]["names"] for found in of_keys.values() if found[0]["type"] == "extra_forbidden"]
-    meant = {".".join((*names[:-1], _nearest(kind, names, others))) for names in unknown}
+    """What is wrong in a table, once for each key. elsewhere: keys of all tables, and where they stand."""
+    of_keys: dict[str, list[Details]] = {}
+    places: dict[str, _Place] = {}
+    for details in _flat_errors(error):
+        place = _place_of(kind, table, details)
+        places[".".join(place.names)] = place
+        of_keys.setdefault(".".join(place.names), []).append(details)
     for key, found in of_keys.items():
-        below = any(other.startswith((f"{key}.", f"{key}[")) for other in of_keys)
-        if not below and not (found[0]["type"] == "missing" and key in meant):
+        if not any(other.startswith(f"{key}.") for other in of_keys):
             # of a key that takes several kinds of values, the kinds that fit as far as can be
             deepest = max(len(each["loc"]) for each in found)
-            yield _wrong(kind, key, [each for each in found if len(each["loc"]) == deepest], others)
+            yield _wrong(key, places[key], [each for each in found if len(each["loc"]) == deepest], elsewhere)
 
 
-def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], others: Mapping[str, str]) -> Wrong:
-    details, names = found[0], found[0]["names"]
-    # a key without a description of its own is part of one with a description
-    described = [_fields(kind, names[:depth]).get(each) for depth, each in enumerate(names)]
-    description = next((field.description for field in reversed(described) if field and field.description), None)
-    unit = f" ({re.sub(', [-1]$', '', description)})" if description else ""
-    if details["type"] == "extra_forbidden":
-        return Wrong(key, details["input"], f"unknown key, give {_nearest(kind, names, others)}")
-    if details["type"] == "missing":
-        if isinstance(details["loc"][-1], int):
-            return Wrong(key, details["input"], f"give more values{unit}")
-        return Wrong(key, None, f"missing: give it{unit}")
-    cause = details.get("ctx", {}).get("error")
-    if isinstance(cause, WrongValueError | SceneError):
-        value = Verbatim(cause.value) if isinstance(cause, SceneError) else cause.value
-        return Wrong(cause.key or key, value, cause.remedy + unit)
-    may_be_axis = key in (kind.AXES if issubclass(kind, Section) else kind.model_fields)
-    if isinstance(details["input"], list) and details["type"] in _SINGLE and may_be_axis:
-        return Wrong(key, details["input"], f"give one value here, or the list as axes.{key}{unit}")
+def _wrong(key: str, place: _Place, found: Sequence[Details], elsewhere: Mapping[str, str]) -> Wrong:
+    kind, value, cause = found[0]["type"], found[0]["input"], found[0].get("ctx", {}).get("error")
+    if kind == "extra_forbidden":
+        known = [name for each in place.tables for name, field in each.model_fields.items() if not field.exclude]
+        name = place.names[-1]
+        other = "" if len(place.names) > 1 or close_name(name, known) else close_name(name, list(elsewhere))
+        return Wrong(key, value, f"unknown key, give {elsewhere.get(other) or nearest_name(name, known)}")
+    if kind == "missing":
+        is_value = isinstance(found[0]["loc"][-1], int)
+        remedy = "give more values" if is_value else "missing: give it"
+        return Wrong(key, value if is_value else None, remedy + place.meaning)
+    if isinstance(cause, SceneError):
+        return Wrong(cause.key or key, Verbatim(cause.value), cause.remedy + place.meaning)
+    if isinstance(cause, WrongValueError):
+        return Wrong(".".join(filter(None, (key, cause.key))), cause.value, cause.remedy + place.meaning)
+    own_axes = [name for each in place.tables for name in getattr(each, "AXES", each.model_fields)]
+    if isinstance(value, list) and kind in _SINGLE and key in own_axes:
+        return Wrong(key, value, f"give one value here, or the list as axes.{key}{place.meaning}")
     remedies = dict.fromkeys(remedy_of(each).removeprefix("give ") for each in found)
-    return Wrong(key, details["input"], f"give {', or '.join(remedies)}{unit}")
+    return Wrong(key, value, f"give {', or '.join(remedies)}{place.meaning}")
 
 
-def flat_errors(error: ValidationError) -> Iterator[dict[str, Any]]:
+def _flat_errors(error: ValidationError) -> Iterator[Details]:
     """All that is wrong, with its way from the table, also in tables that were checked on the way."""
     for details in error.errors(include_url=False):
         cause = details.get("ctx", {}).get("error")
         if isinstance(cause, ValidationError):
-            yield from ({**each, "loc": (*details["loc"], *each["loc"])} for each in flat_errors(cause))
+            yield from ({**each, "loc": (*details["loc"], *each["loc"])} for each in _flat_errors(cause))
         else:
             yield {**details}
-
-
-def _places(table: object, details: Mapping[str, Any]) -> list[str | int]:
-    """Names and list places that lead to the error, without the kinds of value that were tried on the way.
-
-    A place in a list is kept where a name follows.
-    """
-    places: list[str | int] = []
-    inner: object = table
-    for number, part in enumerate(details["loc"], 1):
-        is_missing = number == len(details["loc"]) and details["type"] == "missing"
-        if isinstance(inner, Mapping) and (part in inner or is_missing):
-            places.append(part)
-            inner = inner.get(part)
-        elif isinstance(inner, list | tuple) and isinstance(part, int):
-            places.append(part)
-            inner = inner[part] if part < len(inner) else None
-    while places and isinstance(places[-1], int):
-        places.pop()
-    return places
-
-
-def _fields(kind: type[BaseModel], names: Sequence[str]) -> Mapping[str, FieldInfo]:
-    """Keys of the table that `names` lead to, none where it is no table with keys of its own."""
-    tables = [kind]
-    for name in names:
-        fields = [each.model_fields.get(name) for each in tables]
-        extra = [each.EXTRA if issubclass(each, Section) else None for each in tables]
-        inner = [one.annotation if one else other for one, other in zip(fields, extra, strict=True)]
-        tables = [table for each in inner for table in tables_in(each)]
-    return {name: field for each in tables for name, field in each.model_fields.items() if not field.exclude}
 
 
 def tables_in(annotation: object) -> list[type[BaseModel]]:
@@ -185,16 +163,6 @@ def tables_in(annotation: object) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [found for each in get_args(annotation) for found in tables_in(each)]
-
-
-def _nearest(kind: type[BaseModel], names: Sequence[str], others: Mapping[str, str]) -> str:
-    """What is meant by an unknown key, the last of the names; the others are those of the tables around it."""
-    known = [*_fields(kind, names[:-1])]
-    if len(names) > 1:
-        return nearest_name(names[-1], known)
-    known += [name for name, shown in others.items() if name == shown]
-    elsewhere = close_name(names[-1], list(others)) if not close_name(names[-1], known) else ""
-    return others.get(elsewhere) or nearest_name(names[-1], known)
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:

@@ -1,27 +1,25 @@
-"""Axes that are keys of [scene] or [wear]: friction, speed, mesh, a threshold, the factor of a surface."""
+"""Axes that are keys of other tables: friction, speed, mesh, a threshold, the factor of a surface; harmonics."""
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, BeforeValidator, RootModel
 
-from studies.scene_error import remedy_of
-from studyrunner.study.mistakes import Mistakes, flat_errors, tables_in
+from studyrunner.study.mistakes import check_tables, raise_wrong, tables_in
 from studyrunner.study.sections import SOLVER_AXES, AxesSection, WearSection
-from studyrunner.user_error import WrongValueError
+from studyrunner.user_error import UserError
 from studyrunner.values import Wrong, read_axis
 
-Table = dict[str, Any]
+Tables = dict[str, Any]
 AxisValue = float | int | bool | str
 
-_MOST_COMBINATIONS = 10_000  # each of them is checked, which takes 0.2 ms
+_MOST_VARIANTS = 10_000  # each of them is checked, which takes 0.2 ms
 _UNITS = {"-": "1", "1": "1", "degrees": "degree", "rpm": "rpm"}
 _UNITS |= {name: name for name in ("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N/m3", "N s/m", "kg", "kg/m3", "J/m2")}
 
@@ -35,7 +33,7 @@ class SceneAxis:
     """
 
     name: str
-    table: Literal["scene", "wear"]
+    table: str
     key: tuple[str, ...]
     values: tuple[AxisValue, ...]
     units: str
@@ -47,105 +45,69 @@ class SceneAxis:
         return ".".join(self.key)
 
 
-def take_scene_axes(tables: Mapping[str, Any], scene: type[BaseModel], found: Mistakes) -> tuple[SceneAxis, ...]:
-    """Axes that are keys of [scene] or [wear], which are taken out of the table [axes].
+class _Values(RootModel[Annotated[tuple[Any, ...], BeforeValidator(read_axis)]]):
+    """Values of an axis of any kind."""
 
-    tables: of the study file. scene: what [scene] of this model consists of.
+
+def take_axes(tables: Tables, scene: type[BaseModel], source: str) -> tuple[SceneAxis, ...]:
+    """Axes that are keys of [scene] or [wear]. Keys of other tables are taken out of [axes], those of [solver] moved.
+
+    tables: of the study file. scene: what [scene] of this model consists of. Raises UserError.
     """
-    axes: list[SceneAxis] = []
-    for name in [name for name in tables["axes"] if name not in AxesSection.model_fields]:
-        of_scene = name in scene.model_fields
-        if not of_scene and name not in WearSection.AXES:
-            continue
-        value = tables["axes"].pop(name)
-        table: Literal["scene", "wear"] = "scene" if of_scene else "wear"
-        for inner, values in value.items() if is_table(value) else [(None, value)]:
-            key = (name,) if inner is None else (name, str(inner))
-            wrong = _wrong_place(tables[table], table, key, values)
-            of_axis = () if wrong else _read_values(".".join(key), values, found)
-            if wrong:
-                found.add(*wrong)
-            elif of_axis:
-                units, meaning = describe_key(scene if of_scene else WearSection, *key)
-                axes.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
-    n_combinations = math.prod(len(axis.values) for axis in axes)
-    if n_combinations > _MOST_COMBINATIONS:
+    tables_of = {"solver": SOLVER_AXES, "wear": WearSection.AXES, "scene": scene.model_fields}
+    places = {name: table for table, names in tables_of.items() for name in names}
+    keys: dict[str, tuple[str, ...]] = {}
+    given: Tables = {}
+    wrong: list[Wrong] = []
+    for name in [name for name in tables["axes"] if name in places and name not in AxesSection.model_fields]:
+        table, value = places[name], tables["axes"].pop(name)
+        first, parts = tables[table].get(name), dict[tuple[str, ...], object]({(name,): value})
+        if is_table(value) and table != "solver":
+            parts = {(name, str(inner)): each for inner, each in value.items()}
+        for key, values in parts.items():
+            dotted, inner = ".".join(key), only_table(first)
+            if first is not None and not (len(key) > 1 and isinstance(inner, Mapping) and key[1] not in inner):
+                wrong.append(Wrong(f"{table}.{name}", first, f"give it once, here or as axes.{dotted}"))
+            elif not "_".join(key).isidentifier():
+                remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
+                wrong.append(Wrong(f"axes.{dotted}", values, remedy))
+            elif table == "solver":
+                tables[table][name] = values
+            else:
+                keys[f"axes.{dotted}"], given[f"axes.{dotted}"] = key, values
+    raise_wrong(source, wrong)
+    axes = []
+    for dotted, checked in check_tables(dict.fromkeys(given, _Values), given, source).items():
+        key, table = keys[dotted], places[keys[dotted][0]]
+        about = describe_key(scene if table == "scene" else WearSection, *key)
+        axes.append(SceneAxis("_".join(key), table, key, checked.root, *about))
+    if (n_variants := math.prod(len(axis.values) for axis in axes)) > _MOST_VARIANTS:
         longest = max(axes, key=lambda axis: len(axis.values))
-        remedy = f"give fewer values: there are {n_combinations} combinations of keys of [scene] and [wear], at most "
-        remedy += f"{_MOST_COMBINATIONS} are possible; [scatter] takes more samples"
-        found.add(f"axes.{longest.dotted}", len(longest.values), remedy)
-        return ()
+        remedy = f"give fewer values: there are {n_variants} combinations of keys of [scene] and [wear], at most "
+        remedy += f"{_MOST_VARIANTS} are possible; [scatter] takes more samples"
+        raise UserError(source, f"axes.{longest.dotted}", len(longest.values), remedy)
     return tuple(axes)
-
-
-def _read_values(dotted: str, values: object, found: Mistakes) -> tuple[AxisValue, ...]:
-    try:
-        return read_axis(values)
-    except ValidationError as error:
-        for each in flat_errors(error):
-            found.add(f"axes.{dotted}.{each['loc'][0]}", each["input"], remedy_of(each))
-    except WrongValueError as error:
-        found.add(f"axes.{dotted}", error.value, error.remedy)
-    except ValueError as error:
-        found.add(f"axes.{dotted}", values, str(error))
-    return ()
-
-
-def _wrong_place(table: Mapping[str, Any], name: str, key: Sequence[str], values: object) -> Wrong | None:
-    """What is wrong with an axis of this key, where its table has the key, or no place for it."""
-    first, dotted = table.get(key[0]), ".".join(key)
-    inner = only_table(first)
-    in_table = len(key) > 1 and isinstance(inner, Mapping)
-    if first is not None and not (in_table and key[1] not in inner):
-        where, given = (dotted, inner[key[1]]) if in_table else (key[0], first)
-        return Wrong(f"{name}.{where}", given, f"give it once, here or as axes.{dotted}")
-    if not "_".join(key).isidentifier():
-        remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
-        return Wrong(f"axes.{dotted}", values, remedy)
-    return None
 
 
 def keys_below_axes(scene_axes: Sequence[SceneAxis]) -> dict[str, str]:
     """For keys of [scene] or [wear] whose values stand under [axes]: the keys there."""
-    return {f"{axis.table}.{name}": f"axes.{name}" for axis in scene_axes for name in (axis.key[0], axis.dotted)}
+    of_keys = (axis for axis in scene_axes if axis.key != ("worn",))
+    return {f"{axis.table}.{axis.key[0]}": f"axes.{axis.key[0]}" for axis in of_keys}
 
 
-@contextlib.contextmanager
-def keys_as_given(scene_axes: Sequence[SceneAxis]) -> Iterator[None]:
-    """A UserError on a key of [scene] or [wear] whose values stand under [axes] names the key there."""
-    found = Mistakes("")
-    with found.collecting(keys_below_axes(scene_axes)):
-        yield
-    found.raise_any()
-
-
-def combinations(tables: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[dict[str, Table]]:
-    """The tables of a study with each combination of values in [scene] and [wear], the last axis fastest."""
+def variants_of(tables: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[Tables]:
+    """[scene] and [wear] with each combination of values of the axes, the last axis fastest."""
     for values in itertools.product(*(axis.values for axis in scene_axes)):
-        changed = {**tables, "scene": dict(tables["scene"]), "wear": dict(tables["wear"])}
+        changed = {name: dict(tables[name]) for name in ("scene", "wear")}
         for axis, value in zip(scene_axes, values, strict=True):
             table, (name, *inner) = changed[axis.table], axis.key
-            if name == "worn":
-                # one state of several
-                depth = table["worn"]["depth"][axis.values.index(value)]
-                table["worn"] = {"depth": [depth], "result": table["worn"].get("result", "")}
+            given = table.get(name, {})
+            if inner:
+                own = {**only_table(given), inner[0]: value}
+                table[name] = own if only_table(given) is given else [own]
             else:
-                table[name] = _with(table.get(name, {}), inner[0], value) if inner else value
+                table[name] = value
         yield changed
-
-
-def scene_with_axes(scene: Mapping[str, Any], axes: Mapping[str, Any]) -> Table:
-    """[scene] of a result that holds its scene, with the only value of each axis that is a key of [scene]."""
-    found = dict(scene)
-    for name, values in axes.items():
-        if name in (*AxesSection.model_fields, *SOLVER_AXES, *WearSection.AXES):
-            continue
-        if not is_table(values):
-            found[name] = only_table(values)
-        elif isinstance(only_table(found.get(name, {})), Mapping):
-            for inner, each in values.items():
-                found[name] = _with(found.get(name, {}), inner, only_table(each))
-    return found
 
 
 def as_checked(scene_axes: Sequence[SceneAxis], study: Any) -> tuple[SceneAxis, ...]:
@@ -157,10 +119,6 @@ def as_checked(scene_axes: Sequence[SceneAxis], study: Any) -> tuple[SceneAxis, 
         values = (float(each) if is_float and isinstance(each, int) else each for each in axis.values)
         checked.append(replace(axis, values=tuple(values)))
     return tuple(checked)
-
-
-def _with(given: Any, key: str, value: AxisValue) -> Any:
-    return [{**given[0], key: value}] if only_table(given) is not given else {**given, key: value}
 
 
 def only_table(value: Any) -> Any:

@@ -9,20 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
 
 from studies.fe_models.model_files import ModelFiles
 from studies.fe_models.text import check_there
 from studies.scene import ContactStiffness, as_scene
 from studies.scene_error import SceneError
 from studies.scenes import scene_parameters
-from studyrunner.study.mistakes import Mistakes, check_table, close_name, scene_errors
-from studyrunner.study.scene_axes import SceneAxis
-from studyrunner.study.sections import ELSEWHERE
+from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
 from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file
 from studyrunner.system.progress import count as counted
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
-from studyrunner.values import NotNegative, Section, Wrong, listed, once
+from studyrunner.values import Axis, NotNegative, Section, Wrong, listed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,18 +48,13 @@ class SceneFileParameters(Section):
     contact_stiffness: ContactStiffness = None
 
 
-def _listed(value: object) -> object:
-    return tuple(listed(value))
-
-
 def _states(value: object) -> object:
     """Depths of all pairs, one number or one for each, of one state or of a list of states."""
     several = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
-    return tuple(_listed(state) for state in listed(value)) if several else (_listed(value),)
+    return tuple(tuple(listed(state)) for state in (listed(value) if several else [value]))
 
 
 _Depths = Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False)]
-_Counts = Annotated[tuple[NotNegative, ...], BeforeValidator(_listed), AfterValidator(once)]
 
 
 class Worn(Section):
@@ -74,7 +67,7 @@ class Worn(Section):
     depth: Annotated[tuple[_Depths, ...], BeforeValidator(_states)] = Field(
         description="m, of each pair or of all pairs"
     )
-    cycle: _Counts = Field((), description="cycle counts of the result")
+    cycle: Axis[NotNegative] = Field((), description="cycle counts of the result")
     result: str = Field("", description="result file")
 
     def rules(self) -> Iterator[Wrong]:
@@ -83,6 +76,10 @@ class Worn(Section):
             found = Verbatim(f"{len(self.depth)} states with {len(self.cycle)} cycle counts")
             remedy = "give one cycle count in scene.worn.cycle for each state, or one state without a count"
             yield Wrong("depth", found, remedy)
+
+    def states(self) -> tuple[Worn, ...]:
+        """Each state alone, without its count."""
+        return tuple(self.model_copy(update={"depth": (each,), "cycle": ()}) for each in self.depth)
 
     def depths(self, n_contact: int) -> tuple[float, ...]:
         """Depths (n_contact,), m, of the only state. Raises WrongValueError where there are others than pairs."""
@@ -116,19 +113,28 @@ class SceneSection(Section):
         """Whether the scene is a bundled one; a result may hold the model that it was built to."""
         return not (_names_file(self.model) or _names_model(self.model))
 
+    @property
+    def of_model(self) -> dict[str, object]:
+        """Parameters that the reduced model depends on: mostly without one friction coefficient of all pairs."""
+        given: dict[str, object] = self.parameters.model_dump(mode="json")
+        depends = self.is_bundled and as_scene(self.parameters).FRICTION_IN_MODEL
+        if not depends and not isinstance(given["friction_coefficient"], dict):
+            del given["friction_coefficient"]
+        return given
+
 
 @dataclass(frozen=True)
 class Origin:
     """Where a study is from.
 
     source: the file as the user named it. path: where it is; relative paths start in its folder. archived: what it says
-    of the result that it holds. keeps_scene: whether this result keeps the model of a bundled scene.
+    of the result that it holds. scene: that of this result, where the file keeps its reduced model.
     """
 
     source: str
     path: Path
     archived: Archived | None = None
-    keeps_scene: bool = False
+    scene: SceneSection | None = None
 
 
 def parameters_of(model: object, source: str) -> type[BaseModel]:
@@ -148,71 +154,56 @@ def parameters_of(model: object, source: str) -> type[BaseModel]:
         raise UserError(source, "scene.model", model, error.remedy) from None
 
 
-def check_scene(table: Mapping[str, Any], origin: Origin) -> SceneSection:
-    """The scene in a table. Raises UserError."""
-    model = table.get("model")
-    for key in table if model is None else ():
-        if close_name(key, ["model"]):
-            raise UserError(origin.source, f"scene.{key}", table[key], "unknown key, give model")
-    kind = parameters_of(model, origin.source)
-    assert isinstance(model, str)
-    if _names_model(model) and origin.archived is None:  # a file that is missing is named before keys that are
+def check_model_file(model: object, origin: Origin) -> None:
+    """Raises UserError where the file of a model is missing: this is said before keys that are missing."""
+    if isinstance(model, str) and _names_model(model) and origin.archived is None:
         with scene_errors(origin.source, None):
             check_there(origin.path.parent / model)
-    given = {key: value for key, value in table.items() if key not in ("model", "worn")}
-    mistakes, worn = Mistakes(origin.source), None
-    with mistakes.collecting():
-        parameters = check_table(kind, given, origin.source, "scene", {**ELSEWHERE, "model": "model", "worn": "worn"})
-    if table.get("worn") is not None:
-        with mistakes.collecting():
-            worn = check_table(Worn, table["worn"], origin.source, "scene.worn")
-    mistakes.raise_any()
-    return SceneSection(model=model, parameters=parameters, worn=worn, **_find_scene(model, parameters, given, origin))
 
 
-def _find_scene(model: str, parameters: BaseModel, given: Mapping[str, Any], origin: Origin) -> dict[str, Any]:
-    """Where the scene is and what it offers: in the result that is read, in files, or to be built."""
-    held, is_file = origin.archived, _names_file(model)
-    before = held.scene if held is not None and held.holds_scene and held.scene.get("model") == model else None
-    changed = [key for key in type(parameters).model_fields if before and given.get(key) != before.get(key)]
-    if not (is_file or _names_model(model)):
-        # only what was kept on request takes the place of what a bundled scene builds
-        kept = _in_file(origin.path, SCENE_GROUP, origin) if origin.keeps_scene and before and not changed else {}
-        return {**kept, "offers": as_scene(parameters).OFFERS}
-    if before is not None:
-        # one friction coefficient of all pairs is not part of the reduced scene
-        free = is_file or isinstance(dict(parameters)["friction_coefficient"], float)
-        for key in changed:
-            if not (free and key == "friction_coefficient"):
-                remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
-                raise UserError(origin.source, f"scene.{key}", given.get(key), remedy)
-        return _in_file(origin.path, SCENE_GROUP, origin)
-    if is_file:
+def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
+    """The scene with its files and what it offers: in the result that is read, in files, or to be built.
+
+    scene: checked. Raises UserError where there is no such file, or the result holds the model of another scene.
+    """
+    model, before = scene.model, origin.scene
+    if scene.is_bundled:
+        scene = scene.model_copy(update={"offers": as_scene(scene.parameters).OFFERS})
+    if before is not None and before.model == model:
+        ours, theirs = scene.of_model, before.of_model
+        changed = [key for key in {**theirs, **ours} if ours.get(key) != theirs.get(key)]
+        if not changed:
+            return _in_file(scene, origin.path, SCENE_GROUP, origin)
+        if not scene.is_bundled:
+            remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
+            raise UserError(origin.source, f"scene.{changed[0]}", ours.get(changed[0]), remedy)
+    if scene.is_bundled:
+        return scene
+    if _names_file(model):
         path = origin.path.parent / model
-        try:
+        with scene_errors(origin.source, path):
             exists = path.is_file()
-        except (OSError, ValueError):
-            exists = False
         if not exists:
             remedy = "there is no such file: give a path relative to the study file"
             raise UserError(origin.source, "scene.model", model, remedy)
-        return _in_file(path, "", origin)
+        return _in_file(scene, path, "", origin)
     # what reads and reduces it is loaded where there is one
     from studies.fe_models.from_files.model import find_files
     from studies.fe_models.from_files.parameters import Parameters
 
-    assert isinstance(parameters, Parameters)
+    assert isinstance(scene.parameters, Parameters)
     with scene_errors(origin.source, None):
-        files = find_files(origin.path.parent, model, parameters)
-    return {"files": files, "offers": ("mesh",) if files.has_faces else ()}
+        files = find_files(origin.path.parent, model, scene.parameters)
+    return scene.model_copy(update={"files": files, "offers": ("mesh",) if files.has_faces else ()})
 
 
-def _in_file(path: Path, group: str, origin: Origin) -> dict[str, Any]:
-    """Where the scene stands and what it offers, once it is known that it can be read at all."""
+def _in_file(scene: SceneSection, path: Path, group: str, origin: Origin) -> SceneSection:
+    """The scene in a file, once it is known that it can be read at all."""
     from studies.scene_file import read_mesh
 
     with scene_errors(origin.source, path):
-        return {"path": path, "group": group, "offers": ("mesh",) if read_mesh(path, group) is not None else ()}
+        offers = scene.offers or (("mesh",) if read_mesh(path, group) is not None else ())
+    return scene.model_copy(update={"path": path, "group": group, "offers": offers})
 
 
 class _OfResult(Section):
@@ -221,79 +212,58 @@ class _OfResult(Section):
     model_config = ConfigDict(extra="allow")
 
     result: str = Field(description="path of a result file; or depth in place of a result")
-    cycle: Annotated[_Counts, Field(min_length=1)] = Field(description="cycle counts of the result")
+    cycle: Axis[NotNegative] = Field(description="cycle counts of the result")
 
 
-def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
-    """The table `worn` with depths, those of a result file read from the file. folder: relative paths start here.
+def read_worn(table: object, source: str, folder: Path) -> Worn:
+    """The table `worn`, with the depths of a result file where it names one. folder: relative paths start here.
 
     table: as the study file has it: {result, cycle, ...}, where other keys select a point of the result, or {depth}.
-
     Raises UserError where the table or the result file is wrong.
     """
     import xarray as xr  # where it is used: it takes a while to load
 
-    if not isinstance(table, Mapping):
-        remedy = 'give {result = "OUT.nc", cycle = [...]} with the axes of a point, or {depth = ...}'
-        raise UserError(source, "scene.worn", table, remedy)
-    if "depth" in table:
-        worn = check_table(Worn, table, source, "scene.worn")
-        return {"depth": [list(each) for each in worn.depth], "cycle": list(worn.cycle), "result": worn.result}
-    given = check_table(_OfResult, table, source, "scene.worn")
+    kind = Worn if isinstance(table, Mapping) and "depth" in table else _OfResult
+    given = check_tables({"scene.worn": kind}, {"scene.worn": table}, source)["scene.worn"]
+    if isinstance(given, Worn):
+        return given
     path = folder / given.result
-    if not path.exists():
-        remedy = "there is no such file: give a result file of run-study, relative to the study file"
-        raise UserError(source, "scene.worn.result", given.result, remedy)
     check_result_file(path, str(path))
     try:
         with xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
             depth = _depths_in(dataset, given.model_extra or {}, given.cycle, source)
+        return Worn(depth=depth.tolist(), cycle=given.cycle, result=given.result)
     except (OSError, RuntimeError, ValueError, TypeError, KeyError, IndexError):
         # what the libraries raise where a file is no result, or damaged
         remedy = "give a result file of run-study that is whole"
         raise UserError(str(path), "the file", Verbatim("damaged"), remedy) from None
-    return {"depth": depth.tolist(), "cycle": list(given.cycle), "result": given.result}
 
 
 def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:
     """Depths (n_states, n_contact), m, of a point of a result at cycle counts."""
     if "wear_depth" not in dataset:
         raise UserError(source, "scene.worn.result", None, "give a result with wear_depth among its variables")
-    depths, found = dataset["wear_depth"], Mistakes(source)
+    depths = dataset["wear_depth"]
     axes = [str(name) for name in depths.dims[:-2]]
-    for name in point.keys() - set(axes):
-        remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
-        found.add(f"scene.worn.{name}", point[name], remedy)
-    places: dict[str, Any] = {}
-    for name in axes:
+    remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
+    raise_wrong(source, (Wrong(f"scene.worn.{name}", point[name], remedy) for name in point.keys() - set(axes)))
+
+    def place(name: str, wanted: Any) -> int:
         values = dataset[name].values.tolist()
-        wanted = point.get(name, values[0] if len(values) == 1 else None)
-        places[name] = _place(f"scene.worn.{name}", values, wanted, found)
-    counts = dataset["cycle"].values.tolist()
-    places["cycle"] = [_place("scene.worn.cycle", counts, count, found) for count in cycle]
-    found.raise_any()
-    chosen = np.asarray(depths.isel(places).values, dtype=np.float64)
+        if wanted is None and len(values) == 1:
+            return 0
+        is_number = isinstance(wanted, float | int) and not isinstance(values[0], str)
+        for number, value in enumerate(values):
+            if value == wanted or (is_number and math.isclose(value, wanted, rel_tol=1e-12)):
+                return number
+        near = sorted(values, key=lambda value: abs(value - wanted)) if is_number else values
+        remedy = f"give a value of the result: {', '.join(map(str, near[:10]))}"
+        raise UserError(source, f"scene.worn.{name}", wanted, remedy)
+
+    places: dict[str, Any] = {name: place(name, point.get(name)) for name in axes}
+    chosen = depths.isel(places | {"cycle": [place("cycle", count) for count in cycle]}).values.astype(np.float64)
     for count, row in zip(cycle, chosen, strict=True):
         if not np.isfinite(row).all():
             remedy = "give an earlier cycle count: the result does not hold the depths of this one"
             raise UserError(source, "scene.worn.cycle", count, remedy)
     return chosen
-
-
-def _place(key: str, values: Sequence[Any], wanted: Any, found: Mistakes) -> int:
-    """Index of a value along an axis of a result; 0, and a mistake, where it is not there."""
-    numbers = isinstance(wanted, float | int) and not isinstance(values[0], str)
-    for place, value in enumerate(values):
-        if (numbers and math.isclose(value, wanted, rel_tol=1e-12)) or value == wanted:
-            return place
-    if numbers:
-        values = sorted(values, key=lambda value: abs(value - wanted))
-    found.add(key, wanted, f"give a value of the result: {', '.join(map(str, values[:10]))}")
-    return 0
-
-
-def worn_axis(table: Mapping[str, Any], name: str) -> tuple[SceneAxis, ...]:
-    """The axis of worn states; none where their cycle counts are not known. table: as `read_worn` gives it."""
-    counts = table.get("cycle", [])
-    meaning = "number of vibration cycles that have worn the joint before"
-    return (SceneAxis(name, "scene", ("worn",), tuple(counts), "1", meaning),) if counts else ()

@@ -6,34 +6,14 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, Field
 
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
-from studyrunner.study.mistakes import nearest_name
-from studyrunner.user_error import WrongValueError
-from studyrunner.values import (
-    Axis,
-    Cycles,
-    Fraction,
-    Harmonics,
-    Listed,
-    Mode,
-    NotNegative,
-    Positive,
-    Samples,
-    Scheme,
-    Section,
-    Sweep,
-    Whole,
-    Wrong,
-    ascending,
-    listed,
-    once,
-)
-from studyrunner.variables import ASKED, KEPT, OF_MISSIONS, OF_MODES
+from studyrunner.values import Axis, Fraction, Listed, NotNegative, Positive, Section, Whole, Wrong, ascending, once
+from studyrunner.variables import ASKED, OF_MISSIONS, OF_MODES
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
@@ -52,17 +32,8 @@ _MOST_KNOTS = 1000
 
 
 def _check_name(value: str) -> str:
-    if not value.strip() or value.startswith(".") or not value.isprintable():
-        raise ValueError("give a name that can be a file name")
-    if "/" in value or "\\" in value or len(value) > 100:
-        raise ValueError("give a name of at most 100 characters without a slash")
-    return value
-
-
-def _check_variables(value: object) -> object:
-    for name in listed(value):
-        if name not in (DEFAULT, *VARIABLES, *KEPT) and isinstance(value, list | tuple):
-            raise WrongValueError(name, f'give "{DEFAULT}" or {nearest_name(str(name), (*VARIABLES, *KEPT))}')
+    if not value.strip() or value.startswith(".") or not value.isprintable() or {*"/\\"} & {*value} or len(value) > 100:
+        raise ValueError("give a name of at most 100 characters that can be a file name, without a slash")
     return value
 
 
@@ -72,6 +43,9 @@ def _check_target(value: dict[str, float]) -> dict[str, float]:
     return value
 
 
+_Scheme = Literal["implicit", "explicit", "adaptive", "final"]
+_Samples = Annotated[Whole, Field(ge=4, le=100_000)]
+_Number = Annotated[Whole, Field(ge=1, le=1000)]
 _Knots = Annotated[Listed[float], Field(min_length=1, max_length=_MOST_KNOTS), AfterValidator(ascending)]
 
 
@@ -102,14 +76,14 @@ class AxesSection(Section):
     wear_coefficient: Axis[NotNegative] = Field((1.1e-11,), description="1/Pa, of the law of [wear]")
     excitation_amplitude: Axis[Positive] = Field((1.0,), description="N, factor of the harmonic load of the scene")
     step: Axis[Positive] = Field((1000.0,), description="h, cycles: length of implicit and explicit steps")
-    scheme: Axis[Scheme] = Field(("adaptive",), description="how wear is integrated over the cycles")
-    sweep: Axis[Sweep] = Field(
+    scheme: Axis[_Scheme] = Field(("adaptive",), description="how wear is integrated over the cycles")
+    sweep: Axis[Literal["up", "down", "ramp"]] = Field(
         ("up",), description="to the unworn state the frequency rises, or falls, or the excitation rises"
     )
     modal_amplitude: Axis[Positive] | None = Field(
         None, description="m sqrt(kg), of nonlinear modes, in place of a frequency"
     )
-    mode: Axis[Mode] = Field((1,), description="number of the nonlinear mode, by frequency, from 1 on")
+    mode: Axis[_Number] = Field((1,), description="number of the nonlinear mode, by frequency, from 1 on")
 
 
 class WearSection(Section):
@@ -173,7 +147,7 @@ class WearSection(Section):
 class SlowTimeSection(Section):
     """[slow_time]: end of the histories, and cycle counts of the output."""
 
-    cycles: Cycles = Field(
+    cycles: Annotated[float, Field(ge=0, allow_inf_nan=True)] = Field(
         100_000.0, description="of vibration; 0: the unworn states only, inf: until nothing wears any more"
     )
     missions: Annotated[Whole, Field(ge=1, le=10_000_000)] | None = Field(
@@ -222,8 +196,10 @@ class SlowTimeSection(Section):
 class SolverSection(Section):
     """[solver]: resolution and accuracy. Several values of the first keys are an axis, as under [axes]."""
 
-    harmonics: Axis[Harmonics] = Field((AUTO,), description="harmonics above the static one")
-    samples: Axis[Samples] = Field((AUTO,), description="time samples in a period, more than twice the harmonics")
+    harmonics: Axis[_Number | Literal["auto"]] = Field((AUTO,), description="harmonics above the static one")
+    samples: Axis[_Samples | Literal["auto"]] = Field(
+        (AUTO,), description="time samples in a period, more than twice the harmonics"
+    )
     tolerance: Axis[Fraction] = Field((1e-8,), description="of the scaled residual")
     rtol: Axis[Fraction] = Field((1e-2,), description="aim for the relative error of worn volume and response")
     shortcuts: bool = Field(True, description="whether points with the same history share one")
@@ -233,7 +209,7 @@ class SolverSection(Section):
 class OutputsSection(Section):
     """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
-    variables: Annotated[Listed[str], BeforeValidator(_check_variables), AfterValidator(once)] = Field(
+    variables: Annotated[Listed[str], AfterValidator(once)] = Field(
         (DEFAULT,), description="list of names; default: those that cost little"
     )
     loops: Annotated[
@@ -262,6 +238,3 @@ SECTIONS: dict[str, type[Section]] = {
     "scatter": ScatterSection,
     "loading": LoadingSection,
 }
-
-ELSEWHERE = {key: f"{table}.{key}" for table, kind in reversed(SECTIONS.items()) for key in kind.model_fields}
-"""Where a key stands that is not known in another table."""

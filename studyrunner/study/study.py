@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from pydantic import Field
 
 from solver.settings import TARGETS, FollowedFrequency, WearTarget
-from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner import variables
+from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
 from studyrunner.study.mission import OWN_AXES, MissionBlock
 from studyrunner.study.scene_axes import SceneAxis
@@ -29,56 +30,39 @@ from studyrunner.study.sections import (
 )
 from studyrunner.study.text import Archived
 from studyrunner.values import Section
-from studyrunner.variables import (
-    ASKED,
-    COUNTS,
-    KEPT,
-    LOOPS,
-    OF_A_MISSION,
-    OF_A_MODE_POINT,
-    OF_MISSIONS,
-    OF_MISSIONS_BY_DEFAULT,
-    OF_MODES,
-    OF_SAMPLED_MISSIONS,
-    OF_SAMPLES,
-    USUAL,
-    Variable,
-)
 
 
 @dataclass(frozen=True)
 class Kind:
     """A kind of study.
 
-    name: what its points are. about: what a result holds, of a {scene}.
+    name: what its points are. about: what a result holds, of a {scene}. time: how well the time of a run is known.
     axes: axes of the result that are neither keys of the solver, of [scene] and [wear], nor samples, in their order.
     asked, kept: variables that its points may have, and that its result always holds.
     usual, of_samples: variables where the study names none, and where samples are drawn.
     counted: what the slow time counts; empty where nothing wears.
     unused: keys without a use, by table. why: the remedy where one is given.
-    time: how well the time of a run is known before, for `--plan`.
     """
 
     name: str
     about: str
+    time: str
     axes: tuple[str, ...]
-    asked: Mapping[str, Variable]
-    kept: Mapping[str, Variable]
+    asked: Mapping[str, variables.Variable]
+    kept: Mapping[str, variables.Variable]
     usual: tuple[str, ...]
     of_samples: tuple[str, ...]
-    counted: str
-    unused: Mapping[str, tuple[str, ...]]
-    why: str
-    time: str
+    counted: str = ""
+    unused: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    why: str = ""
 
 
 def _other_axes(*axes: str) -> tuple[str, ...]:
     return tuple(name for name in AxesSection.model_fields if name not in axes)
 
 
-_AXES = _other_axes("frequency_ratio", "modal_amplitude", "mode")
 _OF_MODES = ("mode", "sweep")
-_OF_MISSIONS = tuple(name for name in _AXES if name not in ("step", "scheme"))
+_OF_MISSIONS = _other_axes("frequency_ratio", "step", "scheme", "modal_amplitude", "mode")
 
 NUMBERS = tuple(name for name in _OF_MISSIONS if name != "sweep")
 """Axes that hold numbers of the joint and of its excitation, which may scatter."""
@@ -87,51 +71,48 @@ WEAR = Kind(
     "wear histories",
     "Fretting wear of a joint under vibration: wear histories of the scene {scene}. Wear depths and worn volume,"
     " contact pressures and slip, vibration, and the errors of each.",
-    _AXES,
-    ASKED,
-    KEPT,
-    USUAL,
-    OF_SAMPLES,
-    "cycle",
-    {},
-    "",
     "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long",
+    _other_axes("frequency_ratio", "modal_amplitude", "mode"),
+    variables.ASKED,
+    variables.KEPT,
+    variables.USUAL,
+    variables.OF_SAMPLES,
+    "cycle",
 )
 MODES = Kind(
     "nonlinear modes",
     "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene {scene}.",
+    "to a factor of three; a mode that is lost at a large amplitude takes longer",
     _OF_MODES,
-    OF_MODES,
-    OF_A_MODE_POINT,
-    tuple(OF_MODES),
-    tuple(OF_MODES),
-    "",
-    {
+    variables.OF_MODES,
+    variables.OF_A_MODE_POINT,
+    tuple(variables.OF_MODES),
+    tuple(variables.OF_MODES),
+    unused={
         "axes": _other_axes(*_OF_MODES, "modal_amplitude"),
         "slow_time": tuple(SlowTimeSection.model_fields),
         "wear": tuple(WearSection.model_fields),
         "outputs": ("loops",),
     },
-    "leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
-    "to a factor of three; a mode that is lost at a large amplitude takes longer",
+    why="leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
 )
 MISSIONS = Kind(
     "missions",
     "Fretting wear of a joint over missions: scene {scene}. Worn volume by block, wear depths, vibration, and the"
     " errors of each.",
+    "to a factor of three, if every block wears",
     _OF_MISSIONS,
-    OF_MISSIONS,
-    OF_A_MISSION,
-    OF_MISSIONS_BY_DEFAULT,
-    OF_SAMPLED_MISSIONS,
+    variables.OF_MISSIONS,
+    variables.OF_A_MISSION,
+    variables.OF_MISSIONS_BY_DEFAULT,
+    variables.OF_SAMPLED_MISSIONS,
     "mission",
     {
-        "axes": _other_axes(*_OF_MISSIONS),
+        "axes": _other_axes(*_OF_MISSIONS, "mode"),
         "slow_time": ("cycles", "final_share", "largest_depth"),
         "outputs": ("loops",),
     },
     "leave it out: slow_time.missions counts in place of cycles, and missions choose their own steps",
-    "to a factor of three, if every block wears",
 )
 
 
@@ -173,16 +154,10 @@ class Study(Section):
         return MISSIONS if self.mission else MODES if self.axes.modal_amplitude is not None else WEAR
 
     @property
-    def recorded(self) -> Mapping[str, Variable]:
+    def recorded(self) -> Mapping[str, variables.Variable]:
         """Variables of its points, beside those that every result holds."""
         asked = {name: entry for name, entry in self.kind.asked.items() if name in self.outputs.variables}
-        return asked | (LOOPS if self.outputs.loops else {}) | (COUNTS if self.to_the_end else {})
-
-    @property
-    def sizes(self) -> Mapping[str, int]:
-        """Lengths of the dimensions after the axes that the study gives: slow time, and blocks of missions."""
-        counted = {self.kind.counted: len(self.output_counts)} if self.kind.counted else {}
-        return {**counted, **({"block": len(self.mission)} if self.mission else {})}
+        return asked | (variables.LOOPS if self.outputs.loops else {}) | (variables.COUNTS if self.to_the_end else {})
 
     @property
     def scene_variables(self) -> tuple[str, ...]:
@@ -248,10 +223,10 @@ class Study(Section):
         names = {} if self.axes.frequency_ratio is None else {"frequency": "frequency_ratio"}
         own = {names.get(name, name): self.solver if name in SOLVER_AXES else self.axes for name in self.own_axes}
         found = {name: getattr(table, name) or () for name, table in own.items()} | self.axes_of_parts
-        if self.axes.modal_amplitude is None:
-            return found
-        worn = found.pop("cycle", (0.0,))
-        return {**found, "modal_amplitude": self.axes.modal_amplitude, "cycle": worn}
+        if self.axes.modal_amplitude is not None:
+            worn = found.pop("cycle", (0.0,))
+            found |= {"modal_amplitude": self.axes.modal_amplitude, "cycle": worn}
+        return found
 
     @property
     def n_points(self) -> int:
@@ -260,13 +235,9 @@ class Study(Section):
 
     @property
     def axes_of_parts(self) -> dict[str, tuple[float | str, ...]]:
-        """Names and values of the axes whose points are parts of the study (`realise`): the last axes of the result."""
-        samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.realisations))}
+        """Names and values of the axes whose points are parts of the study (`parts_of`), the last of the result."""
+        samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.n_rows))}
         return {**{axis.name: axis.values for axis in self.scene_axes}, **samples}
-
-    def units(self, name: str) -> str:
-        """Unit of an axis; "1" where it has none."""
-        return {axis.name: axis.units for axis in self.scene_axes}.get(name) or COORDINATES[name].units
 
     @property
     def own_axes(self) -> tuple[str, ...]:

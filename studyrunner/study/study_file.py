@@ -3,53 +3,54 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter import flat_table
-from studyrunner.study.mission import OWN_AXES, MissionBlock, engine_frequency, read_blocks
-from studyrunner.study.mistakes import Mistakes, check_table, close_name, nearest_name
-from studyrunner.study.overrides import override
-from studyrunner.study.realisation import with_room_for_wear
-from studyrunner.study.rules import check_rules, size_of_result, wrong_scatter
+from studyrunner.study.mission import OWN_AXES, engine_frequency, read_blocks
+from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
+from studyrunner.study.parts import with_room_for_wear
+from studyrunner.study.rules import broken_rules
 from studyrunner.study.scene_axes import (
     SceneAxis,
+    Tables,
     as_checked,
-    combinations,
+    is_table,
     keys_below_axes,
     only_table,
-    scene_with_axes,
-    take_scene_axes,
+    take_axes,
+    variants_of,
 )
-from studyrunner.study.scene_section import WORN_AXIS, Origin, check_scene, parameters_of, read_worn, worn_axis
-from studyrunner.study.sections import (
-    DEFAULT,
-    ELSEWHERE,
-    SECTIONS,
-    SOLVER_AXES,
-    VARIABLES,
-    AxesSection,
-    SlowTimeSection,
-    WearSection,
+from studyrunner.study.scene_section import (
+    WORN_AXIS,
+    Origin,
+    SceneSection,
+    Worn,
+    check_model_file,
+    find_scene,
+    parameters_of,
+    read_worn,
 )
+from studyrunner.study.sections import DEFAULT, SECTIONS, SOLVER_AXES, VARIABLES, SlowTimeSection, WearSection
 from studyrunner.study.study import MODES, Study
-from studyrunner.study.text import format_toml, read_archived, read_toml, read_toml_file
+from studyrunner.study.text import format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError
 from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
-Tables = dict[str, Any]
-
 _IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
-_ON_REQUEST = ("scatter", "loading", "mission")
-_TABLES = ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", *_ON_REQUEST)
+_INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
+"""Keys that stand in each other's place."""
+
+_ON_REQUEST = ("scatter", "loading")
 
 
 def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Study:
@@ -61,20 +62,20 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
 
     Raises UserError where there is no such study or something in it is wrong: a line for each mistake.
     """
-    argument = str(study)
-    path = _study_path(argument)
-    archived = None
+    source = str(study)
+    path = _study_path(source)
+    archived, scene = None, None
     try:
         if is_hdf5(path):
-            archived = read_archived(path, argument)
-            table = read_toml(archived.study.encode(), argument)
-            archived = replace(archived, scene=scene_with_axes(_dict(table, "scene"), _dict(table, "axes")))
+            archived = read_archived(path, source)
+            table = read_toml(archived.study.encode(), source)
+            scene = _scene_of_result(table, source) if archived.holds_scene else None
         else:
-            table = read_toml_file(path, argument)
+            table = read_toml(path, source)
     except OSError as error:
-        raise UserError(argument, "the file", None, f"give a file that can be read: {error.strerror}") from None
-    override(table, overrides)
-    return _check_study(table, Origin(argument, path, archived, _dict(table, "outputs").get("scene") is True))
+        raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
+    _override(table, overrides)
+    return _check_study(table, Origin(source, path, archived, scene))
 
 
 def bundled_studies() -> tuple[str, ...]:
@@ -84,23 +85,37 @@ def bundled_studies() -> tuple[str, ...]:
 
 
 def _study_path(argument: str) -> Path:
-    path, names = Path(argument), bundled_studies()
-    try:
-        if path.is_file():
-            return path
-        remedy = "give a TOML file: this is a folder" if path.is_dir() else ""
-    except OSError as error:
-        remedy = f"give a file that can be read: {error.strerror}"
-    if not remedy and argument in names:
+    names = bundled_studies()
+    with contextlib.suppress(OSError):
+        if Path(argument).is_file():
+            return Path(argument)
+    if argument in names:
         return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
-    what = "no such file" if path.suffix == ".toml" or "/" in argument or "\\" in argument else "none of this name"
-    remedy = remedy or f"there is {what}: give a TOML file or one of the bundled studies {', '.join(names)}"
+    remedy = f"there is no such file: give a TOML file or one of the bundled studies {', '.join(names)}"
     raise UserError(argument, "the study", None, remedy)
 
 
-def _dict(table: Mapping[str, object], name: str) -> dict[str, Any]:
-    section = table.get(name, {})
-    return section if isinstance(section, dict) else {}
+def _tables_of(table: Mapping[str, object], source: str) -> Tables:
+    """The tables of a study file, those that are always read as empty ones; copies, in which keys may be changed."""
+    tables: Tables = {name: {} for name in SECTIONS if name not in _ON_REQUEST} | {"scene": {}}
+    for name, section in table.items():
+        if (meant := nearest_name(name, (*SECTIONS, "scene", "mission"))) != name:
+            raise UserError(source, name, section, f"unknown table, give {meant}")
+        if name != "mission" and not isinstance(section, dict):
+            raise UserError(source, name, section, f"give a table [{name}] with keys")
+        tables[name] = dict(section) if isinstance(section, dict) else section
+    if "scatter" in tables:
+        tables["scatter"] = flat_table(tables["scatter"])
+    return tables
+
+
+def _scene_of_result(table: Mapping[str, object], source: str) -> SceneSection:
+    """The scene of the study of a result that keeps its reduced model: one for all values of axes."""
+    tables = _tables_of(table, source)
+    model, _ = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
+    kind = parameters_of(model, source)
+    given = next(variants_of(tables, take_axes(tables, kind, source)))["scene"]
+    return SceneSection(model=model, parameters=check_tables({"scene": kind}, {"scene": given}, source)["scene"])
 
 
 def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
@@ -108,137 +123,57 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
 
     Raises UserError with all that is wrong in single tables; where nothing is, with all that does not fit together.
     """
-    found = Mistakes(origin.source)
-    tables = _known_tables(table, found)
-    _take_worn(tables, origin, found)
-    scene: type[BaseModel] | None = None
-    with contextlib.suppress(UserError):  # a mistake where the scene is checked
-        scene = parameters_of(tables["scene"].get("model"), origin.source)
-    axes, blocks = _axes_and_blocks(tables, scene, found)
-    solver_axes = _take_solver_axes(tables, found)
-    renamed, parts = {**keys_below_axes(axes), **solver_axes}, []
-    sections = {**_check_sections(tables, scene, renamed, found), "mission": blocks, "archived": origin.archived}
-    sections |= {"source": origin.source, "folder": origin.path.parent}
-    sections["solver_axes"] = tuple(key for key in SOLVER_AXES if f"solver.{key}" in solver_axes)
-    for part in combinations(tables, axes):
-        of_part: dict[str, Any] = {}
-        with found.collecting(renamed):
-            of_part["wear"] = check_table(WearSection, part["wear"], origin.source, "wear")
-        with found.collecting(renamed):
-            of_part["scene"] = check_scene(part["scene"], origin)
-        parts.append((part["scene"], of_part))
-    found.raise_any(table)
-    studies = []
-    for given, of_part in parts:
-        with found.collecting(renamed):
-            study, wrong = Study.model_construct(**sections, **of_part), Mistakes(origin.source)
-            check_rules(study, wrong)
-            study = _with_block_studies(study, given, origin, wrong) if blocks else study
-            wrong.raise_any()
-            studies.append(_complete(study))
-    found.raise_any(table)
+    source, tables = origin.source, _tables_of(table, origin.source)
+    model, worn = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
+    kind = parameters_of(model, source)
+    check_model_file(model, origin)
+    worn = None if worn is None else read_worn(worn, source, origin.path.parent)
+    solver_axes = tuple(key for key in SOLVER_AXES if key in tables["axes"])
+    axes = take_axes(tables, kind, source)
+    blocks = read_blocks(tables.pop("mission"), kind, source) if "mission" in tables else ()
+    if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
+        tables.setdefault("loading", {})
+    kinds: dict[str, type[BaseModel]] = {name: each for name, each in SECTIONS.items() if name in tables}
+    with keys_as_given({**keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
+        variants, studies = [*variants_of(tables, axes)], []
+        sections = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
+        worn_axis = _worn_axis(worn, "cycle" if sections["axes"].modal_amplitude else WORN_AXIS)
+        fixed = {"mission": blocks, "source": source, "folder": origin.path.parent, "archived": origin.archived}
+        fixed |= {"solver_axes": solver_axes, "scene_axes": (*axes, *worn_axis)}
+        for given in variants:
+            checked = check_tables({"scene": kind, "wear": WearSection}, given, source)
+            for state in (None,) if worn is None else worn.states():
+                scene = SceneSection(model=model, parameters=checked["scene"], worn=state)
+                own = {"scene": find_scene(scene, origin), "wear": checked["wear"]}
+                study = Study.model_construct(**{**sections, **fixed, **own})
+                raise_wrong(source, broken_rules(study))
+                study = study.model_copy(update={"scene_axes": ()})
+                studies.append(_complete(_with_block_studies(study, given["scene"], origin)))
     study = studies[0]
-    if axes:
-        study = study.model_copy(update={"scene_axes": as_checked(axes, study), "variants": tuple(studies)})
-        for each in (*size_of_result(study), *wrong_scatter(study)):
-            found.add(*each)
-        found.raise_any()
+    if scene_axes := (*as_checked(axes, study), *worn_axis):
+        study = study.model_copy(update={"scene_axes": scene_axes, "variants": tuple(studies)})
     return study
 
 
-def _known_tables(table: Mapping[str, object], found: Mistakes) -> Tables:
-    """The tables of a study file, those that may be missing as empty ones; copies, in which keys may be changed."""
-    given: Tables = {}
-    for name, section in table.items():
-        meant = nearest_name(name, _TABLES)
-        if meant != name:
-            found.add(name, section, f"unknown table, give {meant}")
-        elif meant != "mission" and not isinstance(section, dict):
-            found.add(name, section, f"give a table [{name}] with keys")
-        # what a table of another name holds may be wrong as well
-        if meant in _TABLES and (meant == name or meant not in table):
-            own: Any = dict(section) if isinstance(section, dict) else section if meant == "mission" else {}
-            given[meant] = flat_table(own) if meant == "scatter" else own
-    for name in ("study", "scene", *(() if "mission" in table else ("axes",))):
-        if name not in given:
-            found.add(name, None, f"missing: give a table [{name}]")
-    return {name: {} for name in _TABLES if name not in _ON_REQUEST} | given
+def _worn_axis(worn: Worn | None, name: str) -> tuple[SceneAxis, ...]:
+    """The axis of worn states, the last one; none where their cycle counts are not known."""
+    meaning = "number of vibration cycles that have worn the joint before"
+    return (SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),) if worn and worn.cycle else ()
 
 
-def _take_worn(tables: Tables, origin: Origin, found: Mistakes) -> None:
-    worn = tables["scene"].pop("worn", None)
-    if worn is None:
-        return
-    with found.collecting():
-        tables["scene"]["worn"] = read_worn(worn, origin.source, origin.path.parent)
-        if "modal_amplitude" in tables["axes"] and not tables["scene"]["worn"]["cycle"]:
-            remedy = "missing: give the cycle count of each depth, which is the coordinate cycle of the modes"
-            found.add("scene.worn.cycle", None, remedy)
-
-
-def _axes_and_blocks(
-    tables: Tables, scene: type[BaseModel] | None, found: Mistakes
-) -> tuple[tuple[SceneAxis, ...], tuple[MissionBlock, ...]]:
-    """Axes that are keys of [scene] or [wear], taken out of the tables, and the blocks of a study of missions.
-
-    scene: what [scene] consists of; None where its model is wrong.
-    """
-    if scene is None:
-        # other names may be keys of the scene
-        own = [*AxesSection.model_fields]
-        tables["axes"] = {name: each for name, each in tables["axes"].items() if close_name(name, own)}
-        return (), ()
-    own = [name for name in tables["axes"] if name in OWN_AXES]
-    axes = take_scene_axes(tables, scene, found)
-    blocks: tuple[MissionBlock, ...] = ()
-    if "mission" in tables:
-        blocks = read_blocks(tables["mission"], tables["axes"], scene, found)
-        for used in [*own, *(axis.name for axis in axes)]:
-            if blocks and all(block.gives(used) for block in blocks):
-                found.add(f"axes.{used}", None, f"leave it out: every block under [[mission]] gives its own {used}")
-    name = "cycle" if "modal_amplitude" in tables["axes"] else WORN_AXIS
-    return (*axes, *worn_axis(tables["scene"].get("worn", {}), name)), blocks
-
-
-def _take_solver_axes(tables: Tables, found: Mistakes) -> dict[str, str]:
-    """Moves keys of [solver] from [axes]: their names there, and in the file."""
-    renamed: dict[str, str] = {}
-    for key in [key for key in SOLVER_AXES if key in tables["axes"]]:
-        if key in tables["solver"]:
-            found.add(f"solver.{key}", tables["solver"][key], f"give it once, here or as axes.{key}")
-        tables["solver"][key] = tables["axes"].pop(key)
-        renamed |= {f"solver.{key}{end}": f"axes.{key}{end}" for end in ("", ".start", ".stop", ".num", ".spacing")}
-    return renamed
-
-
-def _check_sections(
-    tables: Tables, scene: type[BaseModel] | None, renamed: Mapping[str, str], found: Mistakes
-) -> dict[str, Any]:
-    """The tables but [scene] and [wear], which differ along axes: those that are right."""
-    sections: dict[str, Any] = {}
-    if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
-        tables.setdefault("loading", {})
-    for name, kind in SECTIONS.items():
-        if name in tables and name not in found and name != "wear":
-            of_parts = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
-            with found.collecting(renamed):
-                others = {**ELSEWHERE, **{key: key for key in of_parts}}
-                sections[name] = check_table(kind, tables[name], found.source, name, others)
-    return sections
-
-
-def _with_block_studies(study: Study, scene: Mapping[str, Any], origin: Origin, found: Mistakes) -> Study:
-    """The study with a study of each block alone. scene: table of the study."""
-    studies = []
+def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
+    """The study with a study of each block alone. given: keys of [scene] in the study file."""
+    studies, source, scene = [], study.source, study.scene
     for block in study.mission:
+        with keys_as_given({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
+            table = {"scene": {**given, **block.parameters}}
+            parameters = check_tables({"scene": type(scene.parameters)}, table, source)["scene"]
+            of_block = find_scene(SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin)
         own = {name: (getattr(block, name),) for name in OWN_AXES if isinstance(getattr(block, name), float)}
-        update: dict[str, Any] = {"mission": (), "slow_time": SlowTimeSection()}
-        with found.collecting({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
-            update["scene"] = check_scene({**scene, **block.parameters}, origin)
-            if block.engine_order is not None:
-                own["frequency"] = (engine_frequency(block, update["scene"].parameters, origin.source),)
-        axes = {"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own}
-        update["axes"] = study.axes.model_copy(update=axes)
+        if block.engine_order is not None:
+            own["frequency"] = (engine_frequency(block, parameters, source),)
+        axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own})
+        update = {"mission": (), "slow_time": SlowTimeSection(), "scene": of_block, "axes": axes}
         studies.append(study.model_copy(update=update))
     return study.model_copy(update={"block_studies": tuple(studies)})
 
@@ -269,18 +204,17 @@ def _complete(study: Study) -> Study:
 def format_study(study: Study) -> str:
     """The effective study, every default filled in, as TOML; read again it is the same study."""
     tables = study.model_dump(mode="json")
-    scene, axes = tables["scene"], tables["axes"]
     # parameters that differ along the axes without being one: each scene has room for its own wear
     names = {axis.key[0] for axis in study.scene_axes}
     own, others = dict(study.scene.parameters), [dict(each.scene.parameters) for each in study.variants]
     chosen = {key for key in own if key not in names and any(other[key] != own[key] for other in others)}
-    kept = {key: value for key, value in scene["parameters"].items() if key not in chosen}
-    tables["scene"] = {"model": scene["model"], **kept, "worn": _worn_states(study)}
+    kept = {key: value for key, value in tables["scene"]["parameters"].items() if key not in chosen}
+    tables["scene"] = {"model": study.scene.model, **kept, "worn": _worn_states(study)}
+    used = {*study.own_axes, "modal_amplitude", "frequency_ratio"}
+    used -= set() if study.axes.frequency_ratio is None else {"frequency"}
+    axes = tables["axes"] = {name: values for name, values in tables["axes"].items() if name in used}
     if study.follow is not None:
         axes["frequency"] = study.follow.of
-    used = {*study.own_axes, "modal_amplitude", "frequency_ratio"}
-    used -= set() if axes["frequency_ratio"] is None else {"frequency"}
-    axes = tables["axes"] = {name: values for name, values in axes.items() if name in used}
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue
@@ -289,13 +223,14 @@ def format_study(study: Study) -> str:
             given, place = only_table(given[name]), place.setdefault(name, {})
         del given[axis.key[-1]]
         place[axis.key[-1]] = list(axis.values)
-    solver = {key: value[0] if key in SOLVER_AXES else value for key, value in tables["solver"].items()}
-    tables["solver"] = {key: value for key, value in solver.items() if key not in study.own_axes}
-    axes |= {key: list(getattr(study.solver, key)) for key in SOLVER_AXES if key in study.own_axes}
+    for key in SOLVER_AXES:
+        if key in study.own_axes:
+            axes[key] = tables["solver"].pop(key)
+        else:
+            (tables["solver"][key],) = tables["solver"][key]
     for table in ("slow_time", "wear"):
         for key in study.kind.unused.get(table, ()):
             del tables[table][key]
-    tables["mission"] = [block.as_table() for block in study.mission]
     return format_toml(tables)
 
 
@@ -304,8 +239,75 @@ def _worn_states(study: Study) -> dict[str, object] | None:
     if worn is None:
         return None
     counts = [count for axis in study.scene_axes if axis.key == ("worn",) for count in axis.values]
-    if not counts:
-        return {"depth": [list(each) for each in worn.depth]}
     # the axis of worn states is the last one
-    depths = [variant.scene.worn.depth[0] for variant in study.variants[: len(counts)] if variant.scene.worn]
-    return {"cycle": counts, "depth": [list(each) for each in depths], "result": worn.result}
+    variants = study.variants[: len(counts)] if counts else (study,)
+    depths = [list(each.scene.worn.depth[0]) for each in variants if each.scene.worn]
+    return {"cycle": counts, "depth": depths, "result": worn.result} if counts else {"depth": depths}
+
+
+# --- overrides ---
+
+
+def _override(table: Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
+    """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
+    if isinstance(overrides, Mapping):
+        for key, value in overrides.items():
+            _set_key(table, key, _plain(value), "overrides", key)
+        return
+    for text in [overrides] if isinstance(overrides, str) else overrides:
+        key, equals, value_text = (part.strip() for part in text.partition("="))
+        if not equals or not all(key.split(".")):
+            raise UserError("command line", "--set", text, "give KEY=VALUE with the dotted name of a key")
+        _set_key(table, key, _value_of(key, value_text), "command line", f"--set {key}")
+
+
+def _set_key(table: Tables, key: str, value: object, source: str, shown: str) -> None:
+    """Sets the key of a dotted name. source, shown: where the user gave it, and how it is called there."""
+    (*names, last), place = key.split("."), cast("Any", table)
+    for name in names:
+        if isinstance(place, list):
+            # blocks of a mission, by number or name
+            blocks = {str(number): each for number, each in enumerate(place)}
+            place = (blocks | {str(each.get("name")): each for each in place if isinstance(each, dict)}).get(name)
+        else:
+            place = place.setdefault(name, {})
+        if not isinstance(place, dict | list):
+            raise UserError(source, shown, value, f"give a key in a table: {name} is none")
+    if not isinstance(place, dict):
+        raise UserError(source, shown, value, f"give {'.'.join(names)}.NAME.KEY with the name of a table in this list")
+    if value is None:
+        place.pop(last, None)
+        return
+    place[last] = value
+    place.pop(_INSTEAD.get(key, ""), None)
+    # the last place where a key is given counts, here or under [axes]
+    tables = ("solver",) if last in SOLVER_AXES else ("scene", "wear")
+    others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}
+    for other in others.get(".".join(names), ()) if not is_table(value) else ():
+        given = table.get(other)
+        if isinstance(given, dict) and not is_table(given.get(last)):
+            given.pop(last, None)
+
+
+def _value_of(key: str, text: str) -> object:
+    try:
+        parsed = read_toml(f"value = {text}".encode(), "")
+    except UserError:
+        if re.fullmatch(r"[^\s\"'\[\]{}=,#]+", text):
+            return text
+        remedy = f'give a TOML value or a bare word; words in a list stand in quotes, as \'{key}=["up", "down"]\''
+        raise UserError("command line", f"--set {key}", text, remedy) from None
+    if set(parsed) != {"value"}:
+        raise UserError("command line", f"--set {key}", text, "give one TOML value")
+    return parsed["value"]
+
+
+def _plain(value: object) -> object:
+    """A value as TOML has it: numpy's numbers and arrays, tuples and paths are none of its types."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    return str(value) if isinstance(value, Path) else value

@@ -8,7 +8,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +22,11 @@ SCENE_GROUP = "scene"
 _LARGEST = 5 * 2**19  # bytes: an axis of 100 000 values
 
 
-def read_toml_file(path: Path, source: str) -> dict[str, object]:
-    """The table in a file. Raises UserError, and OSError where it cannot be read."""
-    with path.open("rb") as file:
-        return read_toml(file.read(_LARGEST + 1), source)
-
-
-def read_toml(content: bytes, source: str) -> dict[str, object]:
-    """The table. source: the file as the user named it. Raises UserError."""
+def read_toml(content: bytes | Path, source: str) -> dict[str, object]:
+    """The table in a text or a file. source: the file as the user named it. Raises UserError, and OSError of a file."""
+    if isinstance(content, Path):
+        with content.open("rb") as file:
+            content = file.read(_LARGEST + 1)
     remedy = f"give a study file of at most {_LARGEST / 2**20:g} MiB; an axis can be {{start, stop, num}}"
     if len(content) <= _LARGEST:
         try:
@@ -56,8 +53,8 @@ def format_toml(tables: Mapping[str, Any]) -> str:
 class Archived:
     """Attributes of a result file.
 
-    study: the effective study, TOML. scene: its table [scene]. scene_sha256, solver_digest, versions: hashes of scene
-    and solver, and versions of packages; empty where unknown. holds_scene: whether the group SCENE_GROUP is there.
+    study: the effective study, TOML. scene_sha256, solver_digest, versions: hashes of scene and solver, and versions of
+    packages; empty where unknown. holds_scene: whether the group SCENE_GROUP is there.
     """
 
     study: str
@@ -65,7 +62,6 @@ class Archived:
     solver_digest: str
     versions: str
     holds_scene: bool
-    scene: Mapping[str, object] = field(default_factory=dict)
 
     def differences(self, scene_sha256: str, solver_digest: str, versions: str) -> tuple[str, ...]:
         """Reasons why a result that is computed now may have other numbers, as lines."""
@@ -80,12 +76,12 @@ class Archived:
 
 
 @contextmanager
-def _user_errors(name: str, prefix: str = "") -> Iterator[None]:
-    """What is wrong with a result file, called `name` by the user, becomes UserError. prefix: of the key at fault."""
+def _user_errors(name: str) -> Iterator[None]:
+    """What is wrong with a result file, called `name` by the user, becomes UserError."""
     try:
         yield
     except SceneError as error:
-        where = "the file" if error.key == "model" else prefix + error.key
+        where = "the file" if error.key == "model" else f"the attribute {error.key}"
         raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
     except (OSError, RuntimeError, ValueError, TypeError, KeyError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "damaged"
@@ -94,19 +90,19 @@ def _user_errors(name: str, prefix: str = "") -> Iterator[None]:
 
 def read_archived(path: Path, name: str) -> Archived:
     """Reads the attributes of a result file that the user calls `name`. Raises UserError."""
-    with _user_errors(name, "the attribute "), open_hdf5(path) as file:
+    with _user_errors(name), open_hdf5(path) as file:
         names = ("study", "scene_sha256", "solver_digest", "versions")
         study, scene, solver, versions = (read_text_attribute(file, name) for name in names)
-        if not study:
-            remedy = "missing: give a study file (TOML) or a result file of run-study"
-            raise UserError(name, "the attribute study", None, remedy)
-        return Archived(study, scene, solver, versions, SCENE_GROUP in file)
+        holds_scene = SCENE_GROUP in file
+    if not study:
+        remedy = "missing: give a study file (TOML) or a result file of run-study"
+        raise UserError(name, "the attribute study", None, remedy)
+    return Archived(study, scene, solver, versions, holds_scene)
 
 
 def check_result_file(path: Path, name: str) -> None:
     """Raises UserError where a file that the user calls `name` is no result file."""
     with _user_errors(name):
-        if not path.exists():
-            raise UserError(name, "the file", None, "there is none of this name, give a result file of run-study")
         if not path.is_file() or not is_hdf5(path):
-            raise UserError(name, "the file", None, "is no NetCDF file (NetCDF-4), give a result file of run-study")
+            what = "is no NetCDF file (NetCDF-4)" if path.exists() else "there is none of this name"
+            raise UserError(name, "the file", None, f"{what}, give a result file of run-study")

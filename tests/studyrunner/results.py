@@ -20,7 +20,7 @@ from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
-from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn
+from studyrunner.scatter import ScatteredPairs, ScatterSection, draw
 from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study import Study
@@ -237,8 +237,8 @@ def sample_file(scatter: str = SCATTER, jump: float = 0.0) -> xr.Dataset:
     pairs = flank_positions()
     section = ScatterSection.model_validate(tomllib.loads(scatter)["scatter"])
     own = {"friction_coefficient": 0.5, "wear_coefficient": 1e-11, "gap": np.zeros(len(pairs))}
-    draws = drawn(section, own, ScatteredPairs(("flank",) * len(pairs), pairs))
-    friction, wear, gap = (draws[name].apply(values) for name, values in own.items())
+    values = draw(section, own) | draw(section, own, ScatteredPairs(("flank",) * len(pairs), pairs))
+    friction, wear, gap = (values[name] for name in own)
     dataset = build_file({"frequency": (211.5, 212.0), "sample": range(len(wear))}, SAMPLE_CYCLES, variables=OF_SAMPLES)
     rate = 1e-3 * (wear * friction * (1.0 + 1e5 * gap.mean(axis=1)) + jump * (friction > 0.51))
     volume = np.array([1.0, 2.0])[:, None, None] * rate[:, None] * np.array(SAMPLE_CYCLES)

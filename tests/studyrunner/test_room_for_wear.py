@@ -8,9 +8,10 @@ from solver.outcome import Outcome
 from studies import build_scene, read_scene
 from studyrunner import read_study
 from studyrunner.cli import main
-from studyrunner.scene.scene import build_study_scene, describe_scene, write_study_scene
+from studyrunner.scene.answers import write_study_scene
+from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
-from studyrunner.study.realisation import expected_wear, realise
+from studyrunner.study.parts import expected_wear, parts_of
 from studyrunner.study.study_file import format_study
 from tests.mpi.launching import options, results
 from tests.studyrunner.small_studies import compute
@@ -61,7 +62,7 @@ def test_all_that_is_made_of_the_study_has_the_width_that_it_shows(path):
     assert read_study(path) == read_study(path, {"scene.half_width": width})
     assert half_width(read_study(path, {"slow_time.cycles": 1e6})) == width
     # its scene file, and the scene in Python
-    write_study_scene(study, path.with_name("scene.h5"))
+    write_study_scene(study, path.with_name("scene.h5"), print)
     given = {key: value for key, value in study.scene.parameters if key != "friction_coefficient"}
     for again in (read_scene(path.with_name("scene.h5")), build_scene("cylinder_on_flat", **given)):
         assert describe_scene(again).digest == digest
@@ -94,7 +95,7 @@ def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(path):
     assert expected_wear(study).per_slip_work == pytest.approx(1.5**3.1 * 1e-13 * 2000)
     assert half_width(study) > half_width(read_study(path))
     assert half_width(read_study(path, {"scatter": {**scatter, "samples": 1024}})) == half_width(study)
-    widths = {half_width(part.study) for part in realise(study)}
+    widths = {half_width(part.study) for part in parts_of(study)}
     assert widths == {half_width(study)}
     # one scene for all
     assert len(find_scenes(study).studies) == 1
@@ -103,7 +104,7 @@ def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(path):
 def test_each_sample_with_a_scene_of_its_own_has_room_for_its_wear(path):
     inputs = {name: {"lognormal": {"factor": 1.5}} for name in ("P", "wear_coefficient")}
     study = read_study(path, {"scatter": {"samples": 8, **inputs}})
-    for part in realise(study):
+    for part in parts_of(study):
         own = {"scene.P": dict(part.study.scene.parameters)["P"]}
         alone = read_study(path, {**own, "axes.wear_coefficient": part.study.axes.wear_coefficient[0]})
         assert half_width(part.study) == half_width(alone)

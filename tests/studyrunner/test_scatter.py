@@ -6,10 +6,10 @@ import xarray as xr
 from scipy.stats import kstest, sobol_indices
 
 from studyrunner.result.arrays import sample_coordinates
-from studyrunner.scatter import ScatteredPairs, ScatterSection, drawn, flat_table, unit_design
+from studyrunner.scatter import ScatteredPairs, ScatterSection, draw, flat_table, unit_design
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
-from studyrunner.study.realisation import draw_inputs, realise
+from studyrunner.study.parts import draw_inputs, parts_of
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import WrongValueError
 from tests.studyrunner.fakes import plan_of
@@ -27,8 +27,9 @@ def read(**table):
     return ScatterSection.model_validate(flat_table({"samples": 64, **table}))
 
 
-def draw(pairs=PAIRS, **table):
-    return drawn(read(**table), OWN, pairs)
+def drawn(own=OWN, pairs=PAIRS, **table):
+    """Values of all inputs."""
+    return draw(read(**table), own) | draw(read(**table), own, pairs)
 
 
 # --- the designs ---
@@ -73,12 +74,11 @@ def test_each_distribution_has_its_quantiles():
         "range": {"uniform": {"low": 3.0, "high": 5.0}},
         "wear_coefficient": {"lognormal": {"factor": 1.5}},
     }
-    found = draw(samples=4096, **section)
-    assert [name for name, one in found.items() if one.distribution.is_absolute] == ["absolute", "range"]
+    found = drawn({"gap": np.ones(5), "area": np.ones(5), "wear_coefficient": 1.0}, samples=4096, **section)
     share = 0.8413447460685429  # one standard deviation above the median
     expected = {"absolute": 3.0, "area": 1.1, "gap": 1.0 + 1e-6 * (2 * share - 1), "range": 3 + 2 * share}
     for name, value in {**expected, "wear_coefficient": 1.5}.items():
-        assert np.quantile(found[name].apply(1.0), share) == pytest.approx(value, rel=2e-3)
+        assert np.quantile(found[name], share) == pytest.approx(value, rel=2e-3)
 
 
 @pytest.mark.parametrize("of", ["all pairs", "each surface", "each pair"])
@@ -86,19 +86,19 @@ def test_each_distribution_has_its_quantiles():
     "distribution", [{"normal": {"std": 0}}, {"lognormal": {"factor": 1}}, {"uniform": {"half_width": 0}}]
 )
 def test_zero_width_is_the_own_value_to_the_last_bit(of, distribution):
-    (found,) = draw(area={**distribution, "of": of}).values()
-    own = 0.1 + 0.2 * np.arange(5.0)
-    assert (found.apply(own) == own).all()
-    assert (found.apply(0.1 + 0.2) == 0.1 + 0.2).all()
+    own = {"area": 0.1 + 0.2 * np.arange(5.0), "mass": 0.1 + 0.2}
+    found = drawn(own, area={**distribution, "of": of}, mass=distribution)
+    assert (found["area"] == own["area"]).all()
+    assert (found["mass"] == own["mass"]).all()
 
 
 def test_each_input_and_each_surface_has_a_draw():
     gap = {"normal": {"std": 1e-6}, "of": "each pair"}
-    alone = draw(friction_coefficient=NORMAL)["friction_coefficient"]
-    beside = draw(friction_coefficient=NORMAL, gap=gap)
-    np.testing.assert_array_equal(beside["friction_coefficient"].score, alone.score)
-    assert beside["gap"].apply(OWN["gap"]).shape == (64, 5)
-    values = draw(friction_coefficient={**NORMAL, "of": "each surface"})["friction_coefficient"].apply(0.3)
+    alone = drawn(friction_coefficient=NORMAL)["friction_coefficient"]
+    beside = drawn(friction_coefficient=NORMAL, gap=gap)
+    np.testing.assert_array_equal(beside["friction_coefficient"], alone)
+    assert beside["gap"].shape == (64, 5)
+    values = drawn(friction_coefficient={**NORMAL, "of": "each surface"})["friction_coefficient"]
     assert [len(np.unique(row)) for row in values] == [2] * 64
     assert (values[:, 0] == values[:, 2]).all()
 
@@ -107,7 +107,7 @@ def test_neighbouring_pairs_are_correlated_over_the_length():
     along = np.outer(np.repeat([0.0, 1.0, 3.0], 2), [1.0, 0.0, 0.0])
     pairs = ScatteredPairs(("left", "right") * 3, along)
     gap = {"normal": {"std": 2.0}, "of": "each pair", "correlation_length": 1.0}
-    values = drawn(read(gap=gap, samples=4096), {"gap": 0.0}, pairs)["gap"].apply(0.0)
+    values = drawn({"gap": np.zeros(6)}, pairs, gap=gap, samples=4096)["gap"]
     expected = np.where(
         np.arange(6)[:, None] % 2 == np.arange(6) % 2, np.exp(-0.5 * (along[:, :1] - along[:, 0]) ** 2), 0
     )
@@ -133,7 +133,7 @@ def test_neighbouring_pairs_are_correlated_over_the_length():
 def test_draws_that_cannot_be_are_refused(own, name, given):
     nowhere = ScatteredPairs(PAIRS.surface, np.full((5, 3), np.nan))
     with pytest.raises(WrongValueError) as caught:
-        drawn(read(**{name: given}, samples=8192), OWN | own, nowhere)
+        drawn(OWN | own, nowhere, **{name: given}, samples=8192)
     assert caught.value.key.startswith(f"scatter.{name}")
 
 
@@ -204,7 +204,7 @@ def test_pairs_that_differ_between_samples_have_the_dimension():
     gap = "scatter.gap={normal={std=0}, of='each pair'}"
     samples = compute("cylinder_on_flat", "w.nc", *given, "scatter.samples=2", "scatter.R={normal={std=1e-4}}", gap)
     assert samples.sample_gap.dims == ("sample", "contact")
-    gaps = [build_study_scene(each.study).contact.gap for each in realise(read_study("w.nc"))]
+    gaps = [build_study_scene(each.study).contact.gap for each in parts_of(read_study("w.nc"))]
     np.testing.assert_array_equal(samples.sample_gap, gaps)
     assert samples.contact_x.dims == ("sample", "contact")
     assert samples.contact_exists.all()

@@ -7,24 +7,17 @@ import numpy as np
 import pytest
 
 from solver.model import ContactInterface, needed_nodal_diameters
-from solver.packing import Packed, pack
+from solver.packing import Packed, pack, unpack_model
 from studies import build_scene, read_scene
 from studies.fe_models.from_files import model as from_files
 from studies.scene_file import write_scene
-from studies.scenes import sector as sector_room
 from studyrunner.cli import main
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.scene import scene as scene_room
+from studyrunner.scene.answers import write_study_scene
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.scene.scene import (
-    InMemory,
-    _parts,
-    build_study_scene,
-    describe_scene,
-    largest_harmonics,
-    write_study_scene,
-)
-from studyrunner.scene_building import SceneModels
+from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics
+from studyrunner.scene_building import SceneModels, SceneTask, build_scene_task
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.mpi.launching import options
@@ -49,31 +42,30 @@ SCENES = {
 }
 
 
-@pytest.fixture
-def keep_all(monkeypatch):
-    """What takes no time is kept as well."""
-    monkeypatch.setattr(scene_room, "LEAST_SECONDS", -1.0)
-
-
 def memory(model):
     """All that the last bits of a result depend on."""
     arrays = [(name, np.asarray(value)) for name, value in _parts(model)]
     return [(name, a.dtype.str, a.shape, a.strides, a.flags.c_contiguous, a.tobytes()) for name, a in arrays]
 
 
+def build(study, known=None):
+    (built,) = build_scene_task(SceneTask(0, study, known), lambda _: None)
+    return built
+
+
 @pytest.mark.slow
-@pytest.mark.usefixtures("keep_all")
 @pytest.mark.parametrize("case", SCENES)
-def test_what_takes_long_is_computed_once(case, monkeypatch):
-    study, kept = read_study(*SCENES[case]), InMemory()
-    built = build_study_scene(study, computed=kept)
+def test_a_model_is_built_once(case, monkeypatch):
+    study = read_study(*SCENES[case])
+    model, first = build_study_scene(study), build(study)
+    again = unpack_model(first.model)
+    assert memory(again) == memory(model)
+    assert list(again.linear) == list(model.linear)
+    assert type(again.contact.surface) is type(model.contact.surface)
     monkeypatch.setattr(scene_room, "_build_here", pytest.fail)
-    monkeypatch.setattr(sector_room, "prepare_model", pytest.fail)
-    again = build_study_scene(read_study(*SCENES[case]), computed=kept)
-    assert memory(again) == memory(built)
-    assert list(again.linear) == list(built.linear)
-    assert describe_scene(again).digest == describe_scene(built).digest
-    assert type(again.contact.surface) is type(built.contact.surface)
+    second = build(study, first.model)
+    assert second.model is None
+    assert second.facts.digest == first.facts.digest == describe_scene(model).digest
 
 
 def test_a_changed_file_or_source_makes_another_scene(monkeypatch):
@@ -94,20 +86,15 @@ def test_a_changed_scene_file_makes_another_scene():
     Path("s.toml").write_text(f"{tables}contact_stiffness = [1e9, 1e10]\n")
     keys = []
     for mass in (1.0, 2.0):
-        write_study_scene(read_study("two_masses", {"scene.mass_1": mass}), Path("scene.h5"))
+        write_study_scene(read_study("two_masses", {"scene.mass_1": mass}), Path("scene.h5"), print)
         keys += [scene_room.model_key(variant) for variant in read_study("s.toml").variants]
     assert len(set(keys)) == 4
 
 
-@pytest.mark.usefixtures("keep_all")
 @pytest.mark.parametrize("wrong", [Packed("{", ()), pack(None), pack(((0, 1), "model"))])
 def test_what_is_no_model_is_built_again(wrong):
-    study, kept = read_study("two_masses"), InMemory()
-    built = build_study_scene(study, computed=kept)
-    (key,) = kept
-    kept[key] = wrong
-    assert memory(build_study_scene(study, computed=kept)) == memory(built)
-    assert kept[key] is not wrong
+    study = read_study("two_masses")
+    assert memory(unpack_model(build(study, wrong).model)) == memory(build_study_scene(study))
 
 
 # --- in a scene file ---
@@ -142,7 +129,7 @@ def test_a_scene_file_gives_each_pair_its_friction_coefficient():
     assert study.friction_coefficient is None
     assert build_study_scene(study).contact.friction_coefficient.tolist() == [0.2, 0.3, 0.4]
     assert "friction_coefficient" not in format_study(study)
-    write_study_scene(study, Path("again.h5"))
+    write_study_scene(study, Path("again.h5"), print)
     assert digest_of("s.toml", "scene.model=again.h5") == digest_of("s.toml")
 
 
