@@ -125,9 +125,8 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
 
         (omega^2 - Omega^2 + 2 i zeta omega Omega) q = phi^H F,      abs(q) = a,
 
-    is solved for the excitation frequency Omega, as a gives all others: two frequencies below the resonance, none
-    above. Krack, Computers and Structures 154 (2015) 59-71; Schwarz and Krack, Journal of Vibration and Acoustics 142
-    (2020). Other modes are left out, and friction forces do not grow with the frequency as the damping term does: the
+    is solved for the excitation frequency Omega, as a gives all others (Krack, Computers and Structures 154 (2015)
+    59-71). Other modes are left out, and friction forces do not grow with the frequency as the damping term does: the
     response holds near the resonance alone.
 
     model: of the mode, with its harmonic load.

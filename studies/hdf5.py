@@ -24,8 +24,6 @@ LARGEST_TOTAL = 2**31
 """Bytes of all datasets together: three real matrices of 9400 rows, or 14 nodal diameters of 500 pairs with damping as
 coefficients."""
 
-_OF_NETCDF = ("_NCProperties", "_nc3_strict")
-
 
 def is_hdf5(path: Path) -> bool:
     """Whether a file begins as HDF5 files do. Raises OSError where it cannot be read."""
@@ -130,7 +128,7 @@ def as_whole(key: str, values: Any) -> Any:
 
 def read_attribute(group: h5py.HLObject, name: str) -> NDArray[np.generic] | None:
     """A number or text that is an attribute, of shape () or (1,), None where there is none. Raises SceneError."""
-    if name not in group.attrs or name in _OF_NETCDF:
+    if name not in group.attrs:
         return None
     attribute = group.attrs.get_id(name)
     kind = attribute.dtype

@@ -43,7 +43,7 @@ def check_model(model: ReducedModel, n_harmonics: int = 1, *, grouped: bool | No
     if not names or "" in names or len(set(names)) < len(names):
         found = ", ".join(f'"{name}"' for name in names) or "no name"
         raise SceneError("response/names", found, "give at least one response, each with a name of its own")
-    check_harmonics(model, n_harmonics)
+    _check_harmonics(model, n_harmonics)
     for k, linear in model.linear.items():
         if not 0 <= k <= model.n_sectors // 2:
             found = f"there are {model.n_sectors} sectors"
@@ -70,8 +70,8 @@ def check_sector(n_sectors: int, nodal_diameter: int) -> None:
         raise SceneError("nodal_diameter", str(nodal_diameter), f"give 0 to {max(n_sectors - 1, 0)}")
 
 
-def check_harmonics(model: ReducedModel, n_harmonics: int) -> None:
-    """Raise SceneError where one of the harmonics 0..n_harmonics sees a nodal diameter that the model does not hold."""
+def _check_harmonics(model: ReducedModel, n_harmonics: int) -> None:
+    """Each nodal diameter that one of the harmonics 0..n_harmonics sees is in the model."""
     for harmonic in range(n_harmonics + 1):
         for k in needed_nodal_diameters(model.nodal_diameter, model.n_sectors, harmonic):
             if k not in model.linear:
@@ -129,18 +129,19 @@ def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
     n = len(linear.stiffness) if linear.stiffness.ndim == 2 else 0
     if n == 0 or linear.stiffness.shape != (n, n):
         raise SceneError(f"{prefix}stiffness", f"shape {linear.stiffness.shape}", "give a square matrix")
-    matrices = {"stiffness": linear.stiffness, "mass": linear.mass, "damping": linear.damping}
-    vectors = {"load/static": linear.load_static, "load/harmonic": linear.load_harmonic}
+    parts = {
+        **{name: (getattr(linear, name), (n, n)) for name in ("stiffness", "mass", "damping")},
+        "load/static": (linear.load_static, (n,)),
+        "load/harmonic": (linear.load_harmonic, (n,)),
+        "response/dofs": (linear.response, (n_response, n)),
+    }
     # all shapes before any number: what does not fit together takes no time
-    for name, matrix in matrices.items():
-        _check_shape(prefix + name, matrix, (n, n))
-    for name, vector in vectors.items():
-        _check_shape(prefix + name, vector, (n,))
-    _check_shape(f"{prefix}response/dofs", linear.response, (n_response, n))
-    for name, values in {**matrices, **vectors, "response/dofs": linear.response}.items():
+    for name, (values, shape) in parts.items():
+        _check_shape(prefix + name, values, shape)
+    for name, (values, _) in parts.items():
         _refuse(prefix + name, values, ~np.isfinite(values), "give finite numbers")
-    for name, matrix in matrices.items():
-        _check_hermitian(prefix + name, matrix)
+    for name in ("stiffness", "mass", "damping"):
+        _check_hermitian(prefix + name, parts[name][0])
     if np.iscomplexobj(linear.load_static):
         raise SceneError(f"{prefix}load/static", "complex", "give real forces")
 
@@ -150,10 +151,8 @@ def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
         if _largest(linear.mass) > 0:
             raise SceneError(f"{prefix}mass", "a negative eigenvalue", "give a positive semidefinite matrix") from None
     # For a positive semidefinite mass, K + i M is singular only where a motion has neither stiffness nor mass.
-    singular = _singular(_scaled(linear.stiffness) + 1j * _scaled(linear.mass))
-    if singular:
-        found = f"singular together with mass: {singular}"
-        raise SceneError(f"{prefix}stiffness", found, "give every motion stiffness or mass")
+    if _is_singular(_scaled(linear.stiffness) + 1j * _scaled(linear.mass)):
+        raise SceneError(f"{prefix}stiffness", "singular together with mass", "give every motion stiffness or mass")
 
 
 def _check_static(linear: LinearModel, contact: ContactInterface, prefix: str) -> None:
@@ -164,10 +163,9 @@ def _check_static(linear: LinearModel, contact: ContactInterface, prefix: str) -
             dataset = "response/dofs" if name == "response" else name
             raise SceneError(f"{prefix}{dataset}", "complex", "give a real matrix: nodal diameter 0 has no phase")
     away = np.setdiff1d(np.arange(len(linear.stiffness)), contact.dofs)
-    singular = _singular(linear.stiffness[np.ix_(away, away)])
-    if singular:
-        found = f"singular: {singular}, of the displacements without contact"
-        raise SceneError(f"{prefix}stiffness", found, "support every motion by stiffness or by a contact pair")
+    if _is_singular(linear.stiffness[np.ix_(away, away)]):
+        remedy = "support every motion by stiffness or by a contact pair"
+        raise SceneError(f"{prefix}stiffness", "singular among the displacements without contact", remedy)
 
 
 def _check_shape(key: str, values: NDArray[Any], shape: tuple[int, ...]) -> None:
@@ -195,26 +193,21 @@ def _check_hermitian(key: str, matrix: Matrix) -> None:
         raise SceneError(key, f"not {word}: {entries}", f"give a {word} matrix")
 
 
-def _singular(matrix: NDArray[Any]) -> str:
-    """Why a Hermitian (or complex symmetric) matrix is singular to round-off; empty where it is not."""
+def _is_singular(matrix: NDArray[Any]) -> bool:
+    """Whether a Hermitian (or complex symmetric) matrix is singular to round-off."""
     n = len(matrix)
     if n == 0:
-        return ""
+        return False
     diagonal, rows = np.abs(np.diag(matrix)), np.abs(matrix).max(axis=1)
-    if (rows == 0).any():
-        return f"a row of zeros, the first of {np.count_nonzero(rows == 0)} such displacements"
     # Displacements and modal coordinates have different units: make the diagonal 1 before judging.
-    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, rows))
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, np.maximum(rows, np.finfo(np.float64).tiny)))
     balanced = matrix * np.outer(scale, scale)
-    if not np.isfinite(balanced).all():
-        return "entries next to the smallest or largest numbers there are"
+    if (rows == 0).any() or not np.isfinite(balanced).all():
+        return True
     factorise, estimate = get_lapack_funcs(("getrf", "gecon"), (balanced,))
     factors, _, info = factorise(balanced)
-    if info == 0:
-        reciprocal, info = estimate(factors, np.abs(balanced).sum(axis=0).max())
-        if info == 0 and reciprocal > max(n, 10) * np.finfo(np.float64).eps:
-            return ""
-    return f"rank below {n}, the number of displacements"
+    reciprocal, more = estimate(factors, np.abs(balanced).sum(axis=0).max()) if info == 0 else (0.0, 0)
+    return bool(more != 0 or reciprocal <= max(n, 10) * np.finfo(np.float64).eps)
 
 
 def _scaled(matrix: Matrix) -> Matrix:

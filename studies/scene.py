@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, with_contact_stiffness
-from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.scene_error import SceneError
 
@@ -33,18 +32,6 @@ class SurfaceMesh:
 
 
 @dataclass(frozen=True)
-class NaturalFrequencies:
-    """Natural frequencies with the joint stuck, undamped.
-
-    nodal_diameters: ascending; 0 only where the structure is no cyclic sector. frequencies (n_nodal_diameters,
-    N_MODES): Hz, ascending; NaN where there are fewer modes.
-    """
-
-    nodal_diameters: tuple[int, ...]
-    frequencies: FloatArray
-
-
-@dataclass(frozen=True)
 class ExpectedWear:
     """What a study wears at most.
 
@@ -58,46 +45,16 @@ class ExpectedWear:
     depth: float = math.inf
 
 
-@dataclass(frozen=True)
-class WearQuestion:
-    """What an exact answer is asked for: wear and vibration at one frequency and excitation amplitude.
+def stuck_frequencies(model: ReducedModel) -> dict[int, FloatArray]:
+    """Lowest frequencies (N_MODES,), Hz, ascending, of each nodal diameter of a model with its joint stuck, undamped.
 
-    frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts. law: wear
-    law. worn_depth: m, of each pair at the count 0. changed: keys of a study that differ from their defaults, as
-    "wear.law"; there is no answer where a closed form does not know one of them.
-    """
-
-    frequency: float
-    excitation_amplitude: float
-    wear_coefficients: FloatArray
-    cycles: FloatArray
-    law: WearLaw = ARCHARD
-    worn_depth: float = 0.0
-    changed: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True)
-class ExactAnswer:
-    """Exact answer to a `WearQuestion`, NaN where it does not hold.
-
-    worn_volume (n_wear, n_cycles): m3, since the count 0. response_amplitude (n_wear, n_cycles, n_response):
-    amplitude of the first harmonic, m.
-    """
-
-    worn_volume: FloatArray
-    response_amplitude: FloatArray
-
-
-def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
-    """Lowest frequencies of every nodal diameter of a model with its joint stuck: no relative displacement moves.
-
-    Raises SceneError where nothing else moves, or nothing holds the stuck structure.
+    No relative displacement moves; NaN where there are fewer modes. Raises SceneError where nothing else moves, or
+    nothing holds the stuck structure.
     """
     from scipy.linalg import LinAlgError, eigh  # where it is used: it takes a while to load
 
-    dofs = model.contact.dofs
-    frequencies = np.full((len(model.linear), N_MODES), np.nan)
-    for row, (k, linear) in enumerate(sorted(model.linear.items())):
+    dofs, frequencies = model.contact.dofs, {}
+    for k, linear in sorted(model.linear.items()):
         free = np.setdiff1d(np.arange(len(linear.stiffness)), dofs[dofs >= 0])
         if len(free) == 0:
             raise SceneError("variables", "natural_frequency", "leave it out: nothing moves where the joint sticks")
@@ -108,9 +65,15 @@ def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
         except LinAlgError:
             remedy = f"leave it out: nothing holds the stuck structure at nodal diameter {k}"
             raise SceneError("variables", "natural_frequency", remedy) from None
-        moving = inverse[inverse > np.finfo(np.float64).eps * len(free) * inverse[0]][:N_MODES]
-        frequencies[row, : len(moving)] = 1.0 / (2.0 * np.pi * np.sqrt(moving))
-    return NaturalFrequencies(tuple(sorted(model.linear)), frequencies)
+        moving = inverse[inverse > np.finfo(np.float64).eps * len(free) * inverse[0]]
+        frequencies[k] = lowest(1.0 / (2.0 * np.pi * np.sqrt(moving)))
+    return frequencies
+
+
+def lowest(frequencies: FloatArray) -> FloatArray:
+    """The first N_MODES of ascending frequencies, NaN where there are fewer."""
+    own = frequencies[:N_MODES]
+    return np.append(own, np.full(N_MODES - len(own), np.nan))
 
 
 ContactStiffness = Annotated[
@@ -127,7 +90,7 @@ class Scene(BaseModel):
     """Parameters of a bundled scene, and what follows from them. Units stand in the descriptions.
 
     FRICTION_IN_MODEL: whether the reduced model depends on the friction coefficient. OFFERS: what a study may ask for
-    among `outputs.variables` that not every scene knows: "mesh", "exact".
+    among `outputs.variables` that not every scene knows: "mesh", "exact" (a method `exact_answer`).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -150,16 +113,12 @@ class Scene(BaseModel):
         """The same of a scene whose harmonics all see one structure."""
         raise NotImplementedError
 
-    def natural_frequencies(self, model: ReducedModel) -> NaturalFrequencies:
-        """Those that the scene knows; model: its reduced model. Raises SceneError."""
+    def natural_frequencies(self, model: ReducedModel) -> dict[int, FloatArray]:
+        """As `stuck_frequencies`, of all nodal diameters that the scene knows; model: its reduced model."""
         return stuck_frequencies(model)
 
     def describe_mesh(self) -> SurfaceMesh:
         """Outer faces of its mesh, of a scene that offers one. Raises SceneError."""
-        raise NotImplementedError
-
-    def exact_answer(self, asked: WearQuestion) -> ExactAnswer:
-        """The exact answer of a scene that offers one."""
         raise NotImplementedError
 
     def with_room_for_wear(self, expected: ExpectedWear) -> Scene:

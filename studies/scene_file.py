@@ -65,10 +65,8 @@ def write_scene(
 ) -> None:
     """Write a model as a scene file, complete or not at all; an existing file is replaced.
 
-    origin: texts on where the model comes from, attributes of the file.
-
-    Reading it gives the same model bit by bit. Raises SceneError where the model is impossible, OSError where the file
-    cannot be written.
+    origin: texts on where the model comes from, attributes of the file. Reading it gives the same model bit by bit.
+    Raises SceneError where the model is impossible, OSError where the file cannot be written.
     """
     check_model(model)
     path = Path(path)
@@ -89,10 +87,8 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
     """Read and check a scene file.
 
     n_harmonics: harmonics 0..n_harmonics must find their nodal diameter in the file. group: where the scene stands in a
-    file that holds more than one.
-
-    Raises SceneError for wrong content, with the dataset as its key, and for a file that is not HDF5, with the key
-    "model"; OSError where the file is missing or cannot be opened.
+    file that holds more. Raises SceneError about the dataset that is wrong, about "model" where the file is no HDF5;
+    OSError where it is missing or cannot be opened.
     """
     with _open_scene(Path(path), group) as (root, datasets):
         prefixes = _prefixes(datasets)
@@ -113,20 +109,11 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
 def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
     """The mesh of a scene file, None where it has none. Raises what `read_scene` raises."""
     with _open_scene(Path(path), group) as (_, datasets):
-        return _read_mesh(datasets) if _holds_mesh(datasets) else None
-
-
-def has_mesh(path: str | Path, group: str = "") -> bool:
-    """Whether a scene file has a mesh. Raises what `read_scene` raises."""
-    with _open_scene(Path(path), group) as (_, datasets):
-        return _holds_mesh(datasets)
+        return _read_mesh(datasets) if any(key.startswith("mesh/") for key in datasets) else None
 
 
 def read_origin(path: str | Path) -> dict[str, str]:
-    """Attributes of a scene or result file that say which model its scene was reduced from; none where it does not say.
-
-    Raises what `read_scene` raises.
-    """
+    """Attributes of a scene or result file on the model that its scene was reduced from. Raises as `read_scene`."""
     with open_hdf5(Path(path)) as file:
         return {name: text for name in ORIGIN if (text := read_text_attribute(file, name))}
 
@@ -154,10 +141,6 @@ def _prefixes(datasets: Datasets) -> dict[int, str]:
     """Beginnings of the names of the datasets of each nodal diameter; of 0 alone where the file has no groups `nd`."""
     found = {int(match[1]) for key in datasets if (match := re.match(r"nd/(0|[1-9][0-9]*)/", key))}
     return {k: f"nd/{k}/" for k in sorted(found)} or {0: ""}
-
-
-def _holds_mesh(datasets: Datasets) -> bool:
-    return any(key.startswith("mesh/") for key in datasets)
 
 
 def _read_mesh(datasets: Datasets) -> SurfaceMesh:
@@ -245,10 +228,7 @@ def _read_contact(datasets: Datasets) -> ContactInterface:
 
 
 def _shows_order(datasets: Datasets) -> bool:
-    """Whether the file shows that its arrays are not transposed: by the attribute, or by an array that is not square.
-
-    Such an array would be refused for its shape.
-    """
+    """Whether the file shows that its arrays are not transposed: by the attribute, or by one that is not square."""
     name, value = PAIRS_ARE_ROWS
     if read_text_attribute(datasets["contact/dofs"], name) == value:
         return True

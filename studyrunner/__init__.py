@@ -9,10 +9,10 @@ For use in Python, from this package itself:
 - `UserError`, `StorageError`: what they raise, in one sentence.
 
 The rooms, in the way of a study: `study` (its file, checked), `scene` (its reduced model), `kinds` (the kinds of study:
-their tasks, and how these are computed), `plan` (`--plan`), `mpi` (ranks, and which of them does which task),
-`checkpoint` (the file of what is finished), `summary` (the last lines of a run), `result` (the result file), `report`
-(figures and page from result files), `system` (files, signals, streams, progress). On top: `api`, `cli`, `run`,
-`task_runs`, `accessor`. On the ground: `variables`, `user_error`.
+their tasks, and how these are computed), `plan` (all tasks of a study, `--plan`), `mpi` (ranks, and which of them does
+which task), `checkpoint` (the file of what is finished), `summary` (the last lines of a run), `result` (the result
+file), `report` (figures and page from result files), `system` (files, signals, streams, progress). On top: `api`,
+`cli`, `run`, `task_runs`, `accessor`. On the ground: `variables`, `user_error`.
 """
 
 from __future__ import annotations

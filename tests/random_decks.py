@@ -12,16 +12,16 @@ import numpy as np
 from scipy.optimize import linprog
 
 from solver.continuation.first_state import solve_static_state
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import Failure, State
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import Joint, build_case
-from studies.finite_element.element_matrices import Material
-from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, mean_motion
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene
+from studies.finite_element.solid_mesh import Material
 from studies.finite_element.surfaces import surface_of_faces
 from tests.random_scenes import log_uniform
 from tests.studies.fe_models.sectors import faces_where
@@ -76,11 +76,11 @@ def random_deck(seed: int) -> RandomDeck:
     held, supports = _supports(random, blocks, owner, x, level)
     top = (owner == len(blocks) - 1) & (np.abs(level - level.max()) < 1e-9) & ~held.any(axis=1)
     load, loads = _load(random, friction, mesh.n_nodes, top, x)
-    tip = SetMotion(np.flatnonzero(top), np.array([1.0, 0.0, 0.0]))
+    tip = mean_motion(np.flatnonzero(top), np.array([1.0, 0.0, 0.0]), mesh.n_nodes)
     # a pair needs a node that moves
     held[touching] = False
     joint = JointDefinition(tuple(contacts), held, tip, {"tip": tip})
-    model = build_fe_scene(MeshModel(mesh, preload=load), joint, ReductionOptions(n_modes=4), 1).model
+    model = build_fe_scene(FeModel(mesh, preload=load), joint, ReductionOptions(n_modes=4), 1).model
     facts = f"{len(blocks)} blocks, {model.contact.n_contact} pairs, mu {friction:.3g}, tilt {tilt:.2g}, {fit}"
     return RandomDeck(seed, model, friction, f"{facts} {distance:.1e}, {supports}, {loads}")
 
@@ -153,7 +153,7 @@ def _load(random, friction, n_nodes, top, x) -> tuple[np.ndarray, str]:
     if random.random() < 0.3:
         low, high = x[nodes].min(), x[nodes].max()
         nodes, where = nodes[x[nodes] > low + 0.6 * (high - low)], "at one end"
-    return SetMotion(nodes, direction).row(n_nodes) * force, f"{force:.3g} N, shear {shear:.2g} {where}"
+    return mean_motion(nodes, direction, n_nodes) * force, f"{force:.3g} N, shear {shear:.2g} {where}"
 
 
 def equilibrium_possible(stiffness: FloatArray, force: FloatArray, friction: float) -> bool | None:
@@ -221,6 +221,6 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
     possible = equilibrium_possible(structure.static_stiffness, structure.static_force, deck.friction)
     exists = {True: "possible", False: "impossible", None: "at the limit"}[possible]
     point = solve_static_state(joint, np.zeros(joint.contact.n_contact), Run(settings.tolerance))
-    if isinstance(point, Outcome):
-        return exists, point, {}
+    if isinstance(point, Failure):
+        return exists, point.outcome, {}
     return exists, Outcome.CONVERGED, law_errors(joint, point)

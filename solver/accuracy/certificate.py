@@ -1,22 +1,9 @@
 """The certificate of a state: by how much the reported motion and force violate the equations of the problem.
 
 The numbers are computed from the reported state alone. The samples of a period obey the contact law by construction,
-their Fourier series only up to the harmonics that are cut off. Each number measures what both can still get wrong:
-
-- residual: equilibrium of the reported motion and force, the mean forces (static harmonic) included.
-- penetration: of the series of the motion, also between the samples, over the largest vibration in the joint, so that a
-  large mean closing hides nothing.
-- tension, cone_violation: of the samples, and of the Fejer mean of the series (the mean of its truncations). The Fejer
-  kernel is positive and the friction cone is convex: the Fejer mean of a force that obeys the law lies in the cone. So
-  the overshoot of a truncated friction force, 18 % of its limit for any number of harmonics, is no violation.
-- energy_error: work of the excitation, minus the work of the damping, minus the friction work of the slip as it wears:
-  the error of the sampling. Relative to the largest of these works and of the two following, each times `SMALL_WORK`:
-  the elastic work, and the work that the excitation could do at most.
-- periodicity_error: change of the slip over a period.
-
-The certificate does not measure the truncation error, see `solver.accuracy.refinement`. It finds a force 1e-5 off, a
-harmonic left out, friction that drives, a friction coefficient 10 % too large (15 % too small), slip that does not
-repeat by 2 % of the friction limit.
+their Fourier series only up to the harmonics that are cut off. The truncation error is not measured, see
+`solver.accuracy.refinement`. The certificate finds a force 1e-5 off, a harmonic left out, friction that drives, a
+friction coefficient 10 % too large (15 % too small), slip that does not repeat by 2 % of the friction limit.
 """
 
 from __future__ import annotations
@@ -53,11 +40,16 @@ energy over the elastic work. Slip work below this fraction of this fraction wea
 class Certificate:
     """Violations of one state, all dimensionless; 0 is perfect. The first six have limits.
 
-    residual: scaled residual of the equilibrium.
-    penetration, tension: over the largest relative motion, and the largest normal force.
-    cone_violation: over the largest friction limit, or the largest normal force in a joint without friction.
-    energy_error: over the largest work in a period.
-    periodicity_error: change of the tangential state over the largest friction limit.
+    residual: scaled residual of the equilibrium of motion and force, the mean forces included.
+    penetration: of the series of the motion, also between the samples, over the largest vibration in the joint, so that
+        a large mean closing hides nothing.
+    tension, cone_violation: of the samples, and of the Fejer mean of the series (the mean of its truncations), over the
+        largest normal force and friction limit. The Fejer kernel is positive and the friction cone is convex: so the
+        overshoot of a truncated friction force, 18 % of its limit for any number of harmonics, is no violation.
+    energy_error: work of the excitation, minus the work of the damping, minus the friction work of the slip as it
+        wears, over the largest of these works and, times `SMALL_WORK`, of the elastic work and of the work that the
+        excitation could do at most.
+    periodicity_error: change of the tangential state over a period over the largest friction limit.
     response_error, wear_rate_error: estimated relative truncation errors, NaN where not estimated.
     """
 

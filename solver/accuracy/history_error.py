@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.model import BoolArray, ComplexArray, FloatArray
+from solver.model import BoolArray, FloatArray
 from solver.settings import WearTarget
 
 HISTORY_SAFETY = 1.5
@@ -82,9 +82,9 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     at_start = np.fmax(np.abs(rate - other).sum() / rate.sum() if known else 0.0, fine["wear_rate_error"][0])
     # start state and steps have nothing to do with each other: the worst case is their sum
     error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume + fine["local"])
-    # a pair that agrees with the reference solution better than the volume does so by chance (else 5 and 7 of 24 deep
-    # pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times). By the root of the
-    # number of equal pairs that would share the volume its relative error is smaller than that of independent pairs
+    # a pair that agrees with the reference solution better than the volume does so by chance (dovetail, 211.25 Hz: else
+    # 5 of 24 deep pairs are outside of their errors, by seven times); the error of the volume is smaller than that of
+    # its independent pairs by the root of the number of equal pairs that would share the volume
     squares = ((depth * area) ** 2).sum(axis=1)
     n_equal = np.divide(volume**2, squares, out=np.ones_like(squares), where=squares > 0.0)
     of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(n_equal)) * _over(error, volume)
@@ -189,23 +189,15 @@ def _change_within(volume: FloatArray, error: FloatArray, steps: Compared, area:
     """Relative change (n,) of the response while the worn volume (n,), m3, passes the values within its error (n,), m3:
     a state is not known better than the depths with which it vibrates. steps: the history at the ends of its steps.
     """
-    worn, response = steps.fine["wear_depth"] @ area, steps.fine["response"]
-    known = np.isfinite(worn)
-    worn, response = worn[known], response[known]
+    worn = steps.fine["wear_depth"] @ area
+    response, worn = steps.fine["response"][np.isfinite(worn)], worn[np.isfinite(worn)]
     found = np.zeros_like(volume)
-    if worn.size < 2:
-        return found
-
-    def at(value: FloatArray) -> ComplexArray:
-        return np.array([np.interp(value, worn, each) for each in response.T])
-
-    for place in np.flatnonzero(np.isfinite(error)):
+    for place in np.flatnonzero(np.isfinite(error)) if worn.size > 1 else ():
         low, high = volume[place] - error[place], volume[place] + error[place]
-        passed = response[(worn > low) & (worn < high)].T
-        here = at(volume[place : place + 1])
-        moved, size = np.hstack([at(np.array([low, high])), passed]) - here, np.linalg.norm(here)
+        ends = np.array([np.interp([volume[place], low, high], worn, each) for each in response.T])
+        size, passed = np.linalg.norm(ends[:, 0]), response[(worn > low) & (worn < high)].T
         if size > 0.0:
-            found[place] = np.linalg.norm(moved, axis=0).max() / size
+            found[place] = np.linalg.norm(np.hstack([ends, passed]) - ends[:, :1], axis=0).max() / size
     return found
 
 

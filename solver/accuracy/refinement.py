@@ -12,16 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import (
+from solver.accuracy.resolved_state import (
+    FAINT_SHARE,
     HARMONIC_LEVELS,
+    NOTHING,
+    UNKNOWN,
+    Estimate,
+    ResolvedState,
     fewer,
-    levels_to,
     nothing_happens,
     reach,
     shifted,
     shortest_contact,
 )
-from solver.accuracy.resolved_state import FAINT_SHARE, NOTHING, UNKNOWN, Estimate, ResolvedState
 from solver.harmonic_balance.state import State
 from solver.newton.linear_solver import SMALL_JOINT
 from solver.newton.run import Run
@@ -30,8 +33,8 @@ from solver.stability.disturbances import EXPENSIVE_UNKNOWNS
 from solver.structure.joint import Case, Joint
 
 TWO_LEVELS_SAFETY = 1.5
-"""Error over the difference to the state two levels of harmonics up, 2 to 1.2 where the error falls as 1/H to 1/H^3,
-and over the difference to twice the samples, 2 to 1.3 for an error as the time step or its square."""
+"""Error over the difference to the state two levels up, 2 to 1.2 where it falls as 1/H to 1/H^3, and to the state with
+twice the samples, 2 to 1.3 for an error as the time step or its square."""
 
 ONE_LEVEL_SAFETY = 2.5
 """Error over the difference to the state one level up: 3.4 to 1.5 for an error as 1/H to 1/H^3."""
@@ -40,19 +43,19 @@ TRIPLE_SAMPLES_SAFETY = 2.0
 """Error over the difference to three times the samples: 1.5 to 1.1, but the errors of single events scatter."""
 
 KEPT_FRACTION = 0.5
-"""Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once. A state
-with less than this fraction of that error is tried with fewer harmonics and samples."""
+"""Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once; and of
+this error, below which fewer are tried."""
 
 VIBRATION_RECHECK = 0.3
-"""Relative change of the vibration after which errors are estimated and harmonics chosen again. Error of the motion of
-the dovetail on the far side of the resonance: 5 % with 1.0, 0.5 % with 0.3."""
+"""Relative change of the vibration after which harmonics are chosen again. Error of the motion of the dovetail on the
+far side of the resonance: 5 % with 1.0, 0.5 % with 0.3."""
 
 MOST_MIXED_HARMONICS = 79
 """Highest harmonic of "auto" with even harmonics: motions with impacts gain nothing from more."""
 
 NODE_UNKNOWNS = 1600
-"""Most unknowns of a node of a sweep, about those of the dovetail of 48 pairs with five harmonics. Also of a small
-joint: impacts couple all harmonics, and no preconditioner helps."""
+"""Most unknowns of a node of a sweep, those of the dovetail of 48 pairs with five harmonics. Also of a small joint:
+impacts couple all harmonics, and no preconditioner helps."""
 
 MOST_UNKNOWNS = 8000
 """Most unknowns of a balance of 48 pairs in a history with "auto"."""
@@ -68,11 +71,10 @@ MOST_SAMPLES = 8192
 
 SAMPLES_OF_UNKNOWNS = 512
 """Most samples of a period at the largest number of unknowns; more with fewer unknowns. Nine pairs of a blade that lift
-off at 2000 N: 27 harmonics would take 8192 samples, and the wear rate is no more accurate than with 2048."""
+off at 2000 N: with 8192 samples the wear rate is no more accurate than with 2048."""
 
 REFINEMENT_WORK = 1.2e6
-"""Most Newton iterations of one refinement, times the unknowns two levels up. Failed solves take most of them. A joint
-of 48 pairs with nine harmonics may take 200."""
+"""Most Newton iterations of one refinement, times the unknowns two levels up: 200 of 48 pairs with nine harmonics."""
 
 
 @dataclass(frozen=True)
@@ -179,12 +181,9 @@ class _Search:
     def _harmonics_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing harmonics, and the state with more harmonics that gave it.
 
-        The error is the difference to a state with more harmonics (`_levels_to_compare`), else to one with fewer, which
-        is larger.
+        The error is the difference to a state with more harmonics, else to one with fewer, which is larger.
         """
-        resolution, limit = here.case.resolution, here.limit(COMPARED_UNKNOWNS)
-        higher = [shifted(resolution, level) for level in range(1, _levels_to_compare(here) + 1)]
-        higher = [each for each in higher if here.case.model.holds(each.highest) and here.unknowns(each) <= limit]
+        resolution, higher = here.case.resolution, _richer(here)
         richer, found = self._compared(here, higher[-1]) if higher else None, len(higher)
         above, below = shifted(resolution, 1), shifted(resolution, -1)
         seen = 2 * above.highest < resolution.samples and self._allowed(here, above)
@@ -254,15 +253,16 @@ def _ended(here: ResolvedState, estimate: Estimate, *, accurate: bool = True) ->
     return Refined(here.case, here.joint, here.point, estimate, accurate)
 
 
-def _levels_to_compare(here: ResolvedState) -> int:
-    """Levels up for a comparison, at least two: as far as cheap, such that one period of the highest harmonic is as
-    short as the shortest contact, and structure and penalty agree beyond this harmonic (`reach`).
+def _richer(here: ResolvedState) -> list[Resolution]:
+    """Resolutions with more harmonics, level by level, up to that of a comparison, two levels up. As far as cheap, also
+    one period of its highest harmonic is as short as the shortest contact, and structure and penalty agree beyond.
     """
     resolution, at, model = here.case.resolution, here.point.evaluation, here.case.model
-    levels = [shifted(resolution, level) for level in range(3, len(HARMONIC_LEVELS))]
-    cheap = 2 + sum(here.unknowns(each) <= FAR_UNKNOWNS and model.holds(each.highest) for each in levels)
-    if cheap == 2:
-        return 2
+    levels = enumerate(shifted(resolution, level) for level in range(1, len(HARMONIC_LEVELS)))
+    most = here.limit(COMPARED_UNKNOWNS), FAR_UNKNOWNS
+    found = [each for place, each in levels if model.holds(each.highest) and here.unknowns(each) <= most[place > 1]]
+    if len(found) <= 2:
+        return found
     contact = shortest_contact(at.status_t, at.force_t[:, 0], FAINT_SHARE * here.case.settings.rtol)
-    highest = reach(model, here.joint.omega, resolution.highest)
-    return min(max(levels_to(resolution, wanted) for wanted in (1.0 / contact, highest)), cheap)
+    wanted = max(1.0 / contact, reach(model, here.joint.omega, resolution.highest))
+    return found[: max(2, 1 + sum(each.highest < wanted for each in found))]

@@ -120,14 +120,12 @@ def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray,
 class WearingWork:
     """The wearing work of the pairs of one joint.
 
-    - factor (n_contact,): c, 1. least (n_contact,): q alpha, J. table: f; None for 1.
-    - depth_held: whether derivatives leave out the dependence on the depth.
+    factor (n_contact,): c, 1. least (n_contact,): q alpha, J. table: f; None for 1.
     """
 
     factor: FloatArray | float = 1.0
     least: FloatArray | float = 0.0
     table: PairFactors | None = None
-    depth_held: bool = False
 
     @property
     def largest_factor(self) -> float:
@@ -147,7 +145,7 @@ class WearingWork:
         if self.table is None:
             return by_work, none, none
         work, (value, by_force, by_depth) = self._without_table(slip_work), self._table_at(normal_force, depth)
-        return by_work * value, work * by_force, none if self.depth_held else work * by_depth
+        return by_work * value, work * by_force, work * by_depth
 
     def amplification(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> float:
         """Ratio of the relative errors of total wearing work and slip work, 1; above 1 near a threshold."""

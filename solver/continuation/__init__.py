@@ -1,1 +1,1 @@
-"""Continuation: natural steps, arc length, homotopies, first state, relaxation in time, states after a fold."""
+"""Continuation: steps along a parameter, arc length, first state, relaxation in time, states at a phase lag."""

@@ -1,7 +1,7 @@
 """Pseudo-arc-length continuation of a branch through its folds.
 
-The parameter is the further unknown of a bordered system (`solver.newton.run`), and the further equation says
-that the point lies in a plane across the tangent of the branch.
+The parameter is the further unknown of a bordered system, whose further equation puts the point in a plane across the
+tangent of the branch.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ SHORTEST_ARC = CORNER_ARC / 10.0
 ARC_WANDER = 2.0
 """Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
 the branch of `tests/solver/test_whole_response.py` is left for another one."""
-
 
 FOLD_HALVINGS = 10
 """Halvings of a step with a fold; the parameter at the fold is off by the square of the length."""
@@ -72,10 +71,6 @@ class Arc:
             if reached is None:
                 return
             back = state is self.start and (reached.parameter - state.parameter) * toward < 0.0
-            if back and 0.25 * length > SHORTEST_ARC:
-                # the start lies so near to a fold that the first step passes the fold
-                length *= 0.25
-                continue
             ahead = self.tangent(reached.parameter, reached.evaluation, self.place(reached) - self.place(state))
             turns = ahead is not None and ahead[-1] * tangent[-1] < 0.0
             yield state, reached, state if back else self._fold(state, tangent, reached) if turns else None
@@ -159,7 +154,7 @@ class Arc:
 
 @dataclass(frozen=True)
 class _Plane:
-    """A branch, and the plane across its tangent at a length from a base, both scaled (n + 1,)."""
+    """As BorderedProblem: a branch, and the plane across its tangent at a length from a base, both scaled (n + 1,)."""
 
     arc: Arc
     base: FloatArray
@@ -167,21 +162,17 @@ class _Plane:
     length: float
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        """As in BorderedProblem; the value is parameter / span."""
         balance = self.arc.balance_at(float(values[0] * self.arc.span), self.arc.start.history)
         moved = np.append(predicted_h.ravel() / self.arc.size, values) - self.base
         ahead = float(self.tangent @ moved) - self.length
         return Bordered(balance, balance.evaluate(predicted_h), values, np.array([ahead]), extra=moved)
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
-        """As in BorderedProblem."""
         return [self.arc.slope(float(here.values[0] * self.arc.span), here.at)], self.tangent[-1:, None]
 
     def by_step(self, _: Bordered, __: Linearisation, step: FloatArray) -> FloatArray:
-        """As in BorderedProblem."""
         return np.array([self.tangent[:-1] @ step.ravel() / self.arc.size])
 
     def fraction(self, here: Bordered, _: FloatArray, __: FloatArray) -> float:
-        """NaN where the corrector has gone too far."""
         far = np.linalg.norm(here.extra) > ARC_WANDER * abs(self.length)
         return np.nan if far else 1.0

@@ -1,15 +1,14 @@
 """The static state of a joint, and its first periodic state from there.
 
 The static state depends on the history of the load. So the load is raised in equal steps, each from the tangential
-state of the step before. Newton's method finds most of them. Where it cycles among sets of pairs that slip and open,
-the step is made in time, as a joint with viscous pairs makes it, by implicit Euler:
+state of the step before. Where Newton's method cycles among sets of pairs that slip and open, the step is made in time,
+as a joint with viscous pairs makes it, by implicit Euler:
 
     c (u - u_before) + Z_r u + lambda = F_r
 
 A large c, in proportion to the penalty of each pair, binds the pair to its last position, and the state is unique for
-any friction. From step to step c falls, until Newton's method finds the state with c = 0. Also a joint that has to jump
-moves on (a snap under much friction, a body that falls through a gap), and a joint without any static state moves
-without end, in a direction that shows why.
+any friction. From step to step c falls, until Newton's method finds the state with c = 0. A joint without any static
+state moves without end, in a direction that shows why.
 """
 
 from __future__ import annotations
@@ -18,12 +17,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.contact.coulomb import friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
 from solver.continuation.transient import RUNAWAY, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import State
-from solver.model import ComplexArray, FloatArray
+from solver.harmonic_balance.state import Failure, State
+from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import NEGLIGIBLE
@@ -34,14 +32,11 @@ LOAD_STEPS = 20
 """Steps of the static load of a joint with gaps, wear or given normal forces, which may change the state."""
 
 VISCOSITY_CUT, VISCOSITY_RISE = 0.2, 10.0
-"""Factors on the viscosity after a step in time, and after a step that was not found. With a cut of 0.05 and 0.1 as
-many random decks (`tests/random_decks.py`) have a static state."""
+"""Factors on the viscosity after a step in time, and after a step that was not found. With a cut of 0.05 as many random
+decks have a static state."""
 
 VISCOUS_STEPS = 300
 """Most steps in time. Of 300 random decks one needs more than 60."""
-
-LINEARISATIONS = 20
-"""Iterations of the harmonic linearisation."""
 
 RELIEF = (0.1, 0.4)
 """Fractions of the static friction forces that are removed where the excitation cannot be raised with the full forces.
@@ -50,96 +45,58 @@ Other fractions lead to other states that friction allows: 5 % for a mass that r
 
 def solve_first_state(
     case: Case, omega: float, excitation_amplitude: float, wear_depth: FloatArray, run: Run
-) -> State | Outcome:
+) -> State | Failure:
     """First periodic state. These ways are tried in turn until one leads to a stable state:
 
-    1. Where friction cannot hold any pair against the whole excitation, Newton's method starts from a vibration in
-       which all slide (three to four iterations for the slider, which takes 50 with the next way).
-    2. The excitation is raised from zero.
-    3. The excitation is raised from a state with smaller static friction forces. Pairs that the static load leaves at
+    1. The excitation is raised from zero.
+    2. The excitation is raised from a state with smaller static friction forces. Pairs that the static load leaves at
        their friction limit slip under the smallest vibration, in states far from the static one, and shake down.
-    4. The vibration builds up in time under the whole excitation (`transient`).
+    3. The vibration builds up in time under the whole excitation (`transient`).
 
     omega, excitation_amplitude: rad/s, N. wear_depth (n_contact,): m.
-    Returns the state, or START_FAILED, UNSTABLE, UNSETTLED, ADRIFT or an outcome of `solve_static_state`.
+    Returns the state, or START_FAILED, UNSTABLE, UNSETTLED, ADRIFT or the failure of `solve_static_state`.
     """
-    quiet = case.joint(omega, 0.0)
-    static = solve_static_state(quiet, wear_depth, run)
-    if isinstance(static, Outcome):
-        return static
+    rest = state_at_rest(case, omega, wear_depth, run)
+    if isinstance(rest, Failure):
+        return rest
+    quiet, unstable = case.joint(omega, 0.0), False
 
     def balance_at(load_factor: float, history: FloatArray) -> Balance:
         return Balance(case.joint(omega, load_factor * excitation_amplitude), history, wear_depth)
 
-    start, unstable = predicted_at_rest(case, quiet, static, wear_depth), False
-    rest = run.state(balance_at(0.0, static.history), start, 0.0)
-    if rest is None:
-        return Outcome.START_FAILED
-    whole = balance_at(1.0, rest.history)
-    if (sliding := _sliding_start(whole, rest)) is not None:
-        slid = run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
-        if slid is not None and run.is_stable(balance_at(1.0, slid.evaluation.history), slid.evaluation):
-            return slid
     for fraction in (0.0, *RELIEF):
-        relieved = Balance(quiet, relieved_history(quiet, static, fraction), wear_depth)
-        begun = run.state(relieved, start, 0.0) if fraction else rest
+        relieved = balance_at(0.0, relieved_history(quiet, rest, fraction))
+        begun = run.state(relieved, rest.evaluation.predicted_h, 0.0) if fraction else rest
         if begun is None:
             continue
         raised, arrived = follow_naturally(balance_at, begun, 1.0, run)
         if arrived and run.is_stable(balance_at(1.0, raised.evaluation.history), raised.evaluation):
             return raised
         unstable |= arrived
-    settled = relax_to_periodic(case, whole.joint, wear_depth, rest, quiet, run)
-    return Outcome.UNSTABLE if unstable and isinstance(settled, Outcome) else settled
+    settled = relax_to_periodic(case, case.joint(omega, excitation_amplitude), wear_depth, rest, quiet, run)
+    return Failure(Outcome.UNSTABLE) if unstable and isinstance(settled, Failure) else settled
 
 
-def _sliding_start(balance: Balance, rest: State) -> FloatArray | None:
-    """Predicted force (n_rel, m), N, of a joint all of whose pairs slide; None where friction may hold one of them.
+def state_at_rest(case: Case, omega: float, wear_depth: FloatArray, run: Run) -> State | Failure:
+    """The static state with the harmonics of a case, none of which vibrates, and with the parameter 0.
 
-    Friction acts against the velocity with its first harmonic, 4 / pi times its limit (harmonic linearisation).
+    Arguments as in `solve_first_state`. Returns the state, START_FAILED or the failure of `solve_static_state`.
     """
-    joint = balance.joint
-    load, stiffness = joint.structure.harmonic_force, joint.structure.dynamic_stiffness[0]
-    limit = friction_limit(joint.friction_coefficient, rest.evaluation.force_h[:, 0, 0])
-
-    def of_pairs(amplitudes: ComplexArray) -> ComplexArray:
-        spread = np.zeros(3 * limit.size, complex)
-        spread[joint.component_index] = amplitudes
-        return spread.reshape(-1, 3)
-
-    if (np.linalg.norm(of_pairs(load)[:, 1:], axis=1) <= limit).any():
-        return None
-    friction, moved = np.zeros((limit.size, 3), complex), load.astype(np.complex128)
-    for _ in range(LINEARISATIONS):
-        left = load - friction.ravel()[joint.component_index]
-        moved = np.asarray(np.linalg.solve(stiffness, left), dtype=np.complex128)
-        velocity = 1j * of_pairs(moved)[:, 1:]
-        size = np.maximum(np.linalg.norm(velocity, axis=1), 1e-300)
-        friction[:, 1:] = (4.0 / np.pi * limit / size)[:, None] * velocity
-    motion_h, force_h = rest.evaluation.displacement_h.copy(), rest.evaluation.force_h.copy()
-    for values, amplitude in ((motion_h, of_pairs(moved)), (force_h, friction)):
-        values[:, :, 1], values[:, :, 2] = amplitude.real, -amplitude.imag
-    return balance.predict(motion_h, force_h)
+    quiet = case.joint(omega, 0.0)
+    static = solve_static_state(quiet, wear_depth, run)
+    if isinstance(static, Failure):
+        return static
+    balance, at, orders = Balance(quiet, static.history, wear_depth), static.evaluation, case.resolution.orders
+    start = balance.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
+    return run.state(balance, start, 0.0) or Failure(Outcome.START_FAILED)
 
 
-def relieved_history(joint: Joint, static: State, fraction: float) -> FloatArray:
-    """Tangential history (n_contact, 2), m, that reduces the static friction forces by a fraction."""
-    return static.history + fraction * static.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
+def relieved_history(joint: Joint, rest: State, fraction: float) -> FloatArray:
+    """Tangential history (n_contact, 2), m, that reduces the friction forces of a state at rest by a fraction."""
+    return rest.history + fraction * rest.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
 
 
-def predicted_at_rest(case: Case, quiet: Joint, static: State, wear_depth: FloatArray) -> FloatArray:
-    """Predicted force (n_rel, 2H+1), N, of the static state with the harmonics of a case, none of which vibrates.
-
-    quiet: the joint without excitation, at the harmonics of the case.
-    """
-    displacement_h, force_h = (
-        change_orders(part, (), case.resolution.orders)
-        for part in (static.evaluation.displacement_h, static.evaluation.force_h)
-    )
-    return Balance(quiet, static.history, wear_depth).predict(displacement_h, force_h)
-
-
-def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Outcome:
+def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Failure:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
     Without gaps, wear and given normal forces all states of a rising load are proportional, and one step is enough.
@@ -157,19 +114,18 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State 
         balance = Balance(static_joint(joint, step / n_steps), state.history, wear_depth)
         before = state.evaluation.predicted_h
         start = balance.joint.structure.force_h() if step == 1 else before * (step / (step - 1.0))
-        found, used = run.state(balance, start), run.budget.iterations
+        found: State | Failure | None = run.state(balance, start)
         if found is None:
-            settled = _settle(balance, state.evaluation, run)
-            if isinstance(settled, Outcome):
-                return settled
+            used, found = run.budget.iterations, _settle(balance, state.evaluation, run)
             # every search needs a static state, whose steps have a limit of their own
             run.budget.limit += run.budget.iterations - used
-            found = settled
+        if isinstance(found, Failure):
+            return found
         state = found
     return state
 
 
-def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
+def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Failure:
     """Static state to which viscous pairs come from the state `before`, or why there is none."""
     viscosity, begun = 1.0, before.displacement_h
     far, moved = float((balance.joint.contact.gap + balance.wear_depth).max()), np.zeros_like(begun)
@@ -192,7 +148,7 @@ def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
             break
         viscosity *= VISCOSITY_CUT
     if np.abs(moved).max() <= far:
-        return Outcome.STATIC_FAILED
+        return Failure(Outcome.STATIC_FAILED)
     # a motion without end
     opened, slid = -moved[:, 0].min(initial=0.0), np.linalg.norm(moved[:, 1:], axis=1).max(initial=0.0)
-    return Outcome.STATIC_OPEN if opened > slid else Outcome.STATIC_SLIDING
+    return Failure(Outcome.STATIC_OPEN if opened > slid else Outcome.STATIC_SLIDING)

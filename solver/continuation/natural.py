@@ -2,8 +2,7 @@
 
 The length of a step along frequency, load, amplitude, cycles or missions follows from the change of the state over the
 step, or its local error, over the one allowed (`take_step`). Natural steps of Newton's method alone are halved where it
-fails (`follow_naturally`). The *change* of the vibration is `vibration_change` of two states, relative to the first
-one. A state that is found is exact to the tolerance for all values of the constants.
+fails (`follow_naturally`). Changes of the vibration are those of `vibration_change`.
 """
 
 from __future__ import annotations
@@ -14,9 +13,8 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from solver.contact.coulomb import STICK
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import BalanceAt, Failure, State, final_history, vibration_change
+from solver.harmonic_balance.state import BalanceAt, Failure, State, final_history
 from solver.model import FloatArray
 from solver.newton.run import MOST_ITERATIONS, SHORTEST_STEP, Run
 from solver.structure.joint import Joint
@@ -26,24 +24,18 @@ ATTEMPTS = 25
 the largest amplitude (a step takes one or two), shakedown of sliding masses, pairs that are opened."""
 
 NEAR_ITERATIONS = 10
-"""Newton iterations from a near state, where a shorter step is the alternative. Of 1400 such converged solves (impacts,
-sliders, random scenes, dovetail) eight needed all ten."""
+"""Newton iterations from a near state, where a shorter step is the alternative. Of 1400 solves eight needed ten."""
 
 SMOOTH_CHANGE = 0.2
-"""Largest change over a smooth step of a branch. A step with a larger change is divided. A fold with a larger change is
-a jump, with a smaller change a corner. Half the value takes up to 50 % more iterations; twice the value leads to equal
-states."""
-
-LINEAR_CHANGE = 1.0
-"""Largest change over a step between two states in which no pair slips or opens. The reversal of phase at a linear
-resonance is a change of 2."""
+"""Largest change over a smooth step of a branch; a fold with a smaller change is a corner. Half the value takes up to
+50 % more iterations; twice the value leads to equal states."""
 
 STEP_SAFETY = 0.85
 """Length of a step over the length with the allowed error, and the largest factor on a step that was refused."""
 
 LARGEST_STEP_RATIO = 2.0
-"""Largest ratio of two successive steps of a sweep, of an amplitude and on the slow time scale; BDF2 is zero-stable
-below 1 + sqrt(2). With 1.4 the damping of a nonlinear mode of the dovetail changes by 5e-6."""
+"""Largest ratio of two successive steps; BDF2 is zero-stable below 1 + sqrt(2). With 1.4 the damping of a mode of the
+dovetail changes by 5e-6."""
 
 SMALLEST_STEP_RATIO = 0.25
 """Factor on a step whose end was not found, and smallest factor on a step that was refused."""
@@ -105,49 +97,36 @@ def follow_naturally(
 ) -> tuple[State, bool]:
     """Step the parameter to the target; returns the last state, and whether it is at the target.
 
-    Steps are halved where Newton's method needs many iterations. The first Newton iteration from the last state is a
-    tangent predictor (for wear: Eq. (19)), so that no other predictor is needed.
+    The first Newton iteration from the last state is a tangent predictor (for wear: Eq. (19)).
 
-    balance_at: balance at a value of the parameter. start: first state, with its parameter.
-    fine: length of the parameter. A longer step is accepted only if the vibration changes little over the step: where
-    each step leaves a history to the next one, the state at the target depends on the steps.
+    fine: longest step of the parameter, as each step leaves a history to the next one.
     """
-    state, whole, shortest = start, target - start.parameter, SHORTEST_STEP
-    if np.isfinite(fine) and whole != 0.0:
-        shortest = min(shortest, 0.25 * fine / abs(whole))
+    state, whole = start, target - start.parameter
     # fractions of two: sums of them are exact, so that the last step ends at the target
-    fraction, done, failures = 1.0, 0.0, 0
+    fraction = longest = 2.0 ** min(math.floor(math.log2(fine / max(abs(whole), 1e-300))), 0) if fine < np.inf else 1.0
+    shortest, done, failures = min(SHORTEST_STEP, 0.25 * longest), 0.0, 0
     while state.parameter != target:
         ahead = min(done + fraction, 1.0)
         reach = target if ahead == 1.0 else start.parameter + ahead * whole
         balance = balance_at(reach, state.history)
         most = MOST_ITERATIONS if fraction <= 2.0 * shortest else NEAR_ITERATIONS
         result = run.solve(balance, state.evaluation.predicted_h, most)
-        smooth = abs(reach - state.parameter) <= fine or _is_smooth(state.evaluation, result.evaluation)
-        if result.converged and smooth:
+        if result.converged:
             state = State(result.evaluation, final_history(balance, result.evaluation), reach)
-            done, fraction = ahead, min(2.0 * fraction, 1.0)
+            done, fraction = ahead, min(2.0 * fraction, longest)
             continue
-        fraction = 0.5 * (ahead - done)
-        failures += not result.converged
+        fraction, failures = 0.5 * (ahead - done), failures + 1
         if fraction < shortest or failures > ATTEMPTS or run.budget.exhausted:
             return state, False
     return state, True
 
 
-def _is_smooth(before: Evaluation, after: Evaluation) -> bool:
-    """Whether the vibration changes so little between two states that no step between them is needed."""
-    linear = bool((before.status_t == STICK).all() and (after.status_t == STICK).all())
-    return vibration_change(before, after) <= (LINEAR_CHANGE if linear else SMOOTH_CHANGE)
-
-
 def ratchets(joint: Joint, at: Evaluation, fraction: float) -> bool:
     """Whether the work of ratcheting in a period exceeds a fraction of the slip work.
 
-    A very small stiffness holds the mean position of a mass on a slider (`penalty.mean`), and drag c its mean velocity.
-    Where the vibration lets the mass slip to a mean position u_0 that differs from that of its history, the law
-    ratchets by 2 pi / omega penalty.mean (u_0 - history) / c in each period, although the Fourier series are periodic.
-    This slip counts as wear, but its work, mean normal force times ratcheting, is not in the balance of energy.
+    A very small stiffness (`penalty.mean`) holds the mean position of a mass on a slider. Where the vibration lets the
+    mass slip to another mean position, the law ratchets in each period, although the Fourier series are periodic. This
+    slip counts as wear, but its work, mean normal force times ratcheting, is not in the balance of energy.
     """
     work = float(np.abs(at.force_h[:, 0, 0]) @ np.hypot(*joint.law.drift(at).T))
     return work > fraction * float(at.slip_work.sum())
@@ -156,8 +135,8 @@ def ratchets(joint: Joint, at: Evaluation, fraction: float) -> bool:
 def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
     """State after shakedown of the masses, which slip to and fro or stick in the end, at an unchanged wear depth.
 
-    The mean position u_0 becomes the new history, with which only a part of the ratcheting is left, and so on until its
-    work is at most a fraction of the slip work. The last state found where this does not end.
+    The mean position becomes the new history, with which a part of the ratcheting is left, and so on until its work is
+    at most a fraction of the slip work. The last state found where this does not end.
     """
     run, worn = run.fresh(), state.evaluation.wear_depth
     for _ in range(ATTEMPTS):

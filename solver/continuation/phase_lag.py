@@ -53,15 +53,14 @@ def phase_lag(joint: Joint, at: Evaluation) -> float:
 
 def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
     """`F^H x`, N m, of excitation and displacements in the first harmonic, from the motion (n_contact, 3, 2H+1), m."""
-    return _product_change(joint, displacement_h) + joint.structure.drive_offset
+    return _changes(joint, displacement_h)[0] + joint.structure.drive_offset
 
 
 @dataclass(frozen=True)
-class AtLag:
-    """The problem: a balance, with fixed or with growing wear depths, whose frequency follows from its lag.
+class _AtLag:
+    """As BorderedProblem: a balance, with fixed or growing wear depths, whose frequency, rad/s, follows from its lag.
 
-    balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced`: change of the lag with the frequency
-    along the states, s/rad.
+    balance: at some frequency. lag: rad, between 0 and pi.
     """
 
     case: Case
@@ -69,7 +68,6 @@ class AtLag:
     lag: float
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        """As in BorderedProblem; the value is the frequency, rad/s."""
         joint = self.case.joint(float(values[0]), self.balance.joint.excitation_amplitude)
         balance = replace(self.balance, joint=joint)
         at = balance.evaluate(predicted_h)
@@ -77,16 +75,14 @@ class AtLag:
         return Bordered(balance, at, values, self._errors(product, product), extra=product)
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
-        """As in BorderedProblem."""
         by_frequency = frequency_derivative(here.balance, here.at)
         return [by_frequency.force], self._errors(by_frequency.product, here.extra)[:, None]
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
-        """As in BorderedProblem: of the equation times |F^H x|, whose derivative is linear in the motion."""
-        return self._errors(_product_change(here.balance.joint, tangent.motion(step)), here.extra)
+        # of the equation times |F^H x|, whose derivative is linear in the motion
+        return self._errors(_changes(here.balance.joint, tangent.motion(step))[0], here.extra)
 
     def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
-        """The frequency changes by a small fraction of itself at most."""
         return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
 
     def _errors(self, part: complex, product: complex) -> FloatArray:
@@ -97,11 +93,12 @@ class AtLag:
 def solve_at_lag(
     case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
 ) -> Bordered | None:
-    """The state with a given lag, as `AtLag`; None where Newton's method fails.
+    """The state of a balance, with fixed or with growing wear depths, at a phase lag, rad; None where it is not found.
 
-    start (n_rel, 2H+1): first predicted force, N, at the frequency of the balance. most: iterations.
+    start (n_rel, 2H+1): first predicted force, N, at the frequency of the balance. most: iterations. `Bordered.reduced`
+    of the state: change of the lag with the frequency along the states, s/rad.
     """
-    return run.solve_bordered(AtLag(case, balance, lag), start, np.array([balance.joint.omega]), most)
+    return run.solve_bordered(_AtLag(case, balance, lag), start, np.array([balance.joint.omega]), most)
 
 
 def solve_at_peak(
@@ -112,7 +109,7 @@ def solve_at_peak(
     Arguments as in `solve_at_lag`. Along the frequency the wear depth is constant, also in an implicit step.
     """
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
-    before: tuple[float, float] | None = None
+    last, rise_before = lag, 0.0
     for _ in range(ATTEMPTS):
         found = solve_at_lag(case, balance, start, lag, run, most)
         if found is None:
@@ -126,9 +123,9 @@ def solve_at_peak(
         if abs(rise) <= accuracy or above - below <= accuracy:
             return replace(found, reduced=np.array([[turn]])), lag
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
-        slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
+        slope = -1.0 if lag == last else (rise - rise_before) / (lag - last)
         step = float(np.clip(-rise / min(slope, -NEGLIGIBLE), -LARGEST_LAG_STEP, LARGEST_LAG_STEP))
-        before = lag, rise
+        last, rise_before = lag, rise
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
         balance, start = found.balance, found.at.predicted_h
     return None
@@ -149,11 +146,11 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     fixed = Balance(joint, at.history, at.wear_depth)
     by_frequency = frequency_derivative(fixed, at)
     step = run.step(fixed, at, -by_frequency.force, min(FORCING, 0.1 * accuracy))
-    moved = fixed.linearise(at).motion(step)
-    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
-    rise = (by_frequency.response[0] + _response_changes(joint, moved)[0]) / response
-    product = by_frequency.product + _product_change(joint, moved)
-    return float(rise.real), -(product / excitation_product(joint, at.displacement_h)).imag
+    product, response = _changes(joint, fixed.linearise(at).motion(step))
+    amplitude = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
+    rise = (by_frequency.response[0] + response[0]) / amplitude
+    turn = (by_frequency.product + product) / excitation_product(joint, at.displacement_h)
+    return float(rise.real), -turn.imag
 
 
 def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencySlope:
@@ -161,30 +158,21 @@ def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencySlope:
     of the responses; those of masses on rigid ground by differences.
     """
     joint = balance.joint
-    amplitude, orders, u = joint.excitation_amplitude, joint.basis.orders, joint.to_relative(at.displacement_h)
-    slope = frequency_slope(joint.model, joint.omega, amplitude, orders, u)
+    orders, u = joint.basis.orders, joint.to_relative(at.displacement_h)
+    slope = frequency_slope(joint.model, joint.omega, joint.excitation_amplitude, orders, u)
     if not joint.law.rate_dependent:
         return slope
     # longer than usual: the round-off of the static forces is small against the change of all others
     length = 10.0 * DIFFERENCE * joint.omega
     ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
-    motion = (ahead.displacement_h - at.displacement_h) / length
-    return FrequencySlope(
-        force=slope.force + (ahead.residual - at.residual) / length,
-        product=slope.product + _product_change(joint, motion),
-        response=slope.response + _response_changes(joint, motion),
-    )
+    product, response = _changes(joint, (ahead.displacement_h - at.displacement_h) / length)
+    force = slope.force + (ahead.residual - at.residual) / length
+    return FrequencySlope(force, slope.product + product, slope.response + response)
 
 
-def _response_changes(joint: Joint, motion_h: FloatArray) -> ComplexArray:
-    """First harmonic of the responses (n_response,), m, to a motion (n_contact, 3, 2H+1), m, alone."""
-    return np.asarray(joint.structure.dynamic_response[0] @ _first(joint, motion_h))
-
-
-def _product_change(joint: Joint, motion_h: FloatArray) -> complex:
-    """Change of `F^H x`, N m, with a change of the motion (n_contact, 3, 2H+1), m."""
-    return complex(joint.structure.drive @ _first(joint, motion_h))
-
-
-def _first(joint: Joint, motion_h: FloatArray) -> ComplexArray:
-    return to_complex(joint.to_relative(motion_h))[:, 0]
+def _changes(joint: Joint, motion_h: FloatArray) -> tuple[complex, ComplexArray]:
+    """Changes of `F^H x`, N m, and of the first harmonic of the responses (n_response,), m, with a motion
+    (n_contact, 3, 2H+1), m.
+    """
+    first = to_complex(joint.to_relative(motion_h))[:, 0]
+    return complex(joint.structure.drive @ first), np.asarray(joint.structure.dynamic_response[0] @ first)

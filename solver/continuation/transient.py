@@ -1,21 +1,16 @@
 """Relaxation in time to a periodic state: the harmonics of the motion vary slowly until they are constant.
 
-The motion is y(t) = Re sum Y_n(T) exp(i n w t), with amplitudes that vary slowly: d/dt acts on Y_n as i n w + d/dT.
-With the velocity V = (i n w + d/dT) Y as a second unknown, the equation of motion reads
+In the motion y(t) = Re sum Y_n(T) exp(i n w t) the derivative d/dt acts on Y_n as i n w + d/dT. An implicit Euler step
+of length D in T from amplitudes Y_0 and velocities V_0, with s = i n w + 1/D, gives V = s Y - Y_0 / D and
 
-    M (i n w + d/dT) V + C V + K Y + lambda = F,
+    (K + s C + s^2 M) Y + lambda = F + M (s Y_0 + V_0) / D + C Y_0 / D,
 
-and an implicit Euler step of length D in T from (Y_0, V_0), with s = i n w + 1/D, gives V = s Y - Y_0 / D and
-
-    (K + s C + s^2 M) Y + lambda = F + M (s Y_0 + V_0) / D + C Y_0 / D.
-
-This is the harmonic balance, Eq. (8), with other matrices and loads. A periodic motion (V_0 = i n w Y_0, Y = Y_0)
-fulfils the equation exactly for each D; for D -> infinity the equation is the balance. The friction law is periodic
-over one period and starts from the history of the step before. The static harmonic has s = 1/D.
+the harmonic balance, Eq. (8), with other matrices and loads; for D -> infinity the balance itself. A periodic motion
+fulfils the equation for each D. The friction law is periodic and starts from the history of the step before.
 
 A short step resolves the transient, a long step damps all decaying motions. Growing motions leave an unstable state as
-long as 1/D exceeds their rate, which the determinant of the step shows (`stability.hill`). So D starts at one period,
-each periodic state is tested for stability, and D is bounded by this rate once a state was unstable.
+long as 1/D exceeds their rate, which the determinant of the step shows. So D starts at one period, each periodic state
+is tested for stability, and D is bounded by this rate once a state was unstable.
 """
 
 from __future__ import annotations
@@ -27,7 +22,7 @@ import numpy as np
 
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import State, final_history
+from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
@@ -38,12 +33,10 @@ from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Case, Joint
 
 TRANSIENT_CUT = 0.35
-"""Factor of the length of a step that fails, or whose change is twice `SMOOTH_CHANGE`. Half the value takes 2.5
-times the iterations of a jump at a fold."""
+"""Factor of the length of a refused step. Half the value takes 2.5 times the iterations of a jump at a fold."""
 
 SEARCH_ITERATIONS = 800
-"""Most Newton iterations of a relaxation with its periodic state. A jump at a fold of vibro-impact takes 400 to 500; a
-motion that does not settle would take thousands."""
+"""Most Newton iterations of a relaxation. A jump at a fold of vibro-impact takes 400 to 500."""
 
 RUNAWAY = 1e3
 """Displacement over the largest one of vibration and start; above it parts run away."""
@@ -86,15 +79,13 @@ class Transient:
 
     def periodic(self, evaluation: Evaluation) -> Motion:
         """Motion of the whole structure in a periodic state of the joint: the end of an infinite step."""
-        zero = np.zeros((len(self.parts), self.parts[0][1].size), complex)
-        return self.after(evaluation, Motion(zero, zero), 0.0)
+        nothing = np.zeros((len(self.parts), self.parts[0][1].size), complex)
+        return self.after(evaluation, Motion(nothing, nothing), 0.0)
 
     def step(self, before: Motion, inverse: float) -> Joint:
         """Joint whose balance is an implicit Euler step of length 1/`inverse`, s, from a motion `before`."""
-        orders = len(self.parts)
         n_rel = self.relative.size
-        stiffness = np.empty((orders, n_rel, n_rel), complex)
-        force = np.empty((orders, n_rel), complex)
+        stiffness, force = (np.empty((len(self.parts), *each), complex) for each in ((n_rel, n_rel), (n_rel,)))
         for place, load in enumerate(self._loads(before, inverse)):
             linear, rate = self.parts[place][0], self.rates[place] + inverse
             full = cast("Matrix", linear.stiffness + rate * linear.damping + rate**2 * linear.mass)
@@ -120,23 +111,23 @@ class Transient:
 
     def _loads(self, before: Motion, inverse: float) -> list[Matrix]:
         loads: list[Matrix] = []
-        for place, (linear, load) in enumerate(self.parts):
-            moved, velocity = before.displacement[place], before.velocity[place]
-            inertia = linear.mass @ ((self.rates[place] + inverse) * moved + velocity) + linear.damping @ moved
+        for (linear, load), rate, moved, velocity in zip(
+            self.parts, self.rates, before.displacement, before.velocity, strict=True
+        ):
+            inertia = linear.mass @ ((rate + inverse) * moved + velocity) + linear.damping @ moved
             loads.append(load + inverse * inertia)
         return loads
 
 
 def relax_to_periodic(
     case: Case, joint: Joint, wear_depth: FloatArray, start: State, start_joint: Joint, run: Run
-) -> State | Outcome:
+) -> State | Failure:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
     case: model and settings of both joints, which have equal pairs and harmonics; frequency and load may differ.
     wear_depth (n_contact,): m, constant. A start without excitation leads to the state that builds up from rest.
-    Returns the state; ADRIFT where the mean positions run away, as all pairs slip and only friction holds the parts;
-    UNSTABLE where the motion does not leave an unstable periodic state; UNSETTLED where it does not settle within
-    `SEARCH_ITERATIONS`.
+    Returns the state, or ADRIFT (the mean positions run away: only friction holds the parts), UNSTABLE (the motion does
+    not leave an unstable periodic state) or UNSETTLED (it does not settle within `SEARCH_ITERATIONS`).
     """
     budget = run.budget
     budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
@@ -162,7 +153,7 @@ def relax_to_periodic(
         # a step over more than the time in which a motion grows would damp this motion
         damped = grows and result.converged and not run.is_stable(balance, result.evaluation)
         if damped and result.iterations == 0:
-            return Outcome.UNSTABLE
+            return Failure(Outcome.UNSTABLE)
         if not result.converged or too_far or damped:
             length *= TRANSIENT_CUT
             continue
@@ -171,7 +162,7 @@ def relax_to_periodic(
         moved = np.abs(result.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > RUNAWAY * size:
-            return Outcome.ADRIFT
+            return Failure(Outcome.ADRIFT)
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < 0.5 * tried or length >= longest
         if change < RELAXED_CHANGE and renewed:
@@ -190,7 +181,7 @@ def relax_to_periodic(
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(SMOOTH_CHANGE / max(change, 1e-300), 0.5, 2.0))
         length = min(max(length * growth, 1.0), longest)
-    return Outcome.UNSETTLED
+    return Failure(Outcome.UNSETTLED)
 
 
 def _change(before: Motion, after: Motion) -> float:

@@ -136,7 +136,7 @@ def _tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> Fl
         # the load acts in the first harmonic alone
         structure = build_structure(joint.model, joint.omega, 0.0, orders)
     except np.linalg.LinAlgError:
-        # the structure with its joint held is singular at one of these harmonics
+        # the structure with a stuck joint is singular at one of these harmonics
         return np.zeros((still.size, 2 * len(orders) + 1))
     force_h = joint.law.tail(evaluation, build_basis(orders, joint.basis.n_samples))
     force = to_complex(joint.to_relative(force_h)).T[:, :, None]

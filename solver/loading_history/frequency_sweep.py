@@ -1,6 +1,6 @@
 """The sweep along the frequencies of a study: where it begins, nodes common to many points, the state at each point.
 
-A machine passes other frequencies before the point, and the joint keeps their history. So a sweep begins well away from
+The joint keeps the history of the frequencies that a machine passes before a point. So a sweep begins well away from
 the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85 times. All points of a
 cell, a quarter octave, have one first frequency: the one at which the vibration loads the stuck joint least, so that no
 sweep begins at a resonance. It depends on the scene and on the cell, not on the other points of a study.
@@ -16,16 +16,15 @@ import numpy as np
 
 from solver.accuracy.certificate import certify
 from solver.accuracy.refinement import Refined, refine
-from solver.accuracy.resolved_state import NOTHING, UNKNOWN, Estimate, ResolvedState
+from solver.accuracy.resolved_state import NOTHING, ResolvedState
 from solver.continuation.first_state import solve_first_state
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State, carried_history, history_at_rest
-from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, stable_state
-from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep, SweepState
+from solver.harmonic_balance.state import Failure, State
+from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step
+from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
-from solver.packing import Packed, pack, packable
+from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
 from solver.settings import Direction, Resolution, SolverSettings, allowed
@@ -34,31 +33,20 @@ from solver.structure.condensation import build_structure
 from solver.structure.joint import Case, build_case
 
 FIRST_ITERATIONS = SWEEP_ITERATIONS // 8
-"""Most Newton iterations to begin a sweep, or to find a state where the sweep is lost; tens to hundreds suffice where
-some pairs stick."""
+"""Most Newton iterations to begin a sweep, or to find a state where the sweep is lost. Tens to hundreds suffice."""
 
 OTHER_START = Resolution((1,), 64)
 """Harmonics and samples of a further attempt to find a first state: four of 54 random scenes need it."""
 
 BEGIN_AWAY = 0.3
-"""Least distance from the start of a sweep to the point, as a fraction of the frequency of the point. With 0.22 and
-0.38 the dovetail has the same state within 2e-3."""
+"""Least distance from the start of a sweep to the point over its frequency. With 0.22 and 0.38 the dovetail has the
+same state within 2e-3."""
 
 CELLS_PER_OCTAVE = 4
 """Cells in an octave. The first frequency of the dovetail is 105 Hz, half the resonance."""
 
 START_CANDIDATES = 8
 """Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen."""
-
-
-@packable
-@dataclass(frozen=True)
-class FrequencySweepState:
-    """Saved state of a `FrequencySweep`: cell, frequency of a ramp, rad/s, or None, and nodes."""
-
-    cell: int
-    omega: float | None
-    nodes: SweepState
 
 
 @dataclass(eq=False)
@@ -102,12 +90,13 @@ class FrequencySweep:
 
     def save(self) -> None:
         """Give `keep` what another sweep needs to go on."""
-        if self.nodes is not None and self.nodes.saved is not None:
-            self.keep(pack(FrequencySweepState(self.cell, self.omega, self.nodes.saved)))
+        if self.nodes is not None and self.nodes.saved:
+            self.keep(pack((self.cell, self.omega, self.nodes.saved)))
 
-    def load(self, state: FrequencySweepState) -> None:
-        """Go on from the saved state of another sweep."""
-        self._new_sweep(state.cell, state.omega).load(state.nodes)
+    def load(self, saved: Packed) -> None:
+        """Go on from what another sweep has given to `keep`."""
+        cell, omega, nodes = unpack(saved)
+        self._new_sweep(cell, omega).load(nodes)
 
     def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
         """Begin at a known state; False where the state is rejected.
@@ -120,8 +109,10 @@ class FrequencySweep:
         nodes.direction = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
         return nodes.begin(replace(nodes.path, case=case), state)
 
-    def advance(self, frequency: float) -> StartState:
-        """State at the next frequency, Hz, with the harmonics that it needs. Raises OutOfTimeError."""
+    def advance(self, frequency: float) -> StartState | Failure:
+        """State at the next frequency, Hz, with the harmonics it needs, or why there is none. Raises OutOfTimeError
+        and LinAlgError.
+        """
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
         run.budget.iterations, run.budget.limit = 0, NODE_ITERATIONS
@@ -129,35 +120,27 @@ class FrequencySweep:
         target = 2.0 * np.pi * frequency if self.omega is None else 1.0
         nodes.advance_to(target)
         path, reached = nodes.path, nodes.state_at(target, run.fresh())
-        if isinstance(reached, Outcome):
+        if isinstance(reached, Failure):
             run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
             first = self._first(path, target, run)
-            if isinstance(first, Outcome):
-                lost = "" if nodes.last is None else f"stable states end {path.describe(nodes.last)}"
-                return self.without_state(why_lost(nodes, first), lost)
+            if isinstance(first, Failure):
+                return lost(nodes, first)
             path, reached = first[0], Step(first[1])
         refined = self._at_known(path, reached.state) if self.known else None
         refined = refined or refine(path.case, path.joint_of(reached.state), reached.state, run)
-        # folds of a ramp are load factors
-        fold = (nodes.state.fold, *reached.folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
-        found, branch = self._judged(refined, nodes), nodes.state.branch + len(reached.folds)
-        return replace(found, branch=branch, fold_frequency=float(fold))
+        return self._judged(refined, nodes, reached.folds)
 
-    def without_state(
-        self, outcome: Outcome, message: str = "", resolution: Resolution | None = None, estimate: Estimate = UNKNOWN
-    ) -> StartState:
-        """No state at the current frequency, and why; of a state that is found all but the state itself."""
-        used = Resolution((1,), 4) if self.nodes is None else self.nodes.state.nodes.resolution
+    def without_state(self, failure: Failure) -> StartState:
+        """No state at the current frequency, and why."""
+        nodes = self.nodes
         return StartState(
-            outcome=outcome,
+            outcome=failure.outcome,
             state=None,
-            penalty_omega=math.nan if self.nodes is None else self.nodes.path.case.penalty_omega,
-            resolution=resolution or used,
-            response_error=estimate.response,
-            wear_rate_error=estimate.wear_rate,
-            newton_iterations=self.n_iterations,
-            run_time=0.0,
-            message=message,
+            penalty_omega=math.nan if nodes is None else nodes.path.case.penalty_omega,
+            resolution=Resolution((1,), 4) if nodes is None else nodes.path.case.resolution,
+            response_error=math.inf,
+            wear_rate_error=math.inf,
+            message=failure.message,
         )
 
     def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
@@ -176,8 +159,8 @@ class FrequencySweep:
         place = 2.0 * np.pi * first_frequency(self.model, cell, self.sweep) if ramp is None else FREE_STEP
         nodes.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
         first = self._first(nodes.path, place, nodes.run)
-        if isinstance(first, Outcome):
-            nodes.state = replace(nodes.state, failure=first)
+        if isinstance(first, Failure):
+            nodes.failure = first
         else:
             nodes.begin(*first)
         return nodes
@@ -192,20 +175,20 @@ class FrequencySweep:
         self.nodes = Sweep(path, direction, budget, with_reference=not self.known, save=self.save)
         return self.nodes
 
-    def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Outcome:
+    def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Failure:
         """A state from the static one at a value of the parameter, and its path, with the harmonics of a path, or else
         with one; or the reason of the first attempt.
         """
         others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
         omega, load = (place, 1.0) if self.omega is None else (self.omega, place)
-        unworn, why = np.zeros(self.model.contact.n_contact), list[Outcome]()
+        unworn, why = np.zeros(self.model.contact.n_contact), list[Failure]()
         for resolution in (path.case.resolution, *others):
             at = path.at(resolution)
             found = solve_first_state(at.case, omega, load * self.excitation_amplitude, unworn, run.fresh())
             if isinstance(found, State):
                 return at, replace(found, parameter=place)
             why.append(found)
-            if found.static or run.budget.exhausted:
+            if found.outcome.static or run.budget.exhausted:
                 break
         return why[0]
 
@@ -217,36 +200,40 @@ class FrequencySweep:
         moved = state if wanted.case is path.case else path.move(state, wanted, self.run)
         return None if moved is None else Refined(wanted.case, wanted.joint_of(moved), moved, NOTHING, accurate=True)
 
-    def _judged(self, found: Refined, nodes: Sweep[State]) -> StartState:
-        """The outcome of a refined state, with its error and the state of the reference sweep."""
-        resolution, joint, at, estimate = found.case.resolution, found.joint, found.point.evaluation, found.estimate
+    def _judged(self, found: Refined, nodes: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
+        """A refined state with its errors and the state of the reference sweep, or why it is no result.
+
+        folds: that the sweep has jumped over between its last node and the state.
+        """
+        joint, at, estimate = found.joint, found.point.evaluation, found.estimate
         if not certify(joint, at).holds(self.settings.tolerance):
-            return self.without_state(Outcome.CERTIFICATE_FAILED, "", resolution, estimate)
+            return Failure(Outcome.CERTIFICATE_FAILED)
         if unstable := find_instability(found.case, joint, at, self.run, self.every):
-            return self.without_state(unstable.outcome, unstable.message, resolution, estimate)
-        reference = self._reference(nodes, found)
+            return unstable
+        reference = nodes.reference_of(replace(nodes.path, case=found.case), found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
-        return replace(
-            self.without_state(Outcome.CONVERGED if found.accurate else Outcome.INACCURATE, "", resolution, estimate),
+        # folds of a ramp are load factors
+        fold = (nodes.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
+        return StartState(
+            outcome=Outcome.CONVERGED if found.accurate else Outcome.INACCURATE,
             state=periodic_state(joint, found.point),
+            penalty_omega=found.case.penalty_omega,
+            resolution=found.case.resolution,
+            response_error=estimate.response,
+            wear_rate_error=estimate.wear_rate,
+            branch=nodes.branch + len(folds),
+            fold_frequency=float(fold),
             reference=None if reference is None else periodic_state(joint, reference),
         )
 
-    def _reference(self, nodes: Sweep[State], found: Refined) -> State | None:
-        """The state with the tangential history that the reference sweep leaves; None where there is none."""
-        if nodes.here is None or nodes.reference is None:
-            return None
-        (path, states), point = nodes.reference, found.point
-        node = states[-1]
-        at = replace(node.evaluation, history=history_at_rest(path.joint_of(node), node))
-        balance = Balance(found.joint, carried_history(path.case, found.joint, at), point.evaluation.wear_depth)
-        return stable_state(balance, point.evaluation.predicted_h, point.parameter, self.run.fresh())
 
-
-def why_lost(nodes: Sweep[State], failure: Outcome) -> Outcome:
-    """The reason why a sweep has no state; failure: of the last search."""
-    return Outcome.BRANCH_LOST if failure is Outcome.START_FAILED and nodes.last is not None else failure
+def lost(nodes: Sweep[State], failure: Failure) -> Failure:
+    """Why a sweep has no state, and where its states end. failure: of the last search."""
+    if nodes.last is None:
+        return failure
+    reason = Outcome.BRANCH_LOST if failure.outcome is Outcome.START_FAILED else failure.outcome
+    return Failure(reason, f"stable states end {nodes.path.describe(nodes.last)}")
 
 
 def cell_of(frequency: float) -> int:

@@ -8,14 +8,13 @@ from typing import ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import left_out, nothing_happens
-from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
-from solver.accuracy.resolved_state import Estimate
+from solver.accuracy.refinement import VIBRATION_RECHECK, refine
+from solver.accuracy.resolved_state import nothing_happens
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
+from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
+from solver.harmonic_balance.state import Failure, State, history_at_rest, transfer, vibration_change, vibration_size
 from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -24,24 +23,26 @@ from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
-"""Fraction of the parameter: length at which a step that finds no state is left to `Path.rescue`, which goes on in
-steps of this length. Also the load factor at which a ramp begins, and for a nonlinear mode its first amplitude, as
-vibrating contact forces over the friction limits (with ten times the value and with a tenth the damping of the dovetail
-changes by 7e-5 and 1e-3)."""
+"""Fraction of the parameter: length at which a step that finds no state is left to `Path.rescue`, and of its steps.
+Also the load factor at which a ramp begins, and the first amplitude of a mode, as vibrating contact forces over the
+friction limits (with ten times the value and with a tenth the damping of the dovetail changes by 7e-5 and 1e-3)."""
 
 LONGEST_STEP = 0.1
 """Longest step, as a fraction of the parameter."""
 
 SHORTEST_STEP = 2e-5
-"""Shortest step, as a fraction of the parameter, whatever the change of the vibration is. An undamped slider passes its
-resonance in such steps."""
+"""Shortest step, as a fraction of the parameter. An undamped slider passes its resonance in such steps."""
 
 CHANGE_PER_RTOL = 20.0
 """Largest relative change of the vibration in a step, over rtol."""
 
 CHANGE_LIMITS = (0.05, 0.2)
-"""Limits of this change. Dovetail of 48 pairs, 211 to 212.5 Hz, compared with steps twenty times as short: errors of
-the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05."""
+"""Limits of this change. Dovetail of 48 pairs, 211 to 212.5 Hz: errors of the motion up to 0.8 % with 0.2, up to 0.1 %
+with 0.05."""
+
+LINEAR_CHANGE = 1.0
+"""Largest change over a step between two states in which no pair slips or opens. The reversal of phase at a linear
+resonance is a change of 2."""
 
 SMALL_VIBRATION = 0.3
 """Fraction of the friction limits to which changes of a smaller vibration are relative. With 1 the error of the motion
@@ -52,7 +53,7 @@ LEAST_SLIP = 1e-3
 
 SAMPLES_OF_SIGN = 4
 """Samples over those of a node that is unstable with fewer. Underplatform damper of nodal diameter 2, 30 stable states
-from 273.7 Hz on: 128 samples find three unstable with 13 harmonics, four with 9 harmonics; 512 samples none."""
+from 273.7 Hz on: 128 samples find four unstable, 512 samples none."""
 
 S = TypeVar("S", bound=State)
 
@@ -88,9 +89,9 @@ class Path(ABC, Generic[S]):
     def solve(self, states: tuple[S, ...], target: float, run: Run) -> S | None:
         """Stable state at a target near the last of some states, which leaves its history to it; None if not found."""
 
-    def rescue(self, _: S, __: float, ___: Run) -> Step[S] | Outcome:
+    def rescue(self, _: S, __: float, ___: Run) -> Step[S] | Failure:
         """State at a target that `solve` does not find, or why there is none: by default no path that turns back."""
-        return Outcome.BRANCH_LOST
+        return Failure(Outcome.BRANCH_LOST)
 
     @abstractmethod
     def change(self, before: S, after: S) -> float:
@@ -114,8 +115,8 @@ class Path(ABC, Generic[S]):
         """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
         return False
 
-    def suits(self, checked: S, _: float, state: S) -> bool:
-        """Whether the harmonics chosen for an earlier state, with an estimated error, are about those of a state."""
+    def suits(self, checked: S, state: S) -> bool:
+        """Whether the harmonics chosen for an earlier state are about those of a state."""
         return self.differs(checked, state) <= VIBRATION_RECHECK
 
     def at(self, resolution: Resolution) -> Self:
@@ -123,12 +124,19 @@ class Path(ABC, Generic[S]):
         return replace(self, case=self.case.at(resolution))
 
     @abstractmethod
+    def near(self, state: S, predicted_h: FloatArray, history: FloatArray, run: Run) -> S | None:
+        """Stable state at the parameter of a state, from a first predicted force (n_rel, m), N, and with a tangential
+        history (n_contact, 2), m; None where not found.
+        """
+
     def move(self, state: S, other: Self, run: Run) -> S | None:
         """The state with the harmonics and samples of another path; None where not found."""
+        balance, start = transfer(self.case, other.joint_of(state), state.evaluation)
+        return other.near(state, start, balance.history, run.fresh())
 
     @abstractmethod
-    def choose(self, state: S, run: Run) -> tuple[Self, S, Estimate]:
-        """Path and state with the harmonics that the state needs, or the most allowed, and its estimated error."""
+    def choose(self, state: S, run: Run) -> tuple[Self, S, float]:
+        """Path and state with the harmonics that the state needs, and the relative error of its response."""
 
     @abstractmethod
     def describe(self, state: S) -> str:
@@ -168,14 +176,30 @@ class LoadingPath(Path[State]):
     def solve(self, states: tuple[State, ...], target: float, run: Run) -> State | None:
         """As in Path, by Newton's method alone, from the polynomial through the states."""
         start, at = states[-1], np.array([state.parameter for state in states])
-        balance = self.balance_at(target, history_at_rest(self.joint_at(target), start))
         begin = np.zeros_like(start.evaluation.predicted_h)
         for place, state in enumerate(states):
             others = np.delete(at, place)
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
-        return stable_state(balance, begin, target, run)
+        history = history_at_rest(self.joint_at(target), start)
+        return self.near(replace(start, parameter=target), begin, history, run)
 
-    def rescue(self, start: State, target: float, run: Run) -> Step[State] | Outcome:
+    def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:
+        """As in Path. Too few samples may turn the sign of the determinant where many pairs slip and open: a state is
+        unstable where it is so with more.
+        """
+        balance = self.balance_at(state.parameter, history)
+        found = run.state(balance, predicted_h, state.parameter, NEAR_ITERATIONS)
+        if found is None or run.is_stable(balance, found.evaluation):
+            return found
+        joint, basis = balance.joint, balance.joint.basis
+        # the predicted force of masses on rigid ground depends on the length of a sample
+        if joint.law.rate_dependent:
+            return None
+        fine = replace(joint, basis=build_basis(basis.orders, SAMPLES_OF_SIGN * basis.n_samples))
+        finer = replace(balance, joint=fine)
+        return found if run.fresh().is_stable(finer, finer.evaluate(found.evaluation.predicted_h)) else None
+
+    def rescue(self, start: State, target: float, run: Run) -> Step[State] | Failure:
         """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the
         machine; both in turns until the target.
         """
@@ -191,7 +215,7 @@ class LoadingPath(Path[State]):
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
             joints = self.joint_at(beyond), self.joint_of(end)
             settled = relax_to_periodic(self.case, joints[0], balance.wear_depth, end, joints[1], run)
-            if isinstance(settled, Outcome):
+            if isinstance(settled, Failure):
                 return settled
             # a fold with a smaller change is a corner of the branch
             if vibration_change(end.evaluation, settled.evaluation) > SMOOTH_CHANGE:
@@ -199,7 +223,7 @@ class LoadingPath(Path[State]):
             state = replace(settled, parameter=beyond)
             if beyond == target:
                 return Step(state, tuple(folds))
-        return Outcome.BRANCH_LOST
+        return Failure(Outcome.BRANCH_LOST)
 
     def change(self, before: State, after: State) -> float:
         """As in Path."""
@@ -229,54 +253,21 @@ class LoadingPath(Path[State]):
         moved = np.abs(at.displacement_h[:, 1:, 1:]).sum(axis=(1, 2))
         return bool((opens | (slip > LEAST_SLIP * moved)).all())
 
-    def suits(self, checked: State, error: float, state: State) -> bool:
-        """As in Path: the error grows and falls with the part of the contact force in harmonics that are left out.
-
-        Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice.
-        """
-        settings, resolution = self.case.settings, self.case.resolution
-        fewest = resolution == first_resolution(settings)
-        if super().suits(checked, error, state) or (fewest and self.rests(state)):
+    def suits(self, checked: State, state: State) -> bool:
+        """As in Path; any harmonics where all pairs slip and none opens: such a node only serves to begin the next."""
+        if super().suits(checked, state):
             return True
-        if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
-            return True
-        before, now = (left_out(resolution.orders, at.evaluation) for at in (checked, state))
-        if self.rests(state) or not (0.0 < error < np.inf and before > 0.0):
-            return False
-        foreseen = error * now / before
-        enough = fewest or foreseen >= KEPT_FRACTION**2 * settings.rtol
-        # where the error is above rtol already, there are no more harmonics
-        return enough and (foreseen <= settings.rtol or error > settings.rtol)
+        if self.rests(state):
+            return self.case.resolution == first_resolution(self.case.settings)
+        return self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any()
 
-    def move(self, state: State, other: Self, run: Run) -> State | None:
-        """As in Path."""
-        return run.move(self.case, other.joint_of(state), state)
-
-    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:
+    def choose(self, state: State, run: Run) -> tuple[Self, State, float]:
         """As in Path."""
         found = refine(self.case, self.joint_of(state), state, run, node=True)
-        return replace(self, case=found.case), found.point, found.estimate
+        return replace(self, case=found.case), found.point, found.estimate.response
 
     def describe(self, state: State) -> str:
         """As in Path, with the number of pairs that slip or open."""
         at = f"{state.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {state.parameter:.3g}"
         moving = int(np.count_nonzero((state.evaluation.status_t != STICK).any(axis=1)))
         return f"at {at}, {moving} of {len(state.evaluation.status_t)} pairs slip or open"
-
-
-def stable_state(balance: Balance, begin: FloatArray, target: float, run: Run) -> State | None:
-    """Stable state of a balance near a predicted force (n_rel, m), N; None where none is found.
-
-    Too few samples may turn the sign of the determinant where many pairs slip and open: a node is unstable where it is
-    so with more.
-    """
-    found = run.state(balance, begin, target, NEAR_ITERATIONS)
-    if found is None or run.is_stable(balance, found.evaluation):
-        return found
-    joint, basis = balance.joint, balance.joint.basis
-    # the predicted force of masses on rigid ground depends on the length of a sample
-    if joint.law.rate_dependent:
-        return None
-    fine = replace(joint, basis=build_basis(basis.orders, SAMPLES_OF_SIGN * basis.n_samples))
-    finer = replace(balance, joint=fine)
-    return found if run.fresh().is_stable(finer, finer.evaluate(found.evaluation.predicted_h)) else None

@@ -1,14 +1,11 @@
 """Unworn periodic states at the frequencies of a study, each with the loading history that leads to the state.
 
-- "up", "down": the excitation frequency is swept slowly, as in the run-up or run-down of a machine. On a branch that
-  bends over, the two directions find different states.
-- "ramp": the excitation is raised slowly at the frequency of the point, as at the onset of flutter or of a flow
-  disturbance at constant speed. Every point is independent of all others.
+The excitation frequency is swept slowly "up" or "down", as in the run-up or run-down of a machine; on a branch that
+bends over, both find different states. In a "ramp" the excitation is raised slowly at the frequency of the point.
 
-A history with followed frequency begins at the resonance that the sweep "up" or "down" meets first in a range: between
-two nodes, where the phase lag passes pi/2. A resonance that the sweep jumps over, from a fold to a branch beyond, is
-none of its states. The largest amplitude is sought from there, and the sweep then leads to its frequency: along the
-sweep the amplitude has small maxima where pairs begin to slip, far from any resonance.
+A history with followed frequency begins at the resonance that the sweep meets first in a range: between two nodes,
+where the phase lag passes pi/2. A resonance that the sweep jumps over at a fold is none of its states. The largest
+amplitude is sought from there, as it has small maxima where pairs begin to slip, far from any resonance.
 """
 
 from __future__ import annotations
@@ -25,13 +22,13 @@ from solver.clock import computing_time
 from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, history_at_rest
-from solver.loading_history.frequency_sweep import FrequencySweep, cell_of, edge_of, why_lost
+from solver.loading_history.frequency_sweep import FrequencySweep, cell_of, edge_of, lost
 from solver.loading_history.path import FREE_STEP, Step
 from solver.loading_history.sweep import Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Outcome
-from solver.packing import Packed, unpack
+from solver.packing import Packed
 from solver.results.history import StartState
 from solver.settings import Direction, FollowedFrequency, SolverSettings
 
@@ -48,8 +45,7 @@ def follow_branch(
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at given frequencies, one by one, in the order of the sweep: index and state.
 
-    A state depends on its own frequency only. Where the branch ends, the structure settles in time from the last state,
-    as in a slow sweep of the machine. The last attempt starts from the static state.
+    A state depends on its own frequency only.
 
     friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
     frequencies: Hz, ascending. Or what is sought in a range of frequencies: the first resonance that the sweep meets.
@@ -61,7 +57,7 @@ def follow_branch(
     asked = model, friction_coefficient, excitation_amplitude, sweep, settings
     line = FrequencySweep(*asked) if keep is None else FrequencySweep(*asked, keep=keep)
     if resume is not None:
-        line.load(unpack(resume))
+        line.load(resume)
     return follow_line(line, frequencies)
 
 
@@ -72,7 +68,7 @@ def follow_line(line: FrequencySweep, frequencies: FloatArray | FollowedFrequenc
     for index in np.arange(n_states)[:: -1 if line.sweep == "down" else 1].tolist():
         line.set_deadline(started + line.settings.time_limit)
         ended = guarded(partial(_next_state, line, frequencies, index))
-        found = line.without_state(ended.outcome, ended.message) if isinstance(ended, Failure) else ended
+        found = line.without_state(ended) if isinstance(ended, Failure) else ended
         now = computing_time()
         yield index, replace(found, newton_iterations=line.n_iterations, run_time=now - started)
         started = now
@@ -104,9 +100,7 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float | F
                 break
             nodes.advance_to(float(np.nextafter(end, nodes.direction * math.inf)))
         else:
-            at = near if nodes.last is None else nodes.last.parameter / (2.0 * math.pi)
-            said = f"the sweep {line.sweep} ends at {at:.6g} Hz and has met no resonance until there"
-            return Failure(why_lost(nodes, nodes.state.failure or Outcome.BRANCH_LOST), said)
+            return lost(nodes, nodes.failure or Failure(Outcome.BRANCH_LOST))
     within = f"between {follow.low:g} and {follow.high:g} Hz: give another range"
     return Failure(Outcome.RESONANCE_LOST, f"the sweep {line.sweep} meets no {follow.of} {within}")
 

@@ -5,11 +5,10 @@ and these depend on all vibration before. So a sweep has nodes of its own, whose
 the vibration. A state between two nodes is solved from the node before and leaves the sweep unchanged.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
-slip, up to one step too early. A reference sweep has a node in the middle of every third step, and harmonics one level
-lower where these are automatic. The difference of both sweeps is at least half the error of the finer one; with common
-nodes both might keep the same history too early. There is no reference as long as nothing slips or opens, and where
-each pair slips or opens within the period: such a state follows from its parameter alone. Behind a fold the reference
-begins anew: the place of a jump is no measure of the error by steps.
+slip, up to one step too early. A reference sweep has a node in the middle of every third step, as with common nodes
+both might keep one history too early, and harmonics one level lower where these are automatic. The difference of both
+is at least half the error of the finer one. The reference begins where pairs slip or open, and anew behind a fold and
+where each pair slips or opens within the period: such a state follows from its parameter alone.
 """
 
 from __future__ import annotations
@@ -19,10 +18,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Generic
 
-from solver.accuracy.harmonic_levels import fewer
-from solver.accuracy.resolved_state import NOTHING
+from solver.accuracy.resolved_state import fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, carried_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
@@ -30,8 +28,8 @@ from solver.packing import in_rows, packable
 from solver.settings import Resolution
 
 KEPT_NODES = 3
-"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them. With two, and a straight line,
-the nodes of the slider take 7 % more iterations."""
+"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them. With a straight line the nodes
+of the slider take 7 % more iterations."""
 
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
@@ -43,8 +41,7 @@ NODE_ITERATIONS = 5 * SWEEP_ITERATIONS // 16
 """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
 
 ITERATIONS_PER_SAVE = 100
-"""Newton iterations after which a sweep is saved at its next node, and its factorisation dropped, so that a resumed
-sweep is equal to the last bit: 1 s of 48 pairs, 17 s of 336."""
+"""Newton iterations after which a sweep is saved at its next node: 1 s of 48 pairs, 17 s of 336."""
 
 STEPS_OF_REFERENCE = 3
 """Steps of a sweep in one step of its reference. With two, the difference of both may be a quarter of the error
@@ -64,37 +61,20 @@ class Nodes:
         return replace(self, states=(*self.states, state)[-KEPT_NODES:])
 
 
-@packable
-@dataclass(frozen=True)
-class SweepState:
-    """State of a sweep at a node, with which the sweep goes on.
-
-    failure: why there is no state, at the start or behind the last node; None where there is one.
-    length: of the next step. rate: change in the last one, over the largest change allowed, per length.
-    checked, error: the node at which the harmonics were chosen, and its largest estimated error.
-    branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
-    reference: last nodes of the reference sweep, None for none; skipped: parameters of the nodes since then.
-    """
-
-    nodes: Nodes
-    failure: Outcome | None = Outcome.START_FAILED
-    length: float = 0.0
-    rate: float = 0.0
-    checked: Any = None
-    error: float = 0.0
-    branch: int = 0
-    fold: float = math.nan
-    iterations: int = 0
-    reference: Nodes | None = None
-    skipped: tuple[float, ...] = ()
+_SAVED = ("nodes", "failure", "length", "rate", "checked", "branch", "fold", "reference", "skipped")
+"""Attributes of a `Sweep` with which it goes on from a node, and the Newton iterations so far."""
 
 
 class Sweep(Generic[S]):
     """A sweep, node by node, up (direction 1) or down (-1) along the parameter of its path; the line of `take_step`.
 
-    budget: of the nodes, those of the reference sweep included. save: called where the sweep was saved.
-    state, saved: at the current node, and at the last saved one. ahead: the next node, where it is known.
-    passed: parameters of the nodes so far.
+    budget: of the nodes, those of the reference sweep included. save: called where the sweep was saved, as `saved`.
+    nodes, ahead: last nodes, and the next one, where it is known. passed: parameters of the nodes so far.
+    failure: why there is no state, at the start or behind the last node; None where there is one.
+    length: of the next step. rate: change in the last one, over the largest change allowed, per length.
+    checked: the node at which the harmonics were chosen.
+    branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
+    reference: last nodes of the reference sweep, None for none; skipped: parameters of the nodes since then.
     """
 
     def __init__(
@@ -109,34 +89,43 @@ class Sweep(Generic[S]):
         self.path, self.direction, self.budget, self.save = path, direction, budget, save
         self.with_reference = with_reference
         self.run = self._reference_run = Run(path.case.settings.tolerance, budget)
-        self.state = SweepState(Nodes(path.case.resolution))
-        self.saved: SweepState | None = None
+        self.nodes = Nodes(path.case.resolution)
         self.ahead: Step[S] | None = None
         self.passed: list[float] = []
-        self._rate = 0.0
+        self.failure: Failure | None = Failure(Outcome.START_FAILED)
+        self.length, self.rate = path.longest, 0.0
+        self.checked: S | None = None
+        self.branch, self.fold = 0, math.nan
+        self.reference: Nodes | None = None
+        self.skipped: tuple[float, ...] = ()
+        self.saved: dict[str, Any] = {}
 
-    def load(self, state: SweepState) -> None:
-        """Go on from the `saved` state of another sweep."""
-        self.saved = self.state = state
-        self.path = self.path.at(state.nodes.resolution)
-        self.budget.iterations = state.iterations
-        self._forget()
+    def load(self, saved: dict[str, Any]) -> None:
+        """Go on from what another sweep has saved."""
+        self.saved, self.budget.iterations = saved, saved["iterations"]
+        vars(self).update({name: saved[name] for name in _SAVED})
+        self.path = self.path.at(self.nodes.resolution)
+        # without the factorisations that are kept from node to node, and the next node
+        self.run, self._reference_run, self.ahead = self.run.fresh(), self.run.fresh(), None
 
     @property
     def last(self) -> S | None:
         """The current node, or the last one of a lost sweep; None where there was none."""
-        return self.state.nodes.states[-1] if self.state.nodes.states else None
+        return self.nodes.states[-1] if self.nodes.states else None
 
     @property
     def here(self) -> S | None:
         """The current node, None where there is no state."""
-        return self.last if self.state.failure is None else None
+        return self.last if self.failure is None else None
 
-    @property
-    def reference(self) -> tuple[Path[S], tuple[S, ...]] | None:
-        """Path and last nodes of the reference sweep; None where the state does not depend on steps."""
-        found = self.state.reference
-        return None if found is None else (self.path.at(found.resolution), found.states)
+    def reference_of(self, path: Path[S], state: S, run: Run) -> S | None:
+        """A state of a path with the tangential history that the reference sweep leaves; None where there is none."""
+        if self.here is None or self.reference is None:
+            return None
+        of, node = self.path.at(self.reference.resolution), self.reference.states[-1]
+        at = replace(node.evaluation, history=history_at_rest(of.joint_of(node), node))
+        history = carried_history(of.case, path.joint_of(state), at)
+        return path.near(state, state.evaluation.predicted_h, history, run.fresh())
 
     def begin(self, path: Path[S], state: S) -> bool:
         """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
@@ -144,11 +133,11 @@ class Sweep(Generic[S]):
         One harmonic can give a joint that slips and opens everywhere a state that does not exist: more harmonics change
         it by more than half.
         """
-        self.path, self.passed, nodes = path, [state.parameter], Nodes(path.case.resolution, (state,))
-        self.state = replace(self.state, nodes=nodes, length=path.longest, failure=None)
+        self.path, self.passed, self.nodes = path, [state.parameter], Nodes(path.case.resolution, (state,))
         if self._choose_resolution() > SENSITIVE_ERROR:
-            self.state = replace(self.state, nodes=replace(nodes, states=()), failure=Outcome.UNSETTLED)
+            self.nodes, self.failure = Nodes(self.path.case.resolution), Failure(Outcome.UNSETTLED)
             return False
+        self.failure = None
         self._save()
         return True
 
@@ -162,14 +151,14 @@ class Sweep(Generic[S]):
             else:
                 self._advance(here, self.ahead)
 
-    def state_at(self, parameter: float, run: Run) -> Step[S] | Outcome:
+    def state_at(self, parameter: float, run: Run) -> Step[S] | Failure:
         """State at a parameter between the current and the next node, or why there is none.
 
         run: of its own; the sweep must not depend on it.
         """
         if self.here is None or self.ahead is None:
-            return self.state.failure or Outcome.BRANCH_LOST
-        before, path = self.state.nodes.states[:-1], self.path
+            return self.failure or Failure(Outcome.BRANCH_LOST)
+        before, path = self.nodes.states[:-1], self.path
         near = before if self.ahead.folds else (*before[-1:], self.ahead.state)
         found = path.solve((*near, self.here), parameter, run)
         return path.rescue(self.here, parameter, run) if found is None else Step(found)
@@ -177,69 +166,61 @@ class Sweep(Generic[S]):
     def attempt(self, here: S, length: float) -> Step[S] | None:
         """As in Line."""
         run = self.run.with_tolerance(self.path.case.settings.rough_tolerance)
-        target = self.path.ahead(here.parameter, self.direction * length)
-        found = self.path.solve(self.state.nodes.states, target, run)
+        found = self.path.solve(self.nodes.states, self.path.ahead(here.parameter, self.direction * length), run)
         return None if found is None else Step(found)
 
     def ratio(self, here: S, end: Step[S], length: float) -> float:
         """As in Line: the shortest step is accepted, whatever the change of the vibration is."""
         ratio = self.path.change(here, end.state)
-        self._rate = ratio / length
+        self.rate = ratio / length
         return min(ratio, 1.0) if length <= self.path.shortest else ratio
 
     def rescue(self, here: S, length: float) -> Step[S] | Failure:
         """As in Line."""
-        found = self.path.rescue(here, self.path.ahead(here.parameter, self.direction * length), self.run)
-        return Failure(found) if isinstance(found, Outcome) else found
+        return self.path.rescue(here, self.path.ahead(here.parameter, self.direction * length), self.run)
 
     def _look_ahead(self, here: S) -> None:
         """Find the next node, or lose the sweep."""
-        budget, path, self._rate = self.budget, self.path, 0.0
+        budget, path, before, self.rate = self.budget, self.path, self.rate, 0.0
         budget.report(path.describe(here))
         budget.limit = budget.iterations + NODE_ITERATIONS
         taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST)
         if budget.iterations <= SWEEP_ITERATIONS:
-            taken = take_step(self, here, self.state.length, Lengths(1, AIMED_CHANGE, path.shortest, FREE_STEP))
+            taken = take_step(self, here, self.length, Lengths(1, AIMED_CHANGE, path.shortest, FREE_STEP))
         if isinstance(taken, Failure):
-            self.state = replace(self.state, failure=taken.outcome)
+            self.failure = taken
             return
         self.ahead, length = taken
         # the change will grow as in the last step: towards a resonance every third step would be refused
-        growth = self._rate / self.state.rate if self.state.rate > 0.0 else 1.0
-        length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), path.longest)
-        self.state = replace(self.state, length=length, rate=self._rate)
+        growth = self.rate / before if before > 0.0 else 1.0
+        self.length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), path.longest)
 
     def _advance(self, before: S, step: Step[S]) -> None:
         """Make the next node the current one."""
-        self.ahead, nodes = None, self.state.nodes
+        self.ahead = None
         self.passed.append(step.state.parameter)
-        self.state = replace(
-            self.state,
-            nodes=replace(nodes, states=(step.state,)) if step.folds else nodes.then(step.state),
-            branch=self.state.branch + len(step.folds),
-            fold=(self.state.fold, *step.folds)[-1],
-        )
+        self.nodes = replace(self.nodes, states=(step.state,)) if step.folds else self.nodes.then(step.state)
+        self.branch, self.fold = self.branch + len(step.folds), (self.fold, *step.folds)[-1]
         if self.with_reference:
             self._lead_reference(before, step)
-        if not self.path.suits(self.state.checked, self.state.error, step.state):
+        if self.checked is None or not self.path.suits(self.checked, step.state):
             self._choose_resolution()
-        saved = 0 if self.saved is None else self.saved.iterations
-        if self.budget.iterations >= saved + ITERATIONS_PER_SAVE:
+        if self.budget.iterations >= self.saved["iterations"] + ITERATIONS_PER_SAVE:
             self._save()
 
     def _lead_reference(self, before: S, step: Step[S]) -> None:
         """Lead the reference sweep over a step from the node `before`: to its middle, if it is a third step."""
-        reference, skipped = self.state.reference, self.state.skipped
         if step.folds or self.path.forgets(step.state):
-            reference, skipped = None, ()
-        elif reference is not None or not self.path.rests(step.state):
-            reference = reference or Nodes(self.path.case.resolution, (before,))
-            skipped = (*skipped, step.state.parameter)
-            if len(skipped) == STEPS_OF_REFERENCE:
+            self.reference, self.skipped = None, ()
+        elif self.reference is not None or not self.path.rests(step.state):
+            reference = self.reference or Nodes(self.path.case.resolution, (before,))
+            self.skipped = (*self.skipped, step.state.parameter)
+            if len(self.skipped) == STEPS_OF_REFERENCE:
                 middle = 0.5 * (before.parameter + step.state.parameter)
-                reference = self._led(reference, middle) or self._led(reference, *skipped[:-1], middle)
-                skipped = ()
-        self.state = replace(self.state, reference=reference, skipped=skipped)
+                led = self._led(reference, middle) or self._led(reference, *self.skipped[:-1], middle)
+                self.reference, self.skipped = led, ()
+            else:
+                self.reference = reference
 
     def _led(self, nodes: Nodes, *targets: float) -> Nodes | None:
         """Nodes of the reference sweep at the last of some targets, with one level of harmonics fewer than the sweep;
@@ -259,23 +240,17 @@ class Sweep(Generic[S]):
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
-        nodes, error = self.state.nodes, NOTHING
-        here = nodes.states[-1]
+        self.checked, error = self.nodes.states[-1], 0.0
         if self.path.case.settings.automatic:
-            path, here, error = self.path.choose(here, self.run)
-            if path.case.resolution == nodes.resolution:
-                nodes = replace(nodes, states=(*nodes.states[:-1], here))
+            path, self.checked, error = self.path.choose(self.checked, self.run)
+            if path.case.resolution == self.nodes.resolution:
+                self.nodes = replace(self.nodes, states=(*self.nodes.states[:-1], self.checked))
             else:
-                nodes, self.path, self.run = Nodes(path.case.resolution, (here,)), path, self.run.fresh()
-        self.state = replace(self.state, nodes=nodes, checked=here, error=error.largest)
-        return error.response
+                self.nodes, self.path = Nodes(path.case.resolution, (self.checked,)), path
+                self.run = self.run.fresh()
+        return error
 
     def _save(self) -> None:
-        """Save the current node, and drop all that a resumed sweep would not have."""
-        self.saved = self.state = in_rows(replace(self.state, iterations=self.budget.iterations))
-        self._forget()
+        """Save the current node, and go on as a sweep that is resumed there."""
+        self.load(in_rows({name: vars(self)[name] for name in _SAVED} | {"iterations": self.budget.iterations}))
         self.save()
-
-    def _forget(self) -> None:
-        """Drop the factorisations that are kept from node to node, and the next node."""
-        self.run, self._reference_run, self.ahead = self.run.fresh(), self.run.fresh(), None

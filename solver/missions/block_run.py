@@ -239,7 +239,7 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
     if start.state is None or nodes is None or way == "continue":
         return start, None
     passed = tuple(nodes.passed) if nodes.here is not None and start.branch == 0 else ()
-    return start, Begun(passed, start, nodes.state.nodes.resolution)
+    return start, Begun(passed, start, nodes.path.case.resolution)
 
 
 def _by_earlier_sweep(case: BlockCase, begun: Begun) -> StartState | None:
@@ -291,6 +291,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
         elif (halvings := halvings + 1) > ATTEMPTS:
             return None
         else:
+            # past a corner at the resonance: without, half of the sweeps up to 212.6 Hz of the dovetail begin anew
             ahead.insert(0, 0.5 * (states[-1].parameter + ahead[0]))
     return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
 

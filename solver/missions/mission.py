@@ -102,24 +102,21 @@ class MissionRequest:
 class MissionHistory(Presented):
     """A joint over its missions, at `n_output` numbers of missions. Values not reached are NaN, all errors estimated.
 
-    - missions (n_output,): numbers of missions.
-    - worn_volume (n_output,): m3; worn_volume_error: relative, by the steps over missions, the integration of each
-      block and their propagation, harmonics, samples and start states; 0 where nothing has worn.
-    - wear_depth, wear_depth_error (n_output, n_contact): m.
+    - missions (n_output,); worn_volume (n_output,), m3, wear_depth (n_output, n_contact), m.
+    - worn_volume_error, relative, wear_depth_error, m: by the steps over missions, the integration of each block and
+      their propagation, harmonics, samples and start states; 0 where nothing has worn.
     - block_volume (n_output, n_block): m3, their sum is `worn_volume`; block_volume_error: relative.
     - response_begin, response_end (n_output, n_block, n_response): complex first harmonic, m, at start and end of each
-      block, in the mission that ends at the number, at 0 in the first one.
-    - response_peak_begin, response_peak_end: largest magnitude over a period there, m.
-    - response_error (n_output, n_block): relative, of these responses.
+      block, in the mission that ends at the number, at 0 in the first one. response_peak_begin, response_peak_end:
+      largest magnitude over a period there, m. response_error (n_output, n_block): relative, of these responses.
     - excitation_frequency (n_block, 2): Hz, at start and end of each block.
     - reference_volume (n_output,): m3, worn volume of the reference solution.
     - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, of the damping ratio of the joint at rest; 0 where
       nothing wears and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
     - error_estimate: `worn_volume_error` at the last number that was reached.
-    - last_mission: number of missions up to which the history was computed.
-    - steps (n_step,): missions computed in each step.
-    - missions_to_target: number of missions at which the target was reached, and its error; NaN if never.
-    - newton_iterations: of history and reference solution. run_time: CPU seconds of the computing thread.
+    - last_mission: number of missions that were computed. steps (n_step,): missions in each step.
+    - missions_to_target, missions_to_target_error: number at which the target was reached, and its error; NaN if never.
+    - newton_iterations, run_time, CPU seconds: of history and reference solution.
     - outcome, message: how the computation ended, and additions.
     """
 

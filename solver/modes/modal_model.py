@@ -1,18 +1,13 @@
 """Linear modes of the joint, and the model whose periodic states are nonlinear modes.
 
-The extended periodic motion concept (Krack, "Nonlinear modal analysis of nonconservative systems: extension of the
-periodic motion concept", Computers and Structures 154 (2015) 59-71) seeks periodic motions without excitation,
+The extended periodic motion concept (Krack, Computers and Structures 154 (2015) 59-71) seeks periodic motions without
+excitation, where a negative damping feeds in the energy that the joint dissipates:
 
-    M x'' + (C - 2 zeta omega M) x' + K x + (contact forces) = f_0,
+    M x'' + (C - 2 zeta omega M) x' + K x + (contact forces) = f_0.
 
-where the negative damping `-2 zeta omega M` feeds in the energy that the joint dissipates. The structure with its joint
-held is singular at the frequency of its own mode. So harmonic 1 gets a spring on its modal coordinate
-`q = phi^H M x_1`, with the mass-normalised linear mode phi, whose other end moves with the real amplitude Q (the
-drive):
-
-    M x'' + (C - 2 zeta omega M) x' + K x + omega_0^2 M phi (q - Q) + (contact forces) = f_0.
-
-At a nonlinear mode `q = Q`, so that the spring has no force; any other state is a forced vibration like all others.
+The structure with its joint held is singular at the frequency of its own mode. So harmonic 1 gets a spring
+`omega_0^2 M phi (q - Q)` on its modal coordinate `q = phi^H M x_1`, with the mass-normalised linear mode phi. Its other
+end moves with the real amplitude Q (the drive). At a nonlinear mode `q = Q`, so that the spring has no force.
 """
 
 from __future__ import annotations

@@ -17,12 +17,11 @@ from typing import ClassVar, Self
 import numpy as np
 
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import NOTHING, Estimate
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.continuation.first_state import RELIEF, predicted_at_rest, relieved_history, solve_static_state
+from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest, transfer
+from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
@@ -33,10 +32,6 @@ from solver.settings import DIFFERENCE, SolverSettings
 from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
-
-LARGEST_CHANGE = 0.3
-"""Largest change of the frequency (relative) and of the damping ratio in one iteration. With 0.1 and 1 modes are
-equal."""
 
 FIRST_AMPLITUDE = 1e-6
 """First amplitude of a joint without static normal forces, m sqrt(kg)."""
@@ -153,18 +148,17 @@ class NonlinearMode(Path[ModeState]):
         one, other = (state.evaluation.predicted_h[:, 1:] / state.parameter for state in (before, after))
         return float(np.linalg.norm(other - one)) / max(float(np.linalg.norm(one)), 1e-300)
 
-    def move(self, state: ModeState, other: Self, run: Run) -> ModeState | None:
+    def near(self, state: ModeState, predicted_h: FloatArray, history: FloatArray, run: Run) -> ModeState | None:
         """As in Path."""
-        balance, start = transfer(self.case, other.joint_of(state), state.evaluation)
-        return other.find(state.parameter, (start, state.values), balance.history, run.fresh())
+        return self.find(state.parameter, (predicted_h, state.values), history, run)
 
-    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:
+    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, float]:
         """As in Path."""
         found = refine(self.case_of(state.values), self.joint_of(state), state, run, node=True)
         other = self.at(found.case.resolution)
         moved = state if other.case is self.case else self.move(state, other, run)
         # the error of the first response is judged in a sweep of the frequency only
-        return (self, state, NOTHING) if moved is None else (other, moved, NOTHING)
+        return (self, state, 0.0) if moved is None else (other, moved, 0.0)
 
     def describe(self, state: ModeState) -> str:
         """As in Path."""
@@ -173,33 +167,29 @@ class NonlinearMode(Path[ModeState]):
 
 @dataclass(frozen=True)
 class _AtAmplitude:
-    """The equations at an amplitude, m sqrt(kg), over the amplitude, with a tangential history (n_contact, 2), m."""
+    """As BorderedProblem: the equations at an amplitude, m sqrt(kg), over the amplitude, with a tangential history
+    (n_contact, 2), m. Values: frequency, damping ratio and drive. Extra: x_1 (n,), m.
+    """
 
     mode: NonlinearMode
     amplitude: float
     history: FloatArray
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        """As in BorderedProblem; values: frequency, damping ratio and drive. extra: x_1 (n,), m."""
         balance = Balance(self.mode.joint_with(values), self.history, np.zeros(len(self.history)))
         at = balance.evaluate(predicted_h)
         shape = _shape(balance.joint, at.displacement_h, float(values[2]))
-        coordinate, square = self._coordinate(shape), self._product(shape, shape)
-        errors = [coordinate.real - values[2] / self.amplitude, coordinate.imag, 0.5 * (square - 1.0)]
-        return Bordered(balance, at, values, np.array(errors), extra=shape)
+        real, imaginary, square = self._products(shape, shape)
+        errors = np.array([real - values[2] / self.amplitude, imaginary, 0.5 * (square - 1.0)])
+        return Bordered(balance, at, values, errors, extra=shape)
 
-    def _coordinate(self, shape: ComplexArray) -> complex:
-        """Modal coordinate q of x_1 over the amplitude."""
-        mass = self.mode.model.harmonic_structure(1).mass
-        return complex(np.vdot(self.mode.linear.shape, mass @ shape)) / self.amplitude
-
-    def _product(self, one: ComplexArray, other: ComplexArray) -> float:
-        """Re one^H M other over the square of the amplitude."""
-        mass = self.mode.model.harmonic_structure(1).mass
-        return float(np.real(np.vdot(one, mass @ other))) / self.amplitude**2
+    def _products(self, x: ComplexArray, other: ComplexArray) -> FloatArray:
+        """Re q and Im q of x_1 `other`, m, over the amplitude, and Re x^H M other over its square."""
+        moved = self.mode.model.harmonic_structure(1).mass @ other / self.amplitude
+        coordinate = complex(np.vdot(self.mode.linear.shape, moved))
+        return np.array([coordinate.real, coordinate.imag, np.vdot(x, moved).real / self.amplitude])
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
-        """As in BorderedProblem, by differences."""
         slopes, errors = [], []
         lengths = DIFFERENCE * np.array([here.values[0], 1.0, self.amplitude])
         for step, length in zip(np.diag(lengths), lengths, strict=True):
@@ -209,15 +199,10 @@ class _AtAmplitude:
         return slopes, np.stack(errors, axis=1)
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
-        """As in BorderedProblem."""
-        turned = _shape(here.balance.joint, tangent.motion(step), 0.0)
-        coordinate = self._coordinate(turned)
-        return np.array([coordinate.real, coordinate.imag, self._product(here.extra, turned)])
+        return self._products(here.extra, _shape(here.balance.joint, tangent.motion(step), 0.0))
 
-    def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
-        """Frequency and damping ratio change by a limited amount."""
-        largest = max(abs(change[0]) / here.values[0], abs(change[1]))
-        return float(min(1.0, LARGEST_CHANGE / max(largest, 1e-300)))
+    def fraction(self, _: Bordered, __: FloatArray, ___: FloatArray) -> float:
+        return 1.0
 
 
 def _shape(joint: Joint, displacement_h: FloatArray, drive: float) -> ComplexArray:
@@ -301,15 +286,9 @@ def find_rest(
             return Failure(Outcome.START_FAILED, f"mode = {number}: the loaded joint has fewer linear modes")
         # without the spring on the modal coordinate the held structure is singular at its own frequency
         case = build_case(modal_model(model, linear, 0.0), friction_coefficient, omega or linear.omega, settings)
-        quiet = case.joint(linear.omega, 0.0)
-        static = solve_static_state(quiet, unworn, run)
-        if isinstance(static, Outcome):
-            return Failure(static)
+        rest = state_at_rest(case, linear.omega, unworn, run)
+        if isinstance(rest, Failure):
+            return rest
         if omega is not None:
-            break
-        closed, omega = static.evaluation.status_t[:, 0] != SEPARATED, linear.omega
-    start = predicted_at_rest(case, quiet, static, unworn)
-    state = run.fresh().state(Balance(quiet, static.history, unworn), start, 0.0)
-    if state is None:
-        return Failure(Outcome.STATIC_FAILED)
-    return Rest(NonlinearMode(case, model, linear), glued is not None, state)
+            return Rest(NonlinearMode(case, model, linear), glued is not None, rest)
+        closed, omega = rest.evaluation.status_t[:, 0] != SEPARATED, linear.omega

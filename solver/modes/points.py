@@ -1,7 +1,7 @@
 """The points of a nonlinear mode at given amplitudes, each with its errors, or the reason where there is none.
 
 The errors of frequency and damping are, as those of a start state, the change with more harmonics and samples, times a
-safety factor, and the difference to the reference sweep, whose steps in amplitude are three times as long.
+safety factor, and the change with the tangential history that the reference sweep leaves.
 """
 
 from __future__ import annotations
@@ -15,9 +15,8 @@ from typing import Literal
 import numpy as np
 
 from solver.accuracy.certificate import certify
-from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import first_response
+from solver.accuracy.resolved_state import first_response, shifted
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
@@ -33,8 +32,8 @@ from solver.settings import ROUND_OFF, Resolution, SolverSettings
 Direction = Literal["up", "down"]
 
 ERROR_OVER_CHANGE = 1.5
-"""Error of frequency and damping over their change with more harmonics and samples. Estimated over true errors of both:
-mass on a rigid slider at least 1.2, oscillator with a wall 1.4, pressed foot that begins to slip 0.5, dovetail 2."""
+"""Error of frequency and damping over their change with more harmonics and samples. Estimated over true errors: mass on
+a rigid slider at least 1.2, oscillator with a wall 1.4, pressed foot that begins to slip 0.5, dovetail 2."""
 
 _NO_FIRST = Failure(Outcome.START_FAILED, "the mode was not found at its first amplitude")
 
@@ -149,7 +148,7 @@ class _Way:
         found = sweep.state_at(amplitude, run.fresh())
         if not isinstance(found, Step):
             return _lost(sweep)
-        return _judged(_mode_of(sweep.path), found.state, _reference_at(sweep, amplitude, run), run)
+        return _judged(_mode_of(sweep.path), found.state, sweep, run)
 
     def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState] | None:
         """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
@@ -190,28 +189,10 @@ def _mode_of(path: Path[ModeState]) -> NonlinearMode:
     return path
 
 
-def _reference_at(sweep: Sweep[ModeState], amplitude: float, run: Run) -> tuple[NonlinearMode, ModeState] | None:
-    """The state of the reference sweep at an amplitude, m sqrt(kg); None where there is none."""
-    if sweep.reference is None:
-        return None
-    path, states = sweep.reference
-    # its last node may be farther away than the longest step, and a leap may end at another mode
-    last = states[-1].parameter
-    n_steps = max(1, math.ceil(abs(math.log(amplitude / last)) / path.longest))
-    for target in np.geomspace(last, amplitude, n_steps + 1)[1:]:
-        found = path.solve(states, float(target), run.fresh())
-        if found is None:
-            return None
-        states = (*states, found)
-    return _mode_of(path), states[-1]
-
-
-def _judged(
-    mode: NonlinearMode, found: ModeState, reference: tuple[NonlinearMode, ModeState] | None, run: Run
-) -> ModePoint | Failure:
+def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | None, run: Run) -> ModePoint | Failure:
     """The point with the harmonics that it needs, and its errors.
 
-    mode, found: the state, with the harmonics of the mode. reference: the same from the reference sweep, if any.
+    mode, found: the state, with the harmonics of the mode. sweep: that has led to the state, if any.
     """
     settings = mode.case.settings
     # half of rtol is left for the error by the steps of the sweep
@@ -228,9 +209,8 @@ def _judged(
     if not certificate.holds(settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
     errors = _errors_by_resolution(mode, found, run)
-    if reference is not None:
-        by_steps = reference[0].move(reference[1], mode, run) or reference[1]
-        errors = errors + np.abs(by_steps.values - found.values)
+    if sweep is not None and (reference := sweep.reference_of(mode, found, run)) is not None:
+        errors = errors + np.abs(reference.values - found.values)
     # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
     by_friction = float(joint.law.friction_work(at).sum()) / (2.0 * np.pi * (found.omega * found.parameter) ** 2)
     damping = max(by_friction, abs(found.damping_ratio), ROUND_OFF)

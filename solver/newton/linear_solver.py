@@ -1,6 +1,6 @@
 """Newton directions: solves with the exact Jacobian, Eqs. (16) and (17), and the sign of its determinant.
 
-A small Jacobian is factorised. A large one is solved by GMRES. Its preconditioner is kept from solve to solve: a
+A small Jacobian is factorised. A large one is solved by GMRES. Its preconditioner serves for many solves: a
 factorisation, corrected where GMRES has been.
 """
 
@@ -20,8 +20,8 @@ from solver.newton.period_preconditioner import PeriodFactor, build_period_facto
 FORCING = 1e-3
 """Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
 
-KEPT_PRODUCTS = 25
-"""Most products of a solve with a kept factorisation, before a new one is built, which takes as long as 20 products
+REUSE_PRODUCTS = 25
+"""Most products of a solve with an earlier factorisation, before a new one is built, which takes as long as 20 products
 with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 12 to 80."""
 
 MOST_CORRECTED = 60
@@ -48,9 +48,9 @@ SMALL_JOINT = 40
 """Relative displacements up to which a joint is small and its Jacobian is factorised: impacts couple most harmonics,
 and products with any other factorisation are in vain (three pairs with 115 harmonics in the tests)."""
 
-# Shift of the eigenvalues, which are 1 for a pair that sticks. The position of a joint that slips as a whole is
-# arbitrary along its slip: round-off in a zero eigenvalue would give the determinant any sign.
-_NEUTRAL_SHIFT = 1e-8
+NEUTRAL_SHIFT = 1e-8
+"""Shift of the eigenvalues, which are 1 for a pair that sticks, where the sign of the determinant counts. The position
+of a joint that slips as a whole is arbitrary: round-off in a zero eigenvalue would give the determinant any sign."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +85,12 @@ class DenseFactor:
 Factor = DenseFactor | PeriodFactor
 
 
-def build_dense_factor(tangent: Linearisation) -> DenseFactor:
+def build_dense_factor(tangent: Linearisation, shift: float) -> DenseFactor:
     """Factorisation of a Jacobian. Singular ones give infinities: Newton's method judges by the residual."""
     rows, m = tangent.active_rows, tangent.joint.basis.synthesis.shape[0]
     width = min(m, 2 * (LARGEST_DENSE // max(rows.size, 1) // 2) + 1)
     matrix = tangent.dense(tangent.active, width)
-    matrix[np.diag_indices_from(matrix)] += _NEUTRAL_SHIFT
+    matrix[np.diag_indices_from(matrix)] += shift
     factor = matrix, np.zeros(0, np.int64)
     if rows.size:
         factor = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)[:2]
@@ -100,7 +100,7 @@ def build_dense_factor(tangent: Linearisation) -> DenseFactor:
 def build_factor(tangent: Linearisation) -> Factor:
     """A march through the period, or dense factors for small joints, masses, and where a sample is singular."""
     small = tangent.joint.component_index.size <= SMALL_JOINT
-    return (None if small else build_period_factor(tangent)) or build_dense_factor(tangent)
+    return (None if small else build_period_factor(tangent)) or build_dense_factor(tangent, NEUTRAL_SHIFT)
 
 
 @dataclass
@@ -116,19 +116,23 @@ class JacobianSolver:
         """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
         rows, rest = tangent.active_rows, tangent.passive_rows
         steps = np.zeros((len(rights), *rights[0].shape))
-        direct = build_dense_factor(tangent) if rows.size * steps.shape[2] <= DENSE_UNKNOWNS else None
+        direct = None
+        if rows.size * steps.shape[2] <= DENSE_UNKNOWNS:
+            # without the shift: a joint that hardly resists slip has eigenvalues as small
+            direct = build_dense_factor(tangent, 0.0)
+            direct = direct if direct.sign else build_dense_factor(tangent, NEUTRAL_SHIFT)
         for step, right in zip(steps, rights, strict=True):
             if rows.size:
-                step[rows] = (direct.solve(right) if direct else self._solve_kept(tangent, right, rtol))[rows]
+                step[rows] = (direct.solve(right) if direct else self._solve_large(tangent, right, rtol))[rows]
             if rest.size:
                 # the columns of all other unknowns are those of the identity
                 step[rest] = (right - tangent.apply(step, roughly=True))[rest]
         return steps
 
-    def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
-        """Solution in the rows of the active pairs, with the kept factorisation while products are few."""
+    def _solve_large(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
+        """Solution in the rows of the active pairs, with an earlier factorisation while products are few."""
         if self._factor is not None:
-            solution, found = self._iterate(self._factor, tangent, right, rtol, KEPT_PRODUCTS)
+            solution, found = self._iterate(self._factor, tangent, right, rtol, REUSE_PRODUCTS)
             if found:
                 return solution
         self._factor, self._corrections = build_factor(tangent), ()
@@ -167,7 +171,7 @@ class JacobianSolver:
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
-        For a large joint, that of the kept factorisation P times (-1)^k, with k real negative eigenvalues of J P^-1.
+        For a large joint, that of an earlier factorisation P times (-1)^k, with k real negative eigenvalues of J P^-1.
         Where these outliers do not converge, this Jacobian is factorised instead.
         """
         if self._factor is not None and not self._factor.exact:

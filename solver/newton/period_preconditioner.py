@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from solver.contact.sampled_law import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
-from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure
+from solver.structure.condensation import CACHED_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.joint import Joint
 
@@ -119,7 +119,7 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), pairs, coupling, matrices)
 
 
-@lru_cache(maxsize=KEPT_STRUCTURES)
+@lru_cache(maxsize=CACHED_STRUCTURES)
 def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
     """Real stiffness (n_rel, n_rel), N/m: median of all harmonics, which ignores those near a resonance."""
     every = np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real])

@@ -67,7 +67,6 @@ class NewtonResult(Generic[EvaluationT]):
     """End of an iteration: its last point, or that of the lowest norm where it has not converged."""
 
     converged: bool
-    unknown: FloatArray
     evaluation: EvaluationT
     iterations: int
 
@@ -91,7 +90,7 @@ def solve_newton(
     for iteration in range(most + 1):
         norm = current.scaled_residual()
         if norm <= tolerance:
-            return NewtonResult(True, unknown, current, iteration)
+            return NewtonResult(True, current, iteration)
         if norm < best_norm:
             best, best_norm, since_best = (unknown, current), norm, 0
         else:
@@ -108,10 +107,10 @@ def solve_newton(
         while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual():
             length *= 0.5
             if length <= SHORTEST_STEP:
-                return NewtonResult(False, *best, most)
+                return NewtonResult(False, best[1], most)
             trial = evaluate(unknown + length * step)
         unknown, current = unknown + length * step, trial
-    return NewtonResult(False, *best, most)
+    return NewtonResult(False, best[1], most)
 
 
 class BorderedProblem(Protocol):
@@ -195,7 +194,7 @@ class Run:
     solver: JacobianSolver = field(default_factory=JacobianSolver, repr=False)
 
     def fresh(self) -> Run:
-        """A part of the computation whose results do not depend on the factorisation kept so far."""
+        """A part of the computation whose results do not depend on an earlier factorisation."""
         return Run(self.tolerance, self.budget)
 
     def with_tolerance(self, tolerance: float) -> Run:

@@ -62,8 +62,8 @@ class StartState:
     resolution: Resolution
     response_error: float
     wear_rate_error: float
-    newton_iterations: int
-    run_time: float
+    newton_iterations: int = 0
+    run_time: float = 0.0
     branch: int = 0
     fold_frequency: float = math.nan
     message: str = ""
@@ -74,33 +74,29 @@ class StartState:
 class WearHistory(Presented):
     """A point of a study on the slow time scale, at `n_output` cycle counts; not reached: NaN, whole numbers 0.
 
-    - cycles (n_output,): counts; worn_volume, m3, wear_rate, m3 per cycle; wear_depth (n_output, n_contact), m.
+    - cycles (n_output,); worn_volume, m3, wear_rate, m3 per cycle; wear_depth (n_output, n_contact), m.
     - mean_pressure, Pa, slip_range, m, open_fraction (n_output, n_contact): of a period.
     - response (n_output, n_response): complex first harmonic, m; response_mean, response_peak: mean and largest
       magnitude over a period, m.
-    - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
-      `solver.results.state_report.contact_loops`.
+    - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): fretting loops of the chosen pairs, m and N.
     - excitation_frequency, excitation_frequency_error (n_output,): Hz; the error of a given frequency is 0.
-    - worn_volume_error (n_output,): estimated relative error of the worn volume by steps and their propagation,
-      harmonics, samples and start state, 0 where nothing has worn; wear_depth_error (n_output, n_contact): m.
-    - error_estimate: `worn_volume_error` at the last count that was reached; NaN where nothing has worn at this count
-      and the joint wears.
+    - worn_volume_error (n_output,), relative, wear_depth_error (n_output, n_contact), m: estimated errors by steps and
+      their propagation, harmonics, samples and start state; 0 where nothing has worn.
+    - error_estimate: `worn_volume_error` at the last count that was reached; NaN at 0 where the joint wears.
     - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end.
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
-      certificate of the states, all relative; NaN where not estimated.
-    - harmonics_used, samples_used (n_output,): int.
+      certificate of the states, all relative; NaN where not estimated. harmonics_used, samples_used (n_output,): int.
     - last_cycle: count up to which the point was computed; NaN where there is no state.
-    - jump_cycle: first cycle count at which the branch was lost, NaN if never.
-    - cycles_to_target, cycles_to_target_error: count at which the target was reached, and its estimated error, cycles;
-      NaN if never or without a target. The history ends with the step that reaches the target.
-    - cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries
-      load or has worn, NaN if never.
-    - inaccurate_from, inaccurate_in, inaccurate_error: count from which on harmonics and samples do not bring the error
-      of a state below rtol, inf if never; name of the result, and its largest error from there on.
+    - jump_cycle: first count at which the branch was lost, NaN if never.
+    - cycles_to_target, cycles_to_target_error: count at which the target was reached, and its error; NaN if never. The
+      history ends with this step.
+    - cut_off_cycle: first count at which a pair at an edge of the modelled contact carries load or has worn, NaN if
+      never.
+    - inaccurate_from, inaccurate_in, inaccurate_error: count from which on the error of a state is above rtol, inf if
+      never; name of the result, and its largest error from there on.
     - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
-    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step`); or inf.
-    - newton_iterations; run_time: CPU seconds of the computing thread, both with those of the start state.
-    - branch, fold_frequency: of the start state.
+    - step_limit: largest stable explicit step at the first state that wears, cycles; or inf.
+    - newton_iterations, run_time, CPU seconds: both with those of the start state. branch, fold_frequency: of it.
     - outcome, message: how the history ended, and a sentence about it.
     """
 

@@ -60,11 +60,6 @@ class Monodromy(NamedTuple):
     past: FloatArray
     places: IntArray
 
-    @property
-    def size(self) -> int:
-        """Size of a disturbance."""
-        return 4 * len(self.response)
-
 
 @njit(cache=True)
 def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
@@ -90,23 +85,21 @@ def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
     return np.concatenate((now, before, speed, speed_before))
 
 
-def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples: int) -> Monodromy:
-    """Monodromy of a state at a fixed wear depth in the structure `linear`, with samples of the contact law.
+def build_monodromy(joint: Joint, at: Evaluation, n_samples: int) -> Monodromy:
+    """Monodromy of a state at a fixed wear depth in the real structure, with samples of the contact law.
 
     Raises numpy.linalg.LinAlgError where the structure is singular.
     """
     fine = replace(joint, basis=build_basis(joint.basis.orders, n_samples))
     state = Balance(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
-    switching, stuck = switching_pairs(state)
-    dofs = joint.contact.dofs
-    moves = np.ones(len(linear.mass), bool)
-    moves[dofs[stuck][dofs[stuck] >= 0]] = False
+    (switching, stuck), linear = switching_pairs(state), joint.model.linear[0]
+    dofs, moves = joint.contact.dofs, moving(joint, stuck)
     mass, damping, stiffness = (
         np.ascontiguousarray(np.real(part)[np.ix_(moves, moves)])
         for part in (linear.mass, linear.damping, linear.stiffness)
     )
     inertia, drag = mass / fine.law.sample_step**2, damping / fine.law.sample_step
-    compliance = np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness)
+    compliance = np.asarray(np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness), np.float64)
     # displacements of the switching pairs among those that move, -1 for none
     place = np.where(dofs[switching] >= 0, (np.cumsum(moves) - 1)[dofs[switching]], -1).reshape(-1, 1, 3)
     there, rows, n = place.ravel() >= 0, place.ravel(), len(mass)
@@ -133,6 +126,14 @@ def _inverse_of_law(law: SampledLaw, flexibility: FloatArray) -> FloatArray:
         system.reshape(len(system), n_pairs, 3, n_pairs, 3)[:, pairs, :, pairs] += law.by_force[part].swapaxes(0, 1)
         inverse[part] = np.linalg.inv(system.reshape(len(system), 3 * n_pairs, 3 * n_pairs))
     return inverse
+
+
+def moving(joint: Joint, fixed: BoolArray) -> BoolArray:
+    """True for the displacements (n,) of the structure that move while the pairs `fixed` (n_contact,) stick."""
+    dofs = joint.contact.dofs[fixed]
+    moves = np.ones(len(joint.model.linear[0].mass), bool)
+    moves[dofs[dofs >= 0]] = False
+    return moves
 
 
 def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:

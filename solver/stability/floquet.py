@@ -26,7 +26,7 @@ import numpy as np
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure, State
-from solver.model import BoolArray, ComplexArray, FloatArray, LinearModel
+from solver.model import ComplexArray, FloatArray, LinearModel
 from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import MOST_PRODUCTS, SMALL_JOINT
 from solver.newton.run import Run
@@ -37,6 +37,7 @@ from solver.stability.disturbances import (
     build_monodromy,
     hill_multipliers,
     linear_exponents,
+    moving,
     pass_period,
     switching_pairs,
 )
@@ -127,7 +128,7 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, *, grow
     """
     switching, stuck = switching_pairs(at)
     if not switching.any():
-        exponents = linear_exponents(joint.model.harmonic_structure(1), _moving(joint, stuck))
+        exponents = linear_exponents(joint.model.harmonic_structure(1), moving(joint, stuck))
         return Multipliers(_sorted(np.exp(exponents * 2.0 * np.pi / joint.omega)), 0.0)
     travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
     bounces = _bounces(joint, at)
@@ -141,7 +142,7 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, *, grow
 
 
 def _is_small(joint: Joint, at: Evaluation) -> bool:
-    return int(_moving(joint, switching_pairs(at)[1]).sum()) <= SMALL_JOINT
+    return int(moving(joint, switching_pairs(at)[1]).sum()) <= SMALL_JOINT
 
 
 def _bounces(joint: Joint, at: Evaluation) -> bool:
@@ -179,8 +180,7 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
     small, error = _is_small(joint, at), np.inf
     n_samples, values = _samples(joint, at, small) // (1 if growing_only else 2), np.empty(0, np.complex128)
     while n_samples <= 8 * SMALL_SAMPLES:
-        coarse, monodromy = values[:1], build_monodromy(joint, joint.model.linear[0], at, n_samples)
-        values = _sorted(multipliers_of(monodromy, small))
+        coarse, values = values[:1], _sorted(multipliers_of(build_monodromy(joint, at, n_samples), small))
         if not values.size:
             return Multipliers(values, np.inf)
         # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
@@ -194,17 +194,21 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
 
 def _samples(joint: Joint, at: Evaluation, small: bool) -> int:
     """Samples of a period: up to eight times as many for vibrations that grow in the structure alone."""
-    switching, stuck = switching_pairs(at)
-    growing = (_growing(joint.model.linear[0], _moving(joint, pairs).tobytes()) for pairs in (stuck, stuck | switching))
-    fastest = max(float(np.abs(of.imag).max(initial=0.0)) for of in growing) / joint.omega
-    wanted = 2 ** int(np.ceil(np.log2(max(SAMPLES_A_VIBRATION * fastest, 1.0))))
+    (switching, stuck), linear, fastest = switching_pairs(at), joint.model.linear[0], 0.0
+    for pairs in () if _is_passive(linear) else (stuck, stuck | switching):
+        found = linear_exponents(linear, moving(joint, pairs))
+        # round-off of a fast vibration is no growth
+        grows = found.real > found.size * _EPS * np.abs(found).max(initial=0.0)
+        fastest = max(fastest, float(np.abs(found.imag[grows]).max(initial=0.0)))
+    wanted = 2 ** int(np.ceil(np.log2(max(SAMPLES_A_VIBRATION * fastest / joint.omega, 1.0))))
     return int(np.clip(wanted, SMALL_SAMPLES if small else SMALL_SAMPLES // 4, 8 * SMALL_SAMPLES))
 
 
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
     """All multipliers, or the largest ones, as far as Arnoldi's method has converged."""
+    size = 4 * len(monodromy.response)
     if every:
-        return np.asarray(np.linalg.eigvals(pass_period(monodromy, np.eye(monodromy.size))), np.complex128)
+        return np.asarray(np.linalg.eigvals(pass_period(monodromy, np.eye(size))), np.complex128)
 
     def product(vector: FloatArray) -> FloatArray:
         return pass_period(monodromy, vector[:, None])[:, 0]
@@ -213,20 +217,9 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
         return bool(residuals[np.argmax(np.abs(values))] < SMALLEST_GROWTH)
 
     # a fixed start: the result must not depend on earlier computations
-    start = np.random.default_rng(0).normal(size=monodromy.size)
+    start = np.random.default_rng(0).normal(size=size)
     values, residuals = ritz_values(product, start, MOST_PRODUCTS, settled)
     return values[residuals < SMALLEST_GROWTH]
-
-
-# --- the linear structure ---
-
-
-def _moving(joint: Joint, fixed: BoolArray) -> BoolArray:
-    """True for the displacements (n,) of the structure that move while the pairs `fixed` (n_contact,) stick."""
-    dofs = joint.contact.dofs[fixed]
-    moves = np.ones(len(joint.model.linear[0].mass), bool)
-    moves[dofs[dofs >= 0]] = False
-    return moves
 
 
 @lru_cache(maxsize=4)
@@ -235,14 +228,3 @@ def _is_passive(linear: LinearModel) -> bool:
     parts = linear.mass, linear.damping, linear.stiffness
     least = (float(np.linalg.eigvalsh(part)[0]) / max(float(np.abs(np.diag(part)).max()), 1e-300) for part in parts)
     return all(value >= -ROUND_OFF for value in least)
-
-
-@lru_cache(maxsize=4)
-def _growing(linear: LinearModel, moves: bytes) -> ComplexArray:
-    """Exponents, 1/s, of the growing motions; moves: bytes of those of `linear_exponents`."""
-    if _is_passive(linear):
-        return np.empty(0, complex)
-    found = linear_exponents(linear, np.frombuffer(moves, bool))
-    # round-off of a fast vibration is no growth
-    growing: ComplexArray = found[found.real > found.size * _EPS * np.abs(found).max(initial=0.0)]
-    return growing

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 DENSE_BYTES = 2e6
 """Bytes of the matrices of all harmonics up to which a product with each matrix is fastest."""
 
-KEPT_STRUCTURES = 12
+CACHED_STRUCTURES = 8
 """Condensed structures in the cache. A wear history with its errors uses six."""
 
 
@@ -36,10 +36,10 @@ def _others(n: int, relative: IntArray) -> IntArray:
     return np.setdiff1d(np.arange(n), relative)
 
 
-def _block(linear: LinearModel, rates: FloatArray, rows: IntArray, columns: IntArray) -> ComplexArray:
-    """Rows and columns of `K + i r C - r^2 M`, (H, n_rows, n_columns), N/m, at the rates r (H,), rad/s."""
-    at, rate = np.ix_(rows, columns), rates[:, None, None]
-    return cast("ComplexArray", linear.stiffness[at] + 1j * rate * linear.damping[at] - rate**2 * linear.mass[at])
+def _dynamic_stiffness(linear: LinearModel, exponent: complex | ComplexArray, at: Any) -> ComplexArray:
+    """Entries `at` of `K + s C + s^2 M`, N/m, for motions exp(s t); exponent: s, 1/s."""
+    stiffness = linear.stiffness[at] + exponent * linear.damping[at] + exponent**2 * linear.mass[at]
+    return cast("ComplexArray", stiffness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +100,14 @@ class CondensedStructure:
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
 
-@lru_cache(maxsize=KEPT_STRUCTURES)
+@lru_cache(maxsize=CACHED_STRUCTURES)
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
     """Condense the structure at a frequency, rad/s, with an excitation amplitude, N, in harmonic 1.
 
     orders: harmonics above the static one, ascending.
-    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
+    Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular at a harmonic.
     """
     relative, _ = relative_indices(model.contact)
     still = model.linear[0]
@@ -154,7 +154,7 @@ def _condense_each(
     model: ReducedModel, relative: IntArray, rates: FloatArray, orders: tuple[int, ...], load: ComplexArray
 ) -> Moving:
     """A matrix for each harmonic, at the rates n w (H,), rad/s. load (n,): of harmonic 1, N."""
-    n_rel, n_rows, every = relative.size, len(model.linear[0].response) + 1, np.arange(load.size)
+    n_rel, n_rows, exponents = relative.size, len(model.linear[0].response) + 1, 1j * rates[:, None, None]
     stiffness, rows = (np.empty((len(orders), n, n_rel), complex) for n in (n_rel, n_rows))
     force, offset = np.zeros(n_rel, complex), np.zeros(n_rows, complex)
     structures = [model.harmonic_structure(harmonic) for harmonic in orders]
@@ -164,7 +164,7 @@ def _condense_each(
         loads = np.where(np.array(orders)[places, None] == 1, load, 0.0)
         responses = np.broadcast_to(linear.response, (len(places), *linear.response.shape))
         seen = np.concatenate([responses, loads.conj()[:, None]], axis=1)
-        found = condense(_block(linear, rates[places], every, every), relative, loads, cast("Matrix", seen))
+        found = condense(_dynamic_stiffness(linear, exponents[places], ...), relative, loads, cast("Matrix", seen))
         stiffness[places], rows[places] = found.stiffness, found.rows
         if orders[places[0]] == 1:
             force, offset = found.force[0], found.offset[0]
@@ -174,12 +174,14 @@ def _condense_each(
 def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray, load: ComplexArray) -> Moving:
     """As `_condense_each`, of a real structure, with matrices shared by all harmonics."""
     others = _others(load.size, relative)
-    compliance = cast("ComplexArray", np.linalg.inv(_block(linear, rates, others, others)))
+    exponents: ComplexArray = 1j * rates[:, None, None]
     rows = np.vstack([linear.response, load.conj()])
-    by_pairs = rows[:, relative] - rows[:, others] @ compliance @ _block(linear, rates, others, relative)
-    held = compliance[0] @ load[others]
-    force = load[relative] - _block(linear, rates[:1], relative, others)[0] @ held
-    return SharedStiffness(linear, relative, others, rates, compliance), force, by_pairs, rows[:, others] @ held
+    inner, to_pairs = (_dynamic_stiffness(linear, exponents, np.ix_(others, at)) for at in (others, relative))
+    compliance = cast("ComplexArray", np.linalg.inv(inner))
+    by_pairs = rows[:, relative] - rows[:, others] @ compliance @ to_pairs
+    behind = compliance[0] @ load[others]
+    force = load[relative] - _dynamic_stiffness(linear, 1j * float(rates[0]), np.ix_(relative, others)) @ behind
+    return SharedStiffness(linear, relative, others, rates, compliance), force, by_pairs, rows[:, others] @ behind
 
 
 class Condensed(NamedTuple):
@@ -224,13 +226,12 @@ def whole_motion(
     """All displacements (n, ...), m, whose relative ones are `moved` (n_rel, ...), m, under a load (n, ...), N.
 
     Both change with exp(s t); exponent: s, 1/s, `i n w` in harmonic n.
-    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular.
+    Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular.
     """
     n_rel, others, whole = relative.size, _others(len(linear.mass), relative), np.zeros(load.shape, complex)
     whole[relative] = moved
     if others.size:
-        at = np.ix_(others, np.concatenate([relative, others]))
-        rows = linear.stiffness[at] + exponent * linear.damping[at] + exponent**2 * linear.mass[at]
+        rows = _dynamic_stiffness(linear, exponent, np.ix_(others, np.concatenate([relative, others])))
         whole[others] = np.linalg.solve(rows[:, n_rel:], load[others] - rows[:, :n_rel] @ moved)
     return whole
 
@@ -270,8 +271,7 @@ def frequency_slope(
         x = whole_motion(linear, rate, relative, load, moving[:, place])
         slope = 1j * n * (linear.damping @ x) - 2.0 * n**2 * omega * (linear.mass @ x)
         turned = whole_motion(linear, rate, relative, -slope, still)
-        rows = linear.stiffness[relative] + rate * linear.damping[relative] + rate**2 * linear.mass[relative]
-        force[:, place] = slope[relative] + rows @ turned
+        force[:, place] = slope[relative] + _dynamic_stiffness(linear, rate, relative) @ turned
         if n == 1:
             product, response = complex(load.conj() @ turned), linear.response @ turned
     return FrequencySlope(from_complex(np.zeros(relative.size), force), product, response)

@@ -19,10 +19,8 @@ from solver.model import ComplexArray, FloatArray
 class FourierBasis:
     """Matrices between H harmonics, of any orders, and N time samples.
 
-    - orders (H,): ascending.
-    - n_samples: N.
-    - synthesis (2H+1, N): `x_t = x_h @ synthesis`.
-    - analysis (N, 2H+1): `x_h = x_t @ analysis`.
+    orders (H,): ascending. n_samples: N.
+    synthesis (2H+1, N), analysis (N, 2H+1): `x_t = x_h @ synthesis`, `x_h = x_t @ analysis`.
     """
 
     orders: tuple[int, ...]

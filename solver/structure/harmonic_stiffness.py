@@ -38,54 +38,54 @@ class SharedStiffness:
     harmonics the matrices of all harmonics take 211 MB, these take 24 MB. Methods as in `DenseStiffness`.
 
     - relative (n_rel,), others (n_i,): displacements of the pairs, and all others. rates (H,): n w, rad/s.
-    - held_compliance (H, n_i, n_i): `A_ii^-1`, m/N; in the precision of all products.
+    - inner_compliance (H, n_i, n_i): `A_ii^-1`, m/N; in the precision of all products.
     """
 
     linear: LinearModel
     relative: IntArray
     others: IntArray
     rates: FloatArray
-    held_compliance: ComplexArray
+    inner_compliance: ComplexArray
 
     @cached_property
     def _parts(self) -> tuple[FloatArray, FloatArray]:
-        kind = self.held_compliance.real.dtype.name
+        kind = self.inner_compliance.real.dtype.name
         return _real_parts(self.linear, tuple(self.relative.tolist()), tuple(self.others.tolist()), kind)
 
     @cached_property
     def _factors(self) -> ComplexArray:
         """Factors (3, 1, H) of K, M and C in A."""
         ones = np.ones(self.rates.size)
-        return np.stack([ones, -(self.rates**2), 1j * self.rates])[:, None].astype(self.held_compliance.dtype)
+        return np.stack([ones, -(self.rates**2), 1j * self.rates])[:, None].astype(self.inner_compliance.dtype)
 
     @property
     def dense(self) -> ComplexArray:
         """As in `DenseStiffness`; computed at each call."""
         n_rel = self.relative.size
-        found = np.empty((self.rates.size, n_rel, n_rel), self.held_compliance.dtype)
+        found = np.empty((self.rates.size, n_rel, n_rel), self.inner_compliance.dtype)
         for place, factors in enumerate(self._factors[:, 0].T):
             columns, back = (
                 sum(factor * part for factor, part in zip(factors, np.split(parts, 3, axis=1), strict=True))
                 for parts in self._parts
             )
-            found[place] = columns[:n_rel] - back @ (self.held_compliance[place] @ columns[n_rel:])
+            found[place] = columns[:n_rel] - back @ (self.inner_compliance[place] @ columns[n_rel:])
         return found
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """As in `DenseStiffness`."""
         n_rel, (columns, back) = self.relative.size, self._parts
         forces = self._product(columns, to_complex(displacement_h))
-        behind = np.matmul(self.held_compliance, forces[n_rel:].T[:, :, None])[:, :, 0].T
+        behind = np.matmul(self.inner_compliance, forces[n_rel:].T[:, :, None])[:, :, 0].T
         return forces[:n_rel] - self._product(back, behind)
 
     @cached_property
     def single(self) -> SharedStiffness:
         """As in `DenseStiffness`."""
-        return replace(self, held_compliance=self.held_compliance.astype(np.complex64))
+        return replace(self, inner_compliance=self.inner_compliance.astype(np.complex64))
 
     def _product(self, parts: FloatArray, amplitudes: ComplexArray) -> ComplexArray:
         """A u (rows, H) of real parts K, M, C (rows, 3n) and complex u (n, H)."""
-        kind = self.held_compliance.dtype
+        kind = self.inner_compliance.dtype
         motions = (self._factors * amplitudes.astype(kind, copy=False)).reshape(parts.shape[1], self.rates.size)
         return np.asarray((parts @ motions.view(parts.dtype)).view(kind))
 

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, Certificate, certify
-from solver.accuracy.harmonic_levels import lacks_even, left_out
 from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
-from solver.accuracy.resolved_state import UNKNOWN
+from solver.accuracy.resolved_state import UNKNOWN, lacks_even, left_out
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome, in_digits

@@ -70,8 +70,8 @@ def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) 
     """
     case, joint = setup.case_and_joint(state)
     found = relax_to_periodic(case, joint, worn, state.point, joint, setup.run)
-    if isinstance(found, Outcome):
-        return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
+    if isinstance(found, Failure):
+        return found if found.outcome is Outcome.ADRIFT else Failure(Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners
     if vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
         state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))

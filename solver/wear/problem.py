@@ -18,7 +18,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import fewer, shifted
+from solver.accuracy.resolved_state import fewer, shifted
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.state import Failure, vibration_change

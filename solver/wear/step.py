@@ -124,9 +124,10 @@ def _rate_changes(setup: WearingJoint, state: WearState, depths: FloatArray, *, 
     Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
     at, joint, balance, gain = state.at, setup.joint_of(state), setup.balance_of(state), setup.gain(1.0)
-    fixed = replace(setup.wearing, depth_held=True)
-    growth = replace(balance, wear_gain=gain, wearing=fixed).linearise(at).growth_tangent
-    found = depths * (gain * (fixed if fixed_factors else setup.wearing).slopes(*worn_by(at))[2])
+    force_tangent, work_tangent = joint.law.tangent(at)
+    by_work, by_force, by_depth = (gain * part for part in setup.wearing.slopes(*worn_by(at)))
+    growth = by_work[:, None] * work_tangent + by_force[:, None] * force_tangent[:, 0]
+    found = depths * (0.0 if fixed_factors else by_depth)
     closing = np.where(joint.component_index % 3 == 0, depths[:, joint.component_index // 3], 0.0)
     # nothing acts back on a constant normal force
     acting = closing.any(axis=1)

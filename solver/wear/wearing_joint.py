@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import left_out
-from solver.accuracy.resolved_state import NOTHING, Estimate
+from solver.accuracy.resolved_state import NOTHING, Estimate, left_out
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
@@ -138,8 +137,7 @@ class WearingJoint:
         """Case and joint of a state. The last ones are stored; others drop the factorisation."""
         last = self._last
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
-            case = replace(self.case, hold=state.hold)
-            case = case.at(state.resolution)
+            case = replace(self.case, hold=state.hold).at(state.resolution)
             self.drop_factor()
         elif state.omega != last[1].omega:
             case = last[0]

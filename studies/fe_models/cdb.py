@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.fe_models.deck.contents import Boundary, Deck
+from studies.fe_models.deck.contents import Deck, NodalValue
 from studies.fe_models.deck.model import deck_of_arrays
 from studies.fe_models.text import IntArray, Place, library_errors, shown
 from studies.scene_error import SceneError
@@ -138,7 +138,7 @@ def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
     return replace(
         deck,
         boundaries=tuple(
-            Boundary(f"{path.name}: D", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
+            NodalValue(f"{path.name}: D", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
             for (label, value), nodes in commands.held.items()
         ),
         notes=tuple(f"Elements of type {kind} are passed over." for kind in sorted(passed)),

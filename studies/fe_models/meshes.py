@@ -1,9 +1,8 @@
 """Meshes of files: decks, meshes of Gmsh by meshio (formats 2.2 and 4.1, text and binary), tables of nodes.
 
-A table of nodes of reduced matrices stands in place of a mesh, with the columns node, x, y, z and sets. `sets` names
-the sets of a node, with blanks between the names. Nodes that touch have an area and the direction out of their body as
-well, area, normal_x, normal_y, normal_z, and perhaps a gap, negative for an interference; others leave them empty. All
-are in the units of the model.
+A table of nodes stands beside reduced matrices in place of a mesh: node, x, y, z and sets, names with blanks between
+them; of nodes that touch area, normal_x, normal_y, normal_z out of the body, and perhaps gap, negative for an
+interference. All are in the units of the model.
 """
 
 from __future__ import annotations
@@ -41,11 +40,9 @@ _COLUMNS = ["node", *_PLACE, "sets"]
 def read_mesh_file(path: Path) -> Deck:
     """The mesh of a file by its ending: .inp (CalculiX, Abaqus), .msh (Gmsh), .cdb (ANSYS), or a table of nodes, .csv.
 
-    Hexahedra of 8 nodes in .msh and .cdb are read as C3D8I, the project's own. Of .msh, node numbers are the places of
-    nodes in the file and element numbers count its solid elements, both from 1; a physical group gives a set of its
-    nodes, and one of volumes a set of its elements as well.
-
-    Raises SceneError about "model": another ending, a library that is not installed, or what is wrong in the file.
+    Hexahedra of 8 nodes in .msh and .cdb are read as C3D8I, the project's own. Of .msh, nodes and solid elements are
+    numbered from 1 as they stand in the file; a physical group gives a set of its nodes, and one of volumes a set of
+    its elements as well. Raises SceneError about "model".
     """
     readers = {".inp": read_deck, ".msh": _read_gmsh, ".cdb": read_cdb, ".csv": _read_node_table}
     reader = readers.get(path.suffix.lower())

@@ -6,8 +6,6 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from studies.scene_error import SceneError
-
 
 @dataclass(frozen=True)
 class ModelFiles:
@@ -72,13 +70,5 @@ class Units:
         return self.mass / self.length
 
 
-_SYSTEMS = (Units("SI", 1.0, 1.0, "m", "kg"), Units("mm-t-s", 1e-3, 1e3, "mm", "t"))
-
-
-def find_units(name: str) -> Units:
-    """Units by their name, "SI" or "mm-t-s". Raises SceneError about "units"."""
-    for units in _SYSTEMS:
-        if units.name == name:
-            return units
-    known = " or ".join(f'"{units.name}"' for units in _SYSTEMS)
-    raise SceneError("units", f"{name!r}", f"give {known}")
+UNITS = {"SI": Units("SI", 1.0, 1.0, "m", "kg"), "mm-t-s": Units("mm-t-s", 1e-3, 1e3, "mm", "t")}
+"""Systems of units by their names."""

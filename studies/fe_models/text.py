@@ -76,8 +76,7 @@ class Place:
 def library_errors(path: Path, library: str, package: str, key: str) -> Iterator[None]:
     """A block that loads a library and has it read a file; what the library prints is not shown.
 
-    library, package: name of the module, and of the package that brings it. key: what errors are about. Raises
-    SceneError where the file is missing or too large, the library is not there, or cannot read the file.
+    library, package: the module, and the package that brings it. key: what errors are about. Raises SceneError.
     """
     check_file(path, LARGEST_FILE, key)
     said = io.StringIO()

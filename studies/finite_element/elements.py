@@ -129,7 +129,7 @@ class ElementKind:
 
     reference: nodes and shape functions. rule: integration of stiffness and mass, as in CalculiX; with fewer points
     than nodes the mass of an element is singular. corner_faces: corners of the faces S1, S2, ... of CalculiX and
-    Abaqus, in either sense. incompatible_modes: see `element_matrices`. assembled: whether matrices can be assembled
+    Abaqus, in either sense. incompatible_modes: see `ElementBatch`. assembled: whether matrices can be assembled
     here.
     """
 

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.closest_points import closest_points
 from studies.finite_element.cut_faces import CyclicAxis
+from studies.finite_element.solid_mesh import SolidMesh
 from studies.finite_element.surfaces import Surface
 from studies.scene_error import SceneError
 
@@ -101,21 +102,15 @@ _ARRAYS = ("moving", "sector", "frames", "present", "area", "position", "distanc
 
 
 def build_contact_pairs(
-    coordinates: FloatArray,
-    numbers: IntArray,
-    contacts: Sequence[ContactSurfaces],
-    along: FloatArray,
-    axis: CyclicAxis | None = None,
+    mesh: SolidMesh, contacts: Sequence[ContactSurfaces], along: FloatArray, axis: CyclicAxis | None = None
 ) -> ContactPairs:
     """Pairs of all surfaces, those of the first ones first, each by its moving nodes in ascending order.
 
-    coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. contacts: at least one.
-    along (3,): see `local_frames`. axis: of the cyclic structure, for contacts between sectors.
-
-    Raises SceneError where nodes find no point of the other surface, do not face it, or find it behind their own body,
-    and where nodes belong to two pairs.
+    contacts: at least one. along (3,): see `local_frames`. axis: of the cyclic structure, for contacts between sectors.
+    Raises SceneError where nodes find no point of the other surface, do not face it, find it behind their own body, or
+    move in two pairs.
     """
-    parts = []
+    parts, coordinates = [], mesh.coordinates
     for place, contact in enumerate(contacts):
         shared = np.intersect1d(contact.first.nodes, contact.second.nodes)
         if len(shared):
@@ -130,14 +125,13 @@ def build_contact_pairs(
             # a coarse surface may lie inside a finer one that goes on
             other = _match(coordinates, finer.turned_round, place, along, axis)
             match = match if (other.apart > limit).any() else other
-        _check_match(match, numbers, limit)
+        _check_match(match, mesh, limit)
         parts.append(match.pairs)
-    return _joined(parts, numbers)
+    return _joined(parts, mesh)
 
 
 def match_nodes(
-    coordinates: FloatArray,
-    numbers: IntArray,
+    mesh: SolidMesh,
     contacts: Sequence[ContactSurfaces],
     given: tuple[FloatArray, FloatArray, FloatArray],
     axis: CyclicAxis | None,
@@ -149,22 +143,22 @@ def match_nodes(
     SceneError where a node has no area or normal, or meets no node.
     """
     along = np.array([0.0, 0.0, 1.0]) if axis is None else axis.axis
-    area, normals, gap = given
+    (area, normals, gap), coordinates = given, mesh.coordinates
     parts = []
     for place, contact in enumerate(contacts):
         nodes, others = contact.first.nodes, contact.second.nodes
         unknown = nodes[~((area[nodes] > 0.0) & np.isfinite(normals[nodes]).all(axis=1))]
         if len(unknown):
             found = f"{len(unknown)} nodes of {contact.first.name} have no area or normal, as node"
-            raise SceneError("contact", f"{found} {numbers[unknown[0]]}", "give both in the table of nodes")
+            raise SceneError("contact", f"{found} {mesh.numbers[unknown[0]]}", "give both in the table of nodes")
         there = contact.beside(coordinates, axis)
         apart, nearest = cKDTree(there[others]).query(coordinates[nodes])
         limit = contact.tolerance or _TOLERANCE * float(np.sqrt(area[nodes].min()))
-        _check_near(contact, apart, limit, numbers, "give nodes that meet, node by node, or a larger tolerance")
+        _check_near(contact, apart, limit, mesh, "give nodes that meet, node by node, or a larger tolerance")
         weights = sparse.eye(len(coordinates), format="csr")[others[nearest]]
         pairs = _pairs_of(coordinates, there, contact, place, weights, (area[nodes], normals[nodes]), along)
         parts.append(replace(pairs, gap=np.where(np.isnan(gap[nodes]), pairs.gap, gap[nodes])))
-    return _joined(parts, numbers)
+    return _joined(parts, mesh)
 
 
 def _pairs_of(
@@ -200,7 +194,7 @@ def _pairs_of(
     )
 
 
-def _joined(parts: Sequence[ContactPairs], numbers: IntArray) -> ContactPairs:
+def _joined(parts: Sequence[ContactPairs], mesh: SolidMesh) -> ContactPairs:
     """Pairs of several surfaces, one after the other. Raises SceneError where a node moves in two of them."""
     joined = ContactPairs(
         opposite=sparse.vstack([part.opposite for part in parts], format="csr"),
@@ -212,7 +206,7 @@ def _joined(parts: Sequence[ContactPairs], numbers: IntArray) -> ContactPairs:
     twice = unique[count > 1]
     if len(twice):
         names = " and ".join(joined.moving_name[place] for place in joined.surface[joined.moving == twice[0]])
-        found = f"{len(twice)} nodes move in two pairs, in {names}, as node {numbers[twice[0]]}"
+        found = f"{len(twice)} nodes move in two pairs, in {names}, as node {mesh.numbers[twice[0]]}"
         raise SceneError("contact", found, "take them out of one of the surfaces")
     return joined
 
@@ -270,7 +264,7 @@ def _match(
     )
 
 
-def _check_match(match: _Match, numbers: IntArray, limit: float) -> None:
+def _check_match(match: _Match, mesh: SolidMesh, limit: float) -> None:
     """Raises SceneError where nodes are no pairs. limit: largest distance from the facets, m."""
     contact, distance, n = match.contact, match.pairs.distance, match.pairs.n_contact
     moving, opposite = contact.first.name, contact.second.name
@@ -286,22 +280,22 @@ def _check_match(match: _Match, numbers: IntArray, limit: float) -> None:
         remedy = "give two surfaces that face each other in the same sector, or name them in next_sector"
         raise SceneError("contact", found, remedy)
     remedy = "give surfaces that touch, of which one covers the other, or a larger tolerance, at most a facet"
-    _check_near(contact, match.apart, limit, numbers, remedy)
+    _check_near(contact, match.apart, limit, mesh, remedy)
     aside = np.flatnonzero(match.facing > 0.0)
     if len(aside):
         found = f"{len(aside)} of {n} nodes of {moving} do not face {opposite}, as node"
         remedy = "leave them out of the surface"
-        raise SceneError("contact", f"{found} {numbers[contact.first.nodes[aside[0]]]}", remedy)
+        raise SceneError("contact", f"{found} {mesh.numbers[contact.first.nodes[aside[0]]]}", remedy)
 
 
-def _check_near(contact: ContactSurfaces, apart: FloatArray, limit: float, numbers: IntArray, remedy: str) -> None:
+def _check_near(contact: ContactSurfaces, apart: FloatArray, limit: float, mesh: SolidMesh, remedy: str) -> None:
     """Raises SceneError where nodes of the first surface are farther from the second than the limit; apart (n,), m."""
     far = int(np.count_nonzero(apart > limit))
     if far:
         worst, turned = int(np.argmax(apart)), " after a turn by one sector" if contact.sector else ""
         found = (
             f"{far} of {len(apart)} nodes of {contact.first.name} are farther than {limit:.3g} m from"
-            f" {contact.second.name}{turned}; the farthest, node {numbers[contact.first.nodes[worst]]}, is at"
+            f" {contact.second.name}{turned}; the farthest, node {mesh.numbers[contact.first.nodes[worst]]}, is at"
             f" {apart[worst]:.3g} m"
         )
         raise SceneError("contact", found, remedy)

@@ -9,22 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from solver.model import (
-    ContactInterface,
-    FloatArray,
-    LinearModel,
-    Matrix,
-    ReducedModel,
-    needed_nodal_diameters,
-)
+from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
 from studies.finite_element.elimination import NotPositiveDefiniteError
-from studies.finite_element.joint_model import (
-    JointDefinition,
-    MatrixModel,
-    MeshModel,
-    ReductionOptions,
-    Retainer,
-)
+from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, Retainer
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduction import Reduction
 from studies.finite_element.solid_mesh import (
@@ -81,7 +68,7 @@ def silent(_: str) -> None:
 
 
 def build_fe_scene(
-    model: MeshModel | MatrixModel,
+    model: FeModel,
     joint: JointDefinition,
     options: ReductionOptions,
     n_harmonics: int,
@@ -94,18 +81,15 @@ def build_fe_scene(
     the preload, enters nodal diameter 0 only, the unit harmonic load that of the excitation only. The damping is that
     of the model's matrices, else `loss_factor / omega_1` times the stiffness without prestress where that is known,
     omega_1 the first frequency of the glued structure, rad/s, at the nodal diameter of the excitation. Coriolis forces
-    are left out.
-
-    Raises SceneError where the model describes no possible joint.
+    are left out. Raises SceneError where the model describes no possible joint.
     """
     excited, n_sectors = options.nodal_diameter, 0 if joint.cut is None else joint.cut.axis.n_sectors
     if excited > n_sectors // 2:
-        most = f"use at most n_sectors // 2 = {n_sectors // 2}"
+        most = f"use at most n_sectors // 2 = {n_sectors // 2}; more is the same wave turning the other way"
         raise SceneError("nodal_diameter", str(excited), most if n_sectors else "only a cyclic sector has one: use 0")
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
     prepared = prepare_model(model, joint, progress)
-    motions = [each.row(len(model.numbers)) for each in (joint.load, *joint.responses.values())]
-    vectors = np.stack([prepared.static_load, *motions], axis=1)
+    vectors = np.stack([prepared.static_load, joint.load, *joint.responses.values()], axis=1)
     linear: dict[int, LinearModel] = {}
     frequencies: dict[int, FloatArray] = {}
     damping = 0.0
@@ -134,52 +118,50 @@ def build_fe_scene(
     return FeScene(reduced_model, prepared.pairs, frequencies)
 
 
-def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progress: Progress = silent) -> PreparedModel:
+def prepare_model(model: FeModel, joint: JointDefinition, progress: Progress = silent) -> PreparedModel:
     """Pairs and matrices of a model. Raises SceneError where the model describes no possible joint."""
     progress("pairing of the contact surfaces")
     structure = build_structure(model, joint)
-    if isinstance(model, MatrixModel):
+    if model.forms is not None:
         return _prepare(model, structure, model.forms)
     progress("assembly of stiffness and mass")
     check_elements(model.mesh)
-    elastic, mass = (model.padded(form) for form in (assemble_stiffness(model.mesh), assemble_mass(model.mesh)))
+    elastic, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
     still = _prepare(model, structure, {"stiffness": elastic, "mass": mass})
     if not model.prestress or model.rotation is None:
         return still
     progress("static state of the glued structure under the centrifugal load")
-    load = centrifugal_load(mass, model.coordinates, model.rotation)
+    load = centrifugal_load(mass, model.mesh.coordinates, model.rotation)
     with _positive_definite(0, model.rotation):
         displacements = still.reduction.solve_static(load)
     progress("assembly of the prestressed stiffness")
-    stressed = assemble_tangent_stiffness(model.mesh, displacements[: 3 * model.mesh.n_nodes])
-    stiffness = (model.padded(stressed) + spin_softening(mass, model.rotation)).tocsr()
+    stressed = assemble_tangent_stiffness(model.mesh, displacements)
+    stiffness = (stressed + spin_softening(mass, model.rotation)).tocsr()
     forms = {"stiffness": stiffness, "mass": mass, "elastic": elastic}
     return replace(still, reduction=replace(still.reduction, forms=forms), at_rest=still.reduction)
 
 
-def _prepare(
-    model: MeshModel | MatrixModel, structure: Structure, forms: dict[str, sparse.csr_matrix]
-) -> PreparedModel:
+def _prepare(model: FeModel, structure: Structure, forms: Mapping[str, sparse.csr_matrix]) -> PreparedModel:
     """A model with the forms as they are."""
-    mass, placed = forms["mass"], ~np.isnan(model.coordinates)
+    mass, placed = forms["mass"], ~np.isnan(model.mesh.coordinates)
     load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
     if model.gravity is not None:
         load = load + mass @ (placed * model.gravity).ravel()
     if model.rotation is not None:
-        load = load + centrifugal_load(mass, model.coordinates, model.rotation)
+        load = load + centrifugal_load(mass, model.mesh.coordinates, model.rotation)
     along_x = placed * np.array([1.0, 0.0, 0.0])
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
     reduction = Reduction(structure, forms, _positions(model, structure, forms.values()))
     return PreparedModel(reduction, load, None, model.rotation, weight)
 
 
-def _positions(model: MeshModel | MatrixModel, structure: Structure, forms: Iterable[sparse.csr_matrix]) -> FloatArray:
+def _positions(model: FeModel, structure: Structure, forms: Iterable[sparse.csr_matrix]) -> FloatArray:
     """Coordinates of the nodes, and radius, angle and height of a sector, over the extent of the mesh.
 
     Nodes without a place stand among those to which forms and constraints couple them. Rounded, layers of a regular
     mesh are layers.
     """
-    positions, nowhere = model.coordinates.copy(), np.asarray(np.isnan(model.coordinates).any(axis=1))
+    positions, nowhere = model.mesh.coordinates.copy(), np.asarray(np.isnan(model.mesh.coordinates).any(axis=1))
     if nowhere.any():
         node = sparse.kron(sparse.eye(len(nowhere)), np.ones((1, 3)), format="csr")
         joins = (*forms, structure.constraints.steps.T)
@@ -205,12 +187,7 @@ def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int
 
 def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
     given = [contact.friction_coefficient for contact in joint.contacts]
-    friction = None
-    if any(each is not None for each in given):
-        if None in given:
-            missing = joint.contacts[given.index(None)].name
-            raise SceneError("friction_coefficient", f"none for {missing}", "give one for every pair of surfaces")
-        friction = np.array(given, dtype=float)[pairs.surface]
+    friction = None if None in given else np.array(given, dtype=float)[pairs.surface]
     number = np.cumsum(pairs.present.ravel()).reshape(-1, 3) - 1
     return ContactInterface(
         dofs=np.where(pairs.present, number, -1).astype(np.int64),
@@ -241,9 +218,8 @@ def _positive_definite(nodal_diameter: int, rotation: Rotation | None) -> Iterat
         yield
     except NotPositiveDefiniteError as error:
         if error.unstable:
-            speed = (
-                "that of the matrices" if rotation is None else f"{np.sqrt(rotation.omega_squared) * 30.0 / np.pi:.6g}"
-            )
+            rpm = None if rotation is None else np.sqrt(rotation.omega_squared) * 30.0 / np.pi
+            speed = "that of the matrices" if rpm is None else f"{rpm:.6g}"
             found = "the glued structure is unstable: spin softening exceeds its stiffness"
             remedy = f"reduce it: at nodal diameter {nodal_diameter} {found}"
             raise SceneError("rotation_speed", speed, remedy) from error

@@ -14,7 +14,7 @@ from scipy import sparse
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel
+from studies.finite_element.joint_model import FeModel, JointDefinition
 from studies.finite_element.pairing import ContactPairs, build_contact_pairs
 from studies.scene_error import SceneError
 
@@ -79,9 +79,9 @@ class Structure:
         return Coordinates((total @ constraints.axes[:, free]).tocsr(), (total @ driven).tocsr(), free // 3)
 
 
-def build_structure(model: MeshModel | MatrixModel, joint: JointDefinition) -> Structure:
+def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
     """The structure of a joint, with its pairs. Raises SceneError where the model describes no possible joint."""
-    numbers, coordinates, cut = model.numbers, model.coordinates, joint.cut
+    numbers, cut = model.mesh.numbers, joint.cut
     constraints = joint.constraints or eliminate((), joint.held, {}, numbers, len(numbers))[0]
     axis = None if cut is None else cut.axis
     # first tangents lie along the axis
@@ -94,8 +94,8 @@ def build_structure(model: MeshModel | MatrixModel, joint: JointDefinition) -> S
             each.turned_round if follow[each.first.nodes].any() and not follow[each.second.nodes].any() else each
             for each in joint.contacts
         ]
-        pairs = build_contact_pairs(coordinates, numbers, contacts, along, axis)
-    ties = build_contact_pairs(coordinates, numbers, joint.ties, along) if joint.ties else None
+        pairs = build_contact_pairs(model.mesh, contacts, along, axis)
+    ties = build_contact_pairs(model.mesh, joint.ties, along) if joint.ties else None
     _check_followers(constraints, numbers, cut, pairs, ties)
     held = _hold_cut_faces(joint.held, cut, numbers)
     pairs = _merge_cut_pairs(_hold_pairs(pairs, numbers, held, constraints, cut), cut, numbers)
@@ -138,8 +138,7 @@ def _check_followers(
 def _hold_cut_faces(held: BoolArray, cut: CutFaces | None, numbers: IntArray) -> BoolArray:
     """Held displacements (n_nodes, 3), those of nodes on one cut face as those of their images.
 
-    numbers (n_nodes,): of the nodes in the file. Raises SceneError where an image does not have the directions in which
-    a node is held.
+    Raises SceneError where an image does not have the directions in which a node is held.
     """
     if cut is None:
         return held

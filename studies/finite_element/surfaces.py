@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -122,23 +123,23 @@ class Surface:
         return float(np.sqrt(self.areas_and_normals(coordinates)[0].sum() / len(self.facets)))
 
 
-def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> Surface:
-    """Surface of faces of elements, as `loops_of_faces` has them. Raises SceneError where there is none."""
-    return _surface(mesh, name, *loops_of_faces(mesh, name, elements, faces))
+class Face(NamedTuple):
+    """Face of an element.
 
-
-def loops_of_faces(
-    mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray
-) -> tuple[list[IntArray], list[IntArray]]:
-    """Nodes of faces, corners anticlockwise from outside, then mid-side nodes; and all nodes of their elements.
-
-    name: for messages. elements (n_faces,): element numbers. faces (n_faces,): 1 to 6, the faces S1 to S6 of CalculiX
-    and Abaqus.
-
-    Raises SceneError where there is no such element or face.
+    nodes: corners anticlockwise from outside, then mid-side nodes. element: all nodes of the element. part: its label.
     """
-    loops: list[IntArray] = []
-    behind: list[IntArray] = []
+
+    nodes: IntArray
+    element: IntArray
+    part: str
+
+
+def faces_of_elements(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> list[Face]:
+    """Faces by element numbers (n_faces,) and faces (n_faces,), 1 to 6 for S1 to S6 of CalculiX and Abaqus.
+
+    name: for messages. Raises SceneError where there is no such element or face.
+    """
+    found: list[Face] = []
     left = np.ones(len(elements), dtype=np.bool_)
     for group in mesh.groups:
         table = ELEMENT_KINDS[group.kind].faces
@@ -148,20 +149,25 @@ def loops_of_faces(
         left &= ~own
         for chosen in np.flatnonzero(own):
             if not 1 <= faces[chosen] <= len(table):
-                found = f"surface {name} names face S{faces[chosen]} of element {elements[chosen]} ({group.kind})"
-                raise SceneError("contact", found, f"give faces S1 to S{len(table)}")
-            behind.append(group.nodes[order[place[chosen]]])
-            loops.append(behind[-1][list(table[faces[chosen] - 1])])
+                wrong = f"surface {name} names face S{faces[chosen]} of element {elements[chosen]} ({group.kind})"
+                raise SceneError("contact", wrong, f"give faces S1 to S{len(table)}")
+            element = group.nodes[order[place[chosen]]]
+            found.append(Face(element[list(table[faces[chosen] - 1])], element, group.part))
     if left.any():
         raise SceneError("contact", f"surface {name} names element {elements[left][0]}", "there is no such element")
-    return loops, behind
+    return found
 
 
-def pressure_forces(coordinates: FloatArray, loops: list[IntArray], pressure: float) -> FloatArray:
-    """Consistent nodal forces (3 n_nodes,), N, of a pressure, Pa, into the body; faces as `loops_of_faces` has them."""
+def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> Surface:
+    """Surface of faces, as `faces_of_elements` has them. Raises SceneError where there is none."""
+    return _surface(mesh, name, faces_of_elements(mesh, name, elements, faces))
+
+
+def pressure_forces(coordinates: FloatArray, faces: list[Face], pressure: float) -> FloatArray:
+    """Consistent nodal forces (3 n_nodes,), N, of a pressure, Pa, into the body."""
     forces = np.zeros(coordinates.shape)
     for size, shape in FACE_SHAPES.items():
-        own = np.array([loop for loop in loops if len(loop) == size], dtype=np.int64).reshape(-1, size)
+        own = np.array([face.nodes for face in faces if len(face.nodes) == size], dtype=np.int64).reshape(-1, size)
         points, weights = _TRIANGLE_RULE if size in (3, 6) else _QUAD_RULE
         tangents = np.einsum("pna,fnj->fapj", shape.derivatives(points), coordinates[own])
         outward = np.cross(tangents[:, 0], tangents[:, 1])
@@ -176,8 +182,7 @@ def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
     """
     inside = np.zeros(mesh.n_nodes, dtype=np.bool_)
     inside[nodes] = True
-    chosen = [(loop, element) for loop, element, _ in outer_faces(mesh) if inside[loop].all()]
-    surface = _surface(mesh, name, [loop for loop, _ in chosen], [element for _, element in chosen])
+    surface = _surface(mesh, name, [face for face in outer_faces(mesh) if inside[face.nodes].all()])
     lonely = np.setdiff1d(nodes, surface.nodes)
     if len(lonely):
         found = (
@@ -194,9 +199,9 @@ def surface_of_points(name: str, nodes: IntArray) -> Surface:
     return Surface(name, np.tile(nodes[:, None], 4), np.full((n, 8), -1), np.zeros((n, 4, 2)), np.zeros(n))
 
 
-def outer_faces(mesh: SolidMesh) -> list[tuple[IntArray, IntArray, str]]:
-    """Faces of one element only: nodes, corners anticlockwise from outside; all nodes of the element; its part."""
-    faces: list[tuple[IntArray, IntArray, str]] = []
+def outer_faces(mesh: SolidMesh) -> list[Face]:
+    """Faces of one element only."""
+    faces: list[Face] = []
     keys: list[IntArray] = []
     for group in mesh.groups:
         for face in ELEMENT_KINDS[group.kind].faces:
@@ -204,7 +209,7 @@ def outer_faces(mesh: SolidMesh) -> list[tuple[IntArray, IntArray, str]]:
             n_corners = 3 if len(face) in (3, 6) else 4
             key = np.full((len(nodes), 4), -1)
             key[:, :n_corners] = nodes[:, :n_corners]
-            faces += [(loop, element, group.part) for loop, element in zip(nodes, group.nodes, strict=True)]
+            faces += [Face(loop, element, group.part) for loop, element in zip(nodes, group.nodes, strict=True)]
             keys.append(np.sort(key, axis=1))
     _, first, count = np.unique(np.concatenate(keys), axis=0, return_index=True, return_counts=True)
     return [faces[place] for place in np.sort(first[count == 1])]
@@ -213,19 +218,17 @@ def outer_faces(mesh: SolidMesh) -> list[tuple[IntArray, IntArray, str]]:
 def describe_mesh(mesh: SolidMesh) -> SurfaceMesh:
     """Outer faces of a mesh by their corners, for pictures; triangles repeat their last corner."""
     outer = outer_faces(mesh)
-    corners = np.array([loop[[0, 1, 2, 2] if len(loop) in (3, 6) else [0, 1, 2, 3]] for loop, _, _ in outer])
+    corners = np.array([face.nodes[[0, 1, 2, 2 if len(face.nodes) in (3, 6) else 3]] for face in outer])
     used, quads = np.unique(corners, return_inverse=True)
-    parts = tuple(part for _, _, part in outer)
-    return SurfaceMesh(nodes=mesh.coordinates[used], quads=quads.reshape(corners.shape), parts=parts)
+    return SurfaceMesh(mesh.coordinates[used], quads.reshape(corners.shape), tuple(face.part for face in outer))
 
 
-def _surface(mesh: SolidMesh, name: str, loops: list[IntArray], behind: list[IntArray]) -> Surface:
-    """behind: nodes of the element of each face."""
-    if not loops:
+def _surface(mesh: SolidMesh, name: str, chosen: list[Face]) -> Surface:
+    if not chosen:
         raise SceneError("contact", f"surface {name} has no face", "give at least one face of an element")
     depth = np.full(mesh.n_nodes, np.inf)
     facets, faces, places = [], [], []
-    for loop, element in zip(loops, behind, strict=True):
+    for loop, element, _ in chosen:
         first, second, third = mesh.coordinates[loop[:3]]
         normal = np.cross(second - first, third - first)
         below = (first - mesh.coordinates[element]) @ (normal / np.linalg.norm(normal))

@@ -19,12 +19,9 @@ from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan
 import numpy as np
 
 from solver.model import FloatArray, IntArray
-from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import JointDefinition, MeshModel, Retainer, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
-from studies.finite_element.solid_mesh import check_elements
 from studies.finite_element.surfaces import surface_of_nodes
-from studies.scene_error import SceneError
 from studies.scenes.dovetail_parameters import DovetailParameters
 from studies.scenes.sector import AXIS, block_of, graded, mesh_of_bodies
 
@@ -35,7 +32,7 @@ class Parameters(DovetailParameters):
     Radii of the dovetail and of the blade are measured along the centre line.
     """
 
-    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:
         """The sector as a finite-element model, and what is done with it.
 
         The retainer is a spring on the mean axial relative displacement. A prismatic slot holds the root along its axis
@@ -50,10 +47,6 @@ class Parameters(DovetailParameters):
         m, material = self.mesh, self.material
         bodies = [(_disk_blocks(self), ("disk",) * 3, material), (_blade_blocks(self), ("blade",) * 3, material)]
         solid, (web, post_right, post_left, blade, *_) = mesh_of_bodies(bodies)
-        try:
-            check_elements(solid)
-        except SceneError as error:
-            raise SceneError("mesh", str(m), f"change the geometry: {error.value}") from error
         # Coincident nodes, from the leading to the trailing edge, then from the inner to the outer end. Above the slot
         # bottom and above the root bottom there are m rows of elements before the flank begins.
         flank = slice(m, 2 * m + 1)
@@ -67,26 +60,16 @@ class Parameters(DovetailParameters):
             )
             for name, moving, opposite in zip(("intrados", "extrados"), blade_flanks, disk_flanks, strict=True)
         )
-        held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
-        held[web[0].ravel()] = True
         # The number of axial stations is even: mid-chord lies halfway between the two middle ones.
         n_across, n_axial = blade[-1].shape
         middle = blade[-1][n_across // 2, n_axial // 2 - 1 : n_axial // 2 + 1]
-        tip = SetMotion(middle, _chord_directions(self.tip_stagger)[1])
-        left, right = (
-            np.concatenate([web[:, side], post[1:, side]]).ravel() for side, post in ((0, post_left), (-1, post_right))
-        )
-        pairs = build_contact_pairs(solid.coordinates, solid.numbers, contacts, AXIS)
-        joint = JointDefinition(
-            contacts=contacts,
-            held=held,
-            load=tip,
-            responses={"tip": tip},
-            cut=CutFaces(self.axis, left, right),
-            retainer=Retainer(self.retainer, AXIS),
-            pairs=_arranged(pairs, np.concatenate(blade_flanks), solid.n_nodes),
-        )
-        return self.model_of(solid), joint
+        tip = middle, _chord_directions(self.tip_stagger)[1]
+        left = np.concatenate([web[:, 0], post_left[1:, 0]]).ravel()
+        right = np.concatenate([web[:, -1], post_right[1:, -1]]).ravel()
+        pairs = build_contact_pairs(solid, contacts, AXIS)
+        pairs = _arranged(pairs, np.concatenate(blade_flanks), solid.n_nodes)
+        retainer = Retainer(self.retainer, AXIS)
+        return self.sector_of(solid, contacts, web[0].ravel(), (left, right), tip, retainer, pairs)
 
 
 def _arranged(pairs: ContactPairs, flanks: IntArray, n_nodes: int) -> ContactPairs:

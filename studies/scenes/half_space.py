@@ -178,12 +178,10 @@ def press_body(
 ) -> ReducedModel:
     """Reduced model; displacements are u_N of all pairs, u_T of all pairs, d, and where a force moves the body, s.
 
-    A stroke moves the body whatever force it takes: the motion s is then no unknown, and `C_T^-1 s` a load on u_T.
-
-    With the contact forces lambda of the pairs (N, compression positive), the approach d of the body and its tangential
-    motion s, the relative displacements are `u_N = d - C_N lambda_N`, `u_T = s - C_T lambda_T`. So the stiffnesses are
-    the inverse compliances, between the pairs and the one displacement that moves them all. There is no mass: all is
-    quasi-static, and the frequency is that of the load alone.
+    With the contact forces lambda (N, compression positive), the approach d of the body and its tangential motion s the
+    relative displacements are `u_N = d - C_N lambda_N`, `u_T = s - C_T lambda_T`: the stiffnesses are the inverse
+    compliances, between the pairs and the one displacement that moves them all. There is no mass. Under a stroke s is
+    no unknown, and `C_T^-1 s` a load on u_T.
 
     compliance: normal and tangential one, (n_contact, n_contact), m/N. position (n_contact, 3): m, from the middle.
     area (n_contact,): m2. edge (n_contact,): pairs beside which the half-spaces go on without pairs. name: of the body.

@@ -16,10 +16,10 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from solver.contact.wear_law import WearingWork, wearing_work
+from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.model import FloatArray, ReducedModel
 from solver.model_from_matrices import build_model
-from studies.scene import ExactAnswer, Scene, WearQuestion
+from studies.scene import Scene
 
 _SINGULAR = 1e-9  # 1/r beside an odd number, where G has no bound
 _POINTS = 4001  # in a half period, among which the slowest moment of the motion is sought
@@ -104,47 +104,41 @@ class DenHartogSlider:
         return np.hypot(self.amplitude(friction_force), friction_force / self.stiffness * (g + 4.0 / np.pi * v))
 
 
-@dataclass(frozen=True)
-class WearingSlider:
-    """The slider with one pair that wears; a spring presses the pair, or a constant force.
+def wear_of_slider(
+    slider: DenHartogSlider,
+    mu: float,
+    load: float,
+    normal_stiffness: float,
+    area: float,
+    work: WearingWork,
+    sliding: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Depth worn since the start, m, and normal force, N, of the only pair, each (n,).
 
-    mu: friction coefficient. load: normal force at the start, N. normal_stiffness: k_N of the spring, N/m; 0 for a
-    constant force. area: m2. work: part of the slip work that wears, of the only pair.
+    At each sliding s (n,), 1/Pa, wear coefficient times cycle count, ascending from 0 or above. The depth W follows
+    `dW/ds = X(S, N / area, W) / area` with the normal force `N = load - k_N W`, the slip work of a cycle
+    `S = 4 N X_0(mu N)`, X_0 the amplitude of the motion, and the wearing work X of the law
+    (`solver.contact.wear_law`). With a spring the unknown is z = ln(N / load), `dz/ds = -(k_N / area) X / N`, which
+    stays calm however much is worn.
+
+    mu: friction coefficient. load: at the start, N. normal_stiffness: k_N, N/m; 0 for a constant force. area: m2.
     """
 
-    slider: DenHartogSlider
-    mu: float
-    load: float
-    normal_stiffness: float
-    area: float
-    work: WearingWork
-
-    def worn(self, sliding: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Depth worn since the start, m, and normal force, N, at each sliding (n,), 1/Pa, ascending from 0 or above.
-
-        Sliding: s, wear coefficient times cycle count. The depth W follows `dW/ds = X(S, N / area, W) / area` with the
-        normal force `N = load - k_N W`, the slip work of a cycle `S = 4 N X_0(mu N)`, X_0 the amplitude of the motion,
-        and the wearing work X of the law (`solver.contact.wear_law`). With a spring the unknown is z = ln(N / load),
-        `dz/ds = -(k_N / area) X / N`, which stays calm however much is worn.
-        """
-        if self.load <= 0.0:
-            return np.zeros_like(sliding), np.zeros_like(sliding)
-        if self.normal_stiffness <= 0.0:
-            depth = _integrated(lambda w: self._rate(self.load, w) * self.load, sliding)
-            return depth, np.full_like(sliding, self.load)
-
-        def fall(z: float) -> float:
-            depth = -np.expm1(z) * self.load / self.normal_stiffness
-            return -self.normal_stiffness * self._rate(self.load * max(np.exp(z), _LEAST_FORCE), depth)
-
-        z = _integrated(fall, sliding)
-        return np.abs(np.expm1(z)) * self.load / self.normal_stiffness, self.load * np.exp(z)
-
-    def _rate(self, force: float, depth: float) -> float:
+    def rate(force: float, depth: float) -> float:
         """`dW/ds` over the normal force, 1/N m: of the force, N, and the depth, m."""
-        slip_work = 4.0 * force * float(self.slider.amplitude(np.array(self.mu * force)))
-        worn = self.work.work(np.array([slip_work]), np.array([force]), np.array([depth]))
-        return float(worn[0]) / force / self.area
+        slip_work = 4.0 * force * float(slider.amplitude(np.array(mu * force)))
+        worn = work.work(np.array([slip_work]), np.array([force]), np.array([depth]))
+        return float(worn[0]) / force / area
+
+    if load <= 0.0:
+        return np.zeros_like(sliding), np.zeros_like(sliding)
+    if normal_stiffness <= 0.0:
+        return _integrated(lambda depth: rate(load, depth) * load, sliding), np.full_like(sliding, load)
+    soft = load / normal_stiffness
+    z = _integrated(
+        lambda z: -normal_stiffness * rate(load * max(np.exp(z), _LEAST_FORCE), -np.expm1(z) * soft), sliding
+    )
+    return np.abs(np.expm1(z)) * soft, load * np.exp(z)
 
 
 def _integrated(rate: Callable[[float], float], sliding: FloatArray) -> FloatArray:
@@ -203,22 +197,36 @@ class Parameters(Scene):
             response_names=("mass",),
         )
 
-    def exact_answer(self, asked: WearQuestion) -> ExactAnswer:
-        """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
+    def exact_answer(
+        self,
+        frequency: float,
+        excitation_amplitude: float,
+        wear_coefficients: FloatArray,
+        cycles: FloatArray,
+        law: WearLaw = ARCHARD,
+        worn_depth: float = 0.0,
+        changed: frozenset[str] = frozenset(),
+    ) -> tuple[FloatArray, FloatArray]:
+        """Wear and vibration by Den Hartog's closed form and the differential equation of the wear depth.
 
-        NaN where the mass stops on its way, the frequency is one of the singular ones of the form, the mount is damped
-        or the contact compliant, or a key of the study is changed that the form does not know.
+        The volume worn since the count 0 (n_wear, n_cycles), m3, and the amplitude of the first harmonic of the
+        response (n_wear, n_cycles, 1), m. NaN where the mass stops on its way, the frequency is one of the singular
+        ones of the form, the mount is damped, the contact compliant, or `changed`, keys of a study that differ from
+        their defaults, has one that the form does not know.
+
+        frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts.
+        worn_depth: m, at the count 0.
         """
-        mu, load = self.friction_coefficient, self.normal_load - self.normal_stiffness * asked.worn_depth
-        slider = DenHartogSlider(self.mass, self.stiffness, asked.excitation_amplitude, 2.0 * np.pi * asked.frequency)
+        mu, load = self.friction_coefficient, self.normal_load - self.normal_stiffness * worn_depth
+        slider = DenHartogSlider(self.mass, self.stiffness, excitation_amplitude, 2.0 * np.pi * frequency)
         # the worn state depends on wear coefficient and cycle count through their product alone
-        sliding = np.multiply.outer(asked.wear_coefficients, asked.cycles)
-        known = self.damping == 0.0 and self.contact_stiffness is None and asked.changed <= _KNOWN
+        sliding = np.multiply.outer(wear_coefficients, cycles)
+        known = self.damping == 0.0 and self.contact_stiffness is None and changed <= _KNOWN
         if not (known and slider.holds(mu * max(load, 0.0))):
-            return ExactAnswer(np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan))
-        law, contact = asked.law.begun_at(np.array([asked.worn_depth])), self.reduced_model().contact
+            return np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan)
+        begun, contact = law.begun_at(np.array([worn_depth])), self.reduced_model().contact
         different, places = np.unique(sliding, return_inverse=True)
-        work = wearing_work(law, contact, np.array([mu]))
-        depth, force = WearingSlider(slider, mu, load, self.normal_stiffness, self.area, work).worn(different)
+        work = wearing_work(begun, contact, np.array([mu]))
+        depth, force = wear_of_slider(slider, mu, load, self.normal_stiffness, self.area, work, different)
         response, places = slider.first_harmonic(mu * force), places.reshape(sliding.shape)
-        return ExactAnswer(self.area * depth[places], response[places][..., np.newaxis])
+        return self.area * depth[places], response[places][..., np.newaxis]

@@ -14,13 +14,13 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray, ReducedModel
-from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.element_matrices import Material
-from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions
+from studies.finite_element.cut_faces import CutFaces, CyclicAxis
+from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
+from studies.finite_element.pairing import ContactPairs, ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
-from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
+from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.finite_element.surfaces import describe_mesh
-from studies.scene import N_MODES, NaturalFrequencies, Scene, SurfaceMesh
+from studies.scene import N_MODES, Scene, SurfaceMesh, lowest
 from studies.scene_error import SceneError
 
 _SAME_NODE = 1e-9  # points closer than this, in m, are one node
@@ -53,16 +53,11 @@ class SectorParameters(Scene):
         return pi / self.n_sectors
 
     @property
-    def axis(self) -> CyclicAxis:
-        """The axis of the disk, z."""
-        return CyclicAxis(self.n_sectors, ORIGIN, AXIS)
-
-    @property
     def material(self) -> Material:
         """That of disk and blades."""
         return Material(self.young_modulus, self.poisson_ratio, self.density)
 
-    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:
         """The sector as a finite-element model, and what is done with it.
 
         Raises SceneError where the parameters do not go together.
@@ -75,8 +70,6 @@ class SectorParameters(Scene):
 
     def check(self) -> None:
         """Raises SceneError where parameters do not go together."""
-        most = f"use at most n_sectors // 2 = {self.n_sectors // 2}; more is the same wave turning the other way"
-        wave = (self.nodal_diameter > self.n_sectors // 2, "nodal_diameter", most)
         radii = (
             (
                 getattr(self, inner) >= getattr(self, outer),
@@ -85,21 +78,36 @@ class SectorParameters(Scene):
             )
             for inner, outer in pairwise(self.ASCENDING)
         )
-        for wrong, key, remedy in (wave, *radii, *self.impossible()):
+        for wrong, key, remedy in (*radii, *self.impossible()):
             if wrong:
                 raise SceneError(key, str(getattr(self, key)), remedy)
 
-    def model_of(self, mesh: SolidMesh) -> MeshModel:
-        """The turning mesh."""
+    def sector_of(
+        self,
+        mesh: SolidMesh,
+        contacts: tuple[ContactSurfaces, ...],
+        clamped: IntArray,
+        cut: tuple[IntArray, IntArray],
+        tip: tuple[IntArray, FloatArray],
+        retainer: Retainer | None = None,
+        pairs: ContactPairs | None = None,
+    ) -> tuple[FeModel, JointDefinition]:
+        """The turning mesh, clamped at some nodes, with two cut faces, and what is done with it.
+
+        tip: nodes (n,) and direction (3,) of the excitation and of the response.
+        """
+        held = np.zeros((mesh.n_nodes, 3), dtype=np.bool_)
+        held[clamped] = True
+        load, faces = mean_motion(*tip, mesh.n_nodes), CutFaces(CyclicAxis(self.n_sectors, ORIGIN, AXIS), *cut)
         rotation = Rotation((pi * self.rotation_speed / 30.0) ** 2, ORIGIN, AXIS) if self.rotation_speed else None
-        return MeshModel(mesh, rotation, self.stress_stiffening)
+        joint = JointDefinition(contacts, held, load, {"tip": load}, faces, retainer, pairs=pairs)
+        return FeModel(mesh, rotation, self.stress_stiffening), joint
 
     def build(self, n_harmonics: int) -> ReducedModel:
         """As `build_fe_scene`.
 
-        Stress stiffening takes the stress of the sector with its contacts glued, the usual reference state of a modal
-        analysis with prestress: in the blade it follows from equilibrium alone, and how the contacts share the load
-        matters only beside them. With spin softening it is part of every stiffness, the static one included.
+        Stress stiffening takes the stress of the glued sector: in the blade it follows from equilibrium alone, and how
+        the contacts share the load matters only beside them.
         """
         options = ReductionOptions(self.nodal_diameter, self.stuck_modes, self.loss_factor)
         return build_fe_scene(*self.define_sector(), options, n_harmonics).model
@@ -108,15 +116,12 @@ class SectorParameters(Scene):
         """Outer faces of the sector."""
         return describe_mesh(self.define_sector()[0].mesh)
 
-    def natural_frequencies(self, model: ReducedModel) -> NaturalFrequencies:
+    def natural_frequencies(self, model: ReducedModel) -> dict[int, FloatArray]:
         """With all contacts glued, at all nodal diameters 0..N/2; of a compliant contact those of the model."""
         if self.contact_stiffness is not None:
             return super().natural_frequencies(model)
-        prepared, found = prepare_model(*self.define_sector()), np.full((self.n_sectors // 2 + 1, N_MODES), np.nan)
-        for k, row in enumerate(found):
-            own = glued_frequencies(prepared, k, N_MODES)
-            row[: len(own)] = own
-        return NaturalFrequencies(tuple(range(len(found))), found)
+        prepared = prepare_model(*self.define_sector())
+        return {k: lowest(glued_frequencies(prepared, k, N_MODES)) for k in range(self.n_sectors // 2 + 1)}
 
 
 def mesh_of_bodies(
@@ -124,8 +129,8 @@ def mesh_of_bodies(
 ) -> tuple[SolidMesh, tuple[IntArray, ...]]:
     """Mesh of several bodies in hexahedra with incompatible modes, and node numbers (n_i, n_j, n_k) of all blocks.
 
-    bodies: blocks, the name of each block's part, material. A block is a grid of points (n_i, n_j, n_k, 3), m, whose
-    three directions are right-handed. Points of one body that coincide become one node; those of several do not.
+    bodies: blocks, right-handed grids of points (n_i, n_j, n_k, 3), m, the name of each block's part, material. Points
+    of one body that coincide become one node; those of several do not.
     """
     nodes: list[FloatArray] = []
     grids: list[IntArray] = []

@@ -21,8 +21,7 @@ from pydantic import Field
 
 from solver.model import FloatArray
 from studies.finite_element import surfaces
-from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import JointDefinition, MeshModel, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition
 from studies.finite_element.pairing import ContactSurfaces
 from studies.scenes.sector import SectorParameters, block_of, graded, mesh_of_bodies
 
@@ -46,7 +45,7 @@ class Parameters(SectorParameters):
     shroud_angle: float = Field(35.0, ge=-60, le=60, description="angle of blade and contact faces at the tip, degrees")
     shroud_thickness: float = Field(0.006, gt=0, description="radial thickness of the shroud, m")
 
-    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:
         """The sector as a finite-element model, and what is done with it.
 
         Raises SceneError where the parameters do not go together.
@@ -54,20 +53,12 @@ class Parameters(SectorParameters):
         self.check()
         m, angle = self.mesh, radians(self.shroud_angle)
         solid, (disk, _, shroud) = mesh_of_bodies([(self._blocks(), ("disk", "blade", "shroud"), self.material)])
-        held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
-        held[disk[0].ravel()] = True
-        middle = shroud[-1, m : m + 2, 2 * m - 1 : 2 * m + 1].ravel()
-        tip = SetMotion(middle, np.array([0.0, cos(angle), -sin(angle)]))
         leading = surfaces.surface_of_nodes(solid, "leading face", shroud[:, -1].ravel())
         trailing = surfaces.surface_of_nodes(solid, "trailing face", shroud[:, 0].ravel())
-        joint = JointDefinition(
-            contacts=(ContactSurfaces(leading, trailing, clearance=-self.interference, label="shroud", sector=1),),
-            held=held,
-            load=tip,
-            responses={"tip": tip},
-            cut=CutFaces(self.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
-        )
-        return self.model_of(solid), joint
+        contact = ContactSurfaces(leading, trailing, clearance=-self.interference, label="shroud", sector=1)
+        middle, across = shroud[-1, m : m + 2, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)])
+        cut = disk[:, 0].ravel(), disk[:, -1].ravel()
+        return self.sector_of(solid, (contact,), disk[0].ravel(), cut, (middle, across))
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """As `SectorParameters.impossible`."""

@@ -22,10 +22,9 @@ from pydantic import Field
 
 from solver.model import FloatArray
 from studies.finite_element import surfaces
-from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.element_matrices import Material
-from studies.finite_element.joint_model import JointDefinition, MeshModel, Retainer, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer
 from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.solid_mesh import Material
 from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
 
 
@@ -58,7 +57,7 @@ class Parameters(SectorParameters):
         """Radial height of the roof over the sides of the wedge, m."""
         return (self.damper_half_width - 0.5 * self.platform_gap) * tan(radians(self.roof_angle))
 
-    def define_sector(self) -> tuple[MeshModel, JointDefinition]:
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:
         """The sector as a finite-element model, and what is done with it.
 
         Raises SceneError where the parameters do not go together.
@@ -69,27 +68,19 @@ class Parameters(SectorParameters):
         wedge_material = Material(self.young_modulus, self.poisson_ratio, self.damper_density)
         solid, grids = mesh_of_bodies([blade_body, ([self._wedge()], ("wedge",), wedge_material)])
         disk, _, platform, blade, wedge = grids
-        held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
-        held[disk[0].ravel()] = True
-        tip = SetMotion(blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)]))
 
         def contact(label: str, own: slice, other: slice, sector: int) -> ContactSurfaces:
             first = surfaces.surface_of_nodes(solid, f"roof, {label}", wedge[-1, own].ravel())
             second = surfaces.surface_of_nodes(solid, f"underside, {label}", platform[0, other].ravel())
             return ContactSurfaces(first, second, label=label, sector=sector)
 
-        joint = JointDefinition(
-            contacts=(
-                contact("this platform", slice(m + 1), slice(-m - 1, None), 0),
-                contact("next platform", slice(-m - 1, None), slice(m + 1), 1),
-            ),
-            held=held,
-            load=tip,
-            responses={"tip": tip},
-            cut=CutFaces(self.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
-            retainer=Retainer(self.retention_stiffness, AXIS),
+        contacts = (
+            contact("this platform", slice(m + 1), slice(-m - 1, None), 0),
+            contact("next platform", slice(-m - 1, None), slice(m + 1), 1),
         )
-        return self.model_of(solid), joint
+        middle, across = blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)])
+        cut, retainer = (disk[:, 0].ravel(), disk[:, -1].ravel()), Retainer(self.retention_stiffness, AXIS)
+        return self.sector_of(solid, contacts, disk[0].ravel(), cut, (middle, across), retainer)
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """As `SectorParameters.impossible`."""

@@ -40,25 +40,12 @@ class CompletionIndex:
                 empty[name] = math.nan
         # numpy copies a record field by field, and bytes at once
         self._empty = empty.tobytes()
-        identity = Identity(tuple(scenes), digest(repr(self.kind.descr)))
-        self._names: dict[str, tuple[str, ...]] = {}
-
-        def with_key(task: Task) -> Task:
-            names = task.names(identity)
-            key = digest("task", names)
-            self._names[key] = names
-            return replace(task, key=key)
-
-        self.plan = replace(plan, sweeps=tuple(map(with_key, plan.sweeps)), results=tuple(map(with_key, plan.results)))
-
-    def names(self, task: Task) -> tuple[str, ...]:
-        """Hashes of the results of a task, by place."""
-        return self._names[task.key]
+        self.plan = plan.named(Identity(tuple(scenes), digest(repr(self.kind.descr))))
 
     def _missing(self, task: Task) -> list[int]:
         """Places of a task whose result is not there."""
         there = self.store.keys(STARTS if task.gives_starts else RESULTS)
-        return [place for place, name in enumerate(self._names[task.key]) if name not in there]
+        return [place for place, name in enumerate(task.names) if name not in there]
 
     def is_finished(self, task: Task) -> bool:
         """Whether all results of a task are there."""
@@ -108,7 +95,7 @@ class CompletionIndex:
         """Known start states that are needed, with their sweeps."""
         for sweep in self.plan.sweeps:
             needed = self._needed(sweep)
-            for place, name in enumerate(self._names[sweep.key]):
+            for place, name in enumerate(sweep.names):
                 if place in needed and (start := self.store.read(STARTS, name)) is not None:
                     yield sweep, StartResult.unpack(place, start)
 
@@ -121,7 +108,7 @@ class CompletionIndex:
 
     def add(self, task: Task, result: Result) -> None:
         """Adds a result. What progress there was is forgotten with the last one, but for a history without time."""
-        name = self._names[task.key][result.place]
+        name = task.names[result.place]
         progress = None
         if isinstance(result, StartResult):
             self.store.put(STARTS, name, result.pack())
@@ -153,27 +140,24 @@ class CompletionIndex:
         """Forgets points that were not computed to the end, and start states without a state."""
         without_state: set[tuple[int, int] | None] = set()
         for sweep in self.plan.sweeps:
-            for place, name in enumerate(self._names[sweep.key]):
+            for place, name in enumerate(sweep.names):
                 start = self.store.read(STARTS, name)
                 if start is not None and StartResult.unpack(place, start).n_unknowns == 0:
                     without_state.add((sweep.number, place))
                     self.store.forget(STARTS, name)
                     self.store.forget(PROGRESS, sweep.key)
         for task in self.plan.results:
-            names = self._names[task.key]
-            records, there = self.read_results(names)
-            for name, record, is_there in zip(names, records, there, strict=True):
+            for name, record, is_there in zip(task.names, *self.read_results(task.names), strict=True):
                 if is_there and (record["outcome"] not in COMPLETE or task.waits_for in without_state):
                     self.store.forget(RESULTS, name)
 
     def forget_all(self) -> None:
         """Forgets all points of this study. Results of other studies stay."""
-        for key, names in self._names.items():
-            for name in names:
-                self.store.forget(RESULTS, name)
-                self.store.forget(STARTS, name)
-            self.store.forget(PROGRESS, key)
-            self.store.note_life(key)
+        for task in (*self.plan.sweeps, *self.plan.results):
+            for name in task.names:
+                self.store.forget(STARTS if task.gives_starts else RESULTS, name)
+            self.store.forget(PROGRESS, task.key)
+            self.store.note_life(task.key)
 
     def is_suspect(self, task: Task) -> bool:
         """Whether a run has crashed or was killed while this task was under way and had given nothing."""
@@ -185,12 +169,12 @@ class CompletionIndex:
         A sweep ends before the first of its start states that is not there.
         """
         message = f"{MOST_CRASHES} runs in a row have crashed or were killed while they were at it"
-        given_up = {key for key, number in self.store.crashes.items() if number >= MOST_CRASHES} & self._names.keys()
+        given_up = {key for key, number in self.store.crashes.items() if number >= MOST_CRASHES}
         swept = [sweep for sweep in self.plan.sweeps if sweep.key in given_up]
         lost = {(sweep.number, place) for sweep in swept for place in self._missing(sweep)}
         for task in self.plan.results:
             if task.key in given_up or task.waits_for in lost:
                 for place in self._missing(task):
                     self.add(task, task.failed(place, Outcome.CRASHED, message))
-        for key in given_up:
-            self.store.note_life(key)
+        for sweep in swept:
+            self.store.note_life(sweep.key)

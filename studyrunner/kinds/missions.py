@@ -89,12 +89,7 @@ class Mission(Task):
         """Those of the blocks."""
         return tuple(sorted({block.joint.scene for block in self.blocks}))
 
-    @property
-    def order(self) -> tuple[int, ...]:
-        """One place."""
-        return (0,)
-
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hash of the history: of all blocks with their scenes."""
         blocks = [(identity.joint(block.joint), replace(block, joint=_NO_JOINT)) for block in self.blocks]
         wear = (self.wear_coefficient, self.law, self.first, self.settings)
@@ -133,7 +128,7 @@ class Mission(Task):
         asked = of_solver.MissionRequest(
             blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first
         )
-        yield PointResult(self.points(0), _values(self, integrate_missions(asked, note, self.resume)))
+        yield PointResult(_values(self, integrate_missions(asked, note, self.resume)))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""

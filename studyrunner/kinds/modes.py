@@ -50,7 +50,7 @@ class Mode(JointTask):
         """Indices of the amplitudes in the order in which they are computed."""
         return up_or_down(len(self.amplitudes), self.direction)
 
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
         own = (identity.joint(self.joint), self.mode, self.direction, self.settings, identity.record)
         return tuple(digest("mode", *own, amplitude) for amplitude in self.amplitudes)
@@ -73,7 +73,7 @@ class Mode(JointTask):
                 "outcome": int(found.outcome),
             }
             values = named((*self.variables, *OF_A_MODE_POINT), own, found)
-            yield PointResult(self.points(wanted[place]), values, wanted[place])
+            yield PointResult(values, wanted[place])
 
     def describe(self, place: int) -> str:
         """Where along the amplitude."""

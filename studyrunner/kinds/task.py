@@ -95,12 +95,10 @@ class StartResult:
 class PointResult:
     """The result of one point, or of several points that share it.
 
-    points: indices along the dimensions of the study. values: variables of the result by name, with the dimensions
-    after the axes; NaN, or 0 in whole numbers, where not reached, as are missing variables in the file. progress: of a
-    history that was ended by its time limit.
+    values: variables of the result by name, with the dimensions after the axes; NaN, or 0 in whole numbers, where not
+    reached, as are missing variables in the file. progress: of a history that was ended by its time limit.
     """
 
-    points: tuple[Index, ...]
     values: Mapping[str, Any]
     place: int = 0
     progress: Packed | None = None
@@ -137,7 +135,8 @@ class Task(ABC):
     number: among the sweeps, or the other tasks, of the study. cost: estimated time, s.
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
     known: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
-    key: hash of the task in the file of the run. models: of `scenes`, for a rank that does not have them.
+    names: of the results in the file of a run, by place (`hashes`). key: of the task there.
+    models: of `scenes`, for a rank that does not have them.
     variables: names of the variables in a result. indices: for each place the points of the study that have its result;
         none for start states.
     """
@@ -151,6 +150,7 @@ class Task(ABC):
     n_unknowns: int
     known: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
+    names: tuple[str, ...] = field(default=(), compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
     models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
     variables: tuple[str, ...] = ()
@@ -162,9 +162,9 @@ class Task(ABC):
         """Numbers of the scenes whose models the task needs."""
 
     @property
-    @abstractmethod
     def order(self) -> tuple[int, ...]:
         """Places of all results, in the order in which they are given."""
+        return tuple(range(len(self.indices)))
 
     @property
     def places(self) -> tuple[int, ...]:
@@ -200,7 +200,7 @@ class Task(ABC):
         return self.indices[place] if self.indices else ()
 
     @abstractmethod
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of all inputs of each result, in the order of the places. Equal hashes mean equal results."""
 
     @abstractmethod
@@ -209,7 +209,7 @@ class Task(ABC):
 
     def failed(self, place: int, outcome: int, message: str) -> Result:
         """In place of a result that was not computed."""
-        return PointResult(self.points(place), {"outcome": outcome, "message": message}, place)
+        return PointResult({"outcome": outcome, "message": message}, place)
 
     @abstractmethod
     def describe(self, place: int) -> str:
@@ -303,6 +303,16 @@ class TaskPlan:
     left_out: Mapping[str, int]
     n_points: int
     sweeps: tuple[Task, ...] = ()
+
+    def named(self, identity: Identity) -> TaskPlan:
+        """The plan with the names and keys of its tasks."""
+
+        def with_names(task: Task) -> Task:
+            names = task.hashes(identity)
+            return replace(task, names=names, key=digest("task", names))
+
+        sweeps, results = (tuple(map(with_names, tasks)) for tasks in (self.sweeps, self.results))
+        return replace(self, sweeps=sweeps, results=results)
 
     @cached_property
     def waiting(self) -> Mapping[tuple[int, int], tuple[Task, ...]]:

@@ -18,7 +18,6 @@ from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.task import (
     Identity,
-    Index,
     JointTask,
     Keep,
     PointResult,
@@ -47,53 +46,34 @@ _digest_once = lru_cache(maxsize=16)(digest)
 
 
 @dataclass(frozen=True)
-class ScaledHistory:
-    """A history that is read from an integrated history with scaled slow time, and the points that have this history.
-
-    wear_coefficient: 1/Pa; its ratio to that of the integrated history scales the slow time.
-    step: cycles; the step of the first point where the step does not matter. points: along the dimensions of the study.
-    """
-
-    wear_coefficient: float
-    step: float
-    points: tuple[Index, ...]
-
-
-@dataclass(frozen=True)
 class Integrated:
-    """A history that is integrated, and the histories of other points that are read from it.
+    """A history that is integrated, and histories that are read from it with scaled slow time.
 
-    scheme, largest_depth: as for `steps_of` of the solver. histories: one result each. The first is integrated; it
-    needs the most cycles. unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles.
+    scheme, step (cycles), largest_depth: as for `steps_of` of the solver. wear_coefficients: 1/Pa, of the histories,
+    one result each; the first is the largest, which is integrated. unworn: whether nothing wears, so that the state at
+    cycle 0 is that of all cycles.
     """
 
     scheme: str
+    step: float
     largest_depth: float | None
-    histories: tuple[ScaledHistory, ...]
+    wear_coefficients: tuple[float, ...]
     unworn: bool
 
-    @property
-    def wear_coefficient(self) -> float:
-        """Of the integrated history, 1/Pa."""
-        return self.histories[0].wear_coefficient
-
-    @property
-    def step(self) -> float:
-        """Of the integrated history, cycles."""
-        return self.histories[0].step
-
-    def counts(self, cycles: Sequence[float], scaled: ScaledHistory) -> tuple[float, ...]:
+    def counts(self, cycles: Sequence[float], number: int) -> tuple[float, ...]:
         """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
-        if scaled == self.histories[0] and not self.unworn:
+        if number == 0 and not self.unworn:
             # also where both wear coefficients are 0
             return tuple(cycles)
-        ratio = 0.0 if self.unworn else scaled.wear_coefficient / self.wear_coefficient
+        ratio = 0.0 if self.unworn else self.wear_coefficients[number] / self.wear_coefficients[0]
         return tuple(ratio * cycle for cycle in cycles)
 
-    def wear(self, scaled: ScaledHistory) -> tuple[float, float | None]:
-        """Wear coefficient of a history, and its step where the step matters."""
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What decides the integrated history: scheme and step only where they matter."""
         own_steps = self.unworn or self.scheme in OWN_STEPS or self.largest_depth is not None
-        return scaled.wear_coefficient, None if own_steps else scaled.step
+        scheme, step = "" if self.unworn else self.scheme, None if own_steps else self.step
+        return (self.wear_coefficients[0], step, scheme, self.unworn, self.largest_depth)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +109,7 @@ class Sweep(_FromRest):
         """Indices of the frequencies in the order of the sweep."""
         return up_or_down(len(self.frequencies), self.direction)
 
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the start states."""
         return tuple(self.name_of_start(identity, frequency) for frequency in self.frequencies)
 
@@ -207,12 +187,7 @@ class History(_FromRest):
     @property
     def results(self) -> tuple[tuple[Integrated, int], ...]:
         """For each place the integrated history, and the number among those that are read from it."""
-        return tuple((each, number) for each in self.integrated for number in range(len(each.histories)))
-
-    @property
-    def order(self) -> tuple[int, ...]:
-        """One place for each history."""
-        return tuple(range(len(self.results)))
+        return tuple((each, number) for each in self.integrated for number in range(len(each.wear_coefficients)))
 
     @property
     def waits_for(self) -> tuple[int, int]:
@@ -222,12 +197,7 @@ class History(_FromRest):
     @property
     def wear_coefficient(self) -> float:
         """Of the integrated histories, 1/Pa."""
-        return self.integrated[0].wear_coefficient
-
-    def points(self, place: int) -> tuple[Index, ...]:
-        """Points that have the history at a place."""
-        integrated, number = self.results[place]
-        return integrated.histories[number].points
+        return self.integrated[0].wear_coefficients[0]
 
     @property
     def cost_keys(self) -> CostKeys:
@@ -246,16 +216,14 @@ class History(_FromRest):
         cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else COST_AT_REST))
         return replace(self, start=result.start, cost=cost, n_unknowns=n_unknowns, moves=result.moves)
 
-    def names(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the histories: of their start state, and of all that is done with it."""
         start = self.name_of_start(identity, self.frequency)
         kept = _digest_once(identity.record, self.cycles, self.loops, self.until, self.to_the_end)
-        found = []
-        for each, number in self.results:
-            scheme = "" if each.unworn else each.scheme
-            own = (*each.wear(each.histories[0]), scheme, each.unworn, each.largest_depth, self.law)
-            found.append(digest("history", start, kept, own, number > 0, each.wear(each.histories[number])))
-        return tuple(found)
+        return tuple(
+            digest("history", start, kept, self.law, each.identity, number > 0, each.wear_coefficients[number])
+            for each, number in self.results
+        )
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """All histories, read from those that are integrated, as far as these went."""
@@ -282,10 +250,10 @@ class History(_FromRest):
             counts = self.to_the_end
         else:
             # a history begins at cycle 0, whether that count is kept or not
-            read = (integrated.counts(self.cycles, scaled) for scaled in integrated.histories)
+            read = (integrated.counts(self.cycles, number) for number in range(len(integrated.wear_coefficients)))
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
         return WearRequest(
-            integrated.wear_coefficient,
+            integrated.wear_coefficients[0],
             steps_of(integrated.scheme, integrated.step, self.settings.rtol, integrated.largest_depth),
             counts,
             law=self.law,

@@ -17,7 +17,7 @@ from solver.contact.wear_law import WearLaw
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, Index, Joint, TaskPlan, grid, joint_of, n_unknowns_of, settings_at
-from studyrunner.kinds.wear import OWN_STEPS, History, Integrated, ScaledHistory, Sweep
+from studyrunner.kinds.wear import OWN_STEPS, History, Integrated, Sweep
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.study import Study
@@ -57,6 +57,9 @@ class _Point(NamedTuple):
     at: Index
 
 
+_Shared = tuple[Integrated, tuple[tuple[Index, ...], ...]]
+"""A history that is integrated, and the points of each history that is read from it."""
+
 _Starts = dict[float, dict[WearLaw, list[_Point]]]
 """Points by frequency and wear law, in the order of the study."""
 
@@ -86,33 +89,34 @@ def build_tasks(
             for position, frequency in enumerate(frequencies):
                 for law, points in starts[frequency].items():
                     shared = _share_histories(study, points, causes)
-                    for integrated in _together(study, shared):
-                        histories.append(_history(study, len(histories), case, sweep, position, law, integrated))
+                    for together in _together(study, shared):
+                        histories.append(_history(study, len(histories), case, sweep, position, law, together))
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
     return TaskPlan(tuple(histories), left_out, study.n_points, tuple(sweeps))
 
 
 def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet) -> dict[_Case, _Starts]:
     """Points that one sweep reaches."""
-    cases: dict[_Case, _Starts] = {}
+    cases, own_axes = dict[_Case, _Starts](), study.own_axes
     lines = [(at, settings_at(study, at)) for at in grid(study, "excitation_amplitude", "sweep")]
     for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
-        choices = list(itertools.product(*(range(len(getattr(axes, name))) for name in _OF_HISTORY)))
+        sizes = (range(len(getattr(axes, name))) for name in _OF_HISTORY)
+        choices = [dict(zip(_OF_HISTORY, choice, strict=True)) for choice in itertools.product(*sizes)]
         for at, settings in lines:
             amplitude, direction = axes.excitation_amplitude[at["excitation_amplitude"]], axes.sweep[at["sweep"]]
             starts = cases.setdefault(_Case(joint, amplitude, direction, settings), {})
             for place, frequency in enumerate(axes.frequency):
                 points = starts.setdefault(frequency, {}).setdefault(law, [])
                 for choice in choices:
-                    wear, step, scheme = choice
-                    places = {**at, "frequency": place, **dict(zip(_OF_HISTORY, choice, strict=True))}
-                    index = (*(places[name] for name in study.own_axes), *part.place)
-                    points.append(_Point(axes.wear_coefficient[wear], axes.step[step], axes.scheme[scheme], index))
+                    places = {**at, "frequency": place, **choice}
+                    wear, step, scheme = (getattr(axes, name)[index] for name, index in choice.items())
+                    at_axes = (*(places[name] for name in own_axes), *part.place)
+                    points.append(_Point(wear, step, scheme, at_axes))
     return cases
 
 
-def _share_histories(study: Study, points: Sequence[_Point], causes: Counter[str]) -> Iterator[Integrated]:
+def _share_histories(study: Study, points: Sequence[_Point], causes: Counter[str]) -> Iterator[_Shared]:
     """The histories to integrate from a start state; with `shortcuts = false` only equal points share one.
 
     causes: numbers of points that are not computed alone, by reason; those of these points are added.
@@ -125,15 +129,10 @@ def _share_histories(study: Study, points: Sequence[_Point], causes: Counter[str
         for point in sorted(alike, key=lambda point: -point.wear_coefficient):
             by_wear.setdefault(point.wear_coefficient, []).append(point)
         first = next(iter(by_wear.values()))[0]
-        yield Integrated(
-            first.scheme,
-            study.slow_time.largest_depth if first.scheme == "explicit" else None,
-            tuple(
-                ScaledHistory(wear_coefficient, same[0].step, tuple(point.at for point in same))
-                for wear_coefficient, same in by_wear.items()
-            ),
-            unworn=cause in ("cycles", "unworn"),
-        )
+        depth = study.slow_time.largest_depth if first.scheme == "explicit" else None
+        unworn = cause in ("cycles", "unworn")
+        integrated = Integrated(first.scheme, first.step, depth, tuple(by_wear), unworn)
+        yield integrated, tuple(tuple(point.at for point in same) for same in by_wear.values())
         n_different = len({point[:3] for point in alike})
         causes.update({cause: n_different - 1, "equal": len(alike) - n_different})
 
@@ -153,35 +152,31 @@ def _group(study: Study, point: _Point) -> tuple[str, Hashable]:
     return "alone", point[:3]
 
 
-def _together(study: Study, shared: Iterator[Integrated]) -> Iterator[tuple[Integrated, ...]]:
+def _together(study: Study, shared: Iterator[_Shared]) -> Iterator[tuple[_Shared, ...]]:
     """The histories by task."""
-    groups: dict[object, list[Integrated]] = {}
+    groups: dict[object, list[_Shared]] = {}
     for each in shared:
-        alone = each.unworn or not study.solver.shortcuts
-        groups.setdefault(each if alone else each.wear_coefficient, []).append(each)
+        alone = each[0].unworn or not study.solver.shortcuts
+        groups.setdefault(each if alone else each[0].wear_coefficients[0], []).append(each)
     for group in groups.values():
         for begin in range(0, len(group), MOST_TOGETHER):
             yield tuple(group[begin : begin + MOST_TOGETHER])
 
 
 def _history(
-    study: Study,
-    number: int,
-    case: _Case,
-    sweep: Sweep,
-    position: int,
-    law: WearLaw,
-    integrated: tuple[Integrated, ...],
+    study: Study, number: int, case: _Case, sweep: Sweep, place: int, law: WearLaw, together: tuple[_Shared, ...]
 ) -> History:
+    integrated, points = zip(*together, strict=True)
     cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
     steps = [(each.scheme, each.step) for each in integrated]
     return History(
         number=number,
         law=law,
         sweep=sweep.number,
-        position=position,
-        frequency=sweep.frequencies[position],
+        position=place,
+        frequency=sweep.frequencies[place],
         integrated=integrated,
+        indices=tuple(itertools.chain.from_iterable(points)),
         cycles=study.output_counts,
         variables=tuple(study.recorded),
         loops=study.outputs.loops,

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from solver.results.history import WearHistory, describe_cut_off, judge, last_error
+from solver.results.history import WearHistory, judge, last_error
 from studyrunner.kinds.task import PointResult, deepest, describe_target, first_harmonic, named
 from studyrunner.kinds.wear import History, Integrated
-from studyrunner.units import describe_reach, show_count
+from studyrunner.units import describe_reach
 from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10
@@ -28,10 +28,9 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
     the end of the integrated history. What was computed of a history that ends early is kept. Effort is that of the
     integrated history.
     """
-    scaled = integrated.histories[place]
-    slower = scaled.wear_coefficient / integrated.wear_coefficient if place else 1.0
+    slower = integrated.wear_coefficients[place] / integrated.wear_coefficients[0] if place else 1.0
     endless = task.to_the_end is not None and not integrated.unworn
-    counts = history.cycles if endless else np.array(integrated.counts(task.cycles, scaled))
+    counts = history.cycles if endless else np.array(integrated.counts(task.cycles, place))
     rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
     known = rows[reached]
@@ -54,7 +53,8 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
         last = asked if whole else min(last, asked)
     depths = history.wear_depth[known]
     if not message and known.size and not outcome.complete:
-        message = _end_of_shared(task, history, outcome, slower, known, last)
+        end = math.inf if task.to_the_end is not None else task.cycles[-1]
+        message = describe_reach(last, end, float(history.worn_volume_error[known[-1]]))
     own: dict[str, Any] = {
         "outcome": int(outcome),
         "jump_cycle": jump,
@@ -67,22 +67,7 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
         "message": message or (describe_target(task.until, target, "cycle", whole=whole) if known.size else ""),
     }
     values = _at_counts(history, task.variables, slower, rows, reached) | named(tuple(KEPT), own, history)
-    return PointResult(scaled.points, values, place)
-
-
-def _end_of_shared(
-    task: History, history: WearHistory, outcome: Outcome, slower: float, known: NDArray[np.intp], last: float
-) -> str:
-    """How far a history has come that ended before its last count, in cycles of its own.
-
-    slower: wear coefficient over that of the integrated history. known: its rows. last: its last count.
-    """
-    if outcome is Outcome.NO_FINAL_STATE:
-        return f"at cycle {show_count(last)} the joint wears on at {slower * history.wear_rate[-1]:.6g} m3 a cycle"
-    if outcome is Outcome.CONTACT_CUT_OFF:
-        return describe_cut_off(history.cut_off_cycle / slower)
-    worn = float(history.worn_volume_error[known[-1]])
-    return describe_reach(last, math.inf if task.to_the_end is not None else task.cycles[-1], worn)
+    return PointResult(values, place)
 
 
 def _at_counts(

@@ -97,7 +97,7 @@ def _keys(shape: Sequence[int], completion: CompletionIndex) -> NDArray[np.bytes
     keys = np.zeros(math.prod(shape), _KEY_TYPE)
     there = completion.store.keys(RESULTS)
     for task in completion.plan.results:
-        for place, key in enumerate(completion.names(task)):
+        for place, key in enumerate(task.names):
             if key in there:
                 keys[np.ravel_multi_index(np.transpose(task.points(place)), shape)] = key.encode()
     return keys

@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.scene import ExactAnswer, WearQuestion, as_scene, stuck_frequencies
+from studies.scene import as_scene, stuck_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
 from studyrunner.scene.scene_set import SceneSet, along_axes, find_scenes
@@ -70,10 +70,11 @@ def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
     bundled = scene.is_bundled and as_scene(scene.parameters)
     found = bundled.natural_frequencies(model) if bundled else stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()
-    labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
-    yield SmallArray("natural_frequency", entry.dimensions, found.frequencies, entry)
-    for name, values in labels.items():
-        yield SmallArray(name, (name,), np.array(values, dtype=np.int32), COORDINATES[name])
+    values = np.array(list(found.values()))
+    labels = {"nodal_diameter": list(found), "mode": range(1, values.shape[1] + 1)}
+    yield SmallArray("natural_frequency", entry.dimensions, values, entry)
+    for name, numbers in labels.items():
+        yield SmallArray(name, (name,), np.array(numbers, dtype=np.int32), COORDINATES[name])
 
 
 @dataclass(frozen=True)
@@ -150,9 +151,8 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     answers = [_answers(part.study) for part in parts_of(study)]
     others = (*(1,) * (len(study.own_axes) - 3), *(len(values) for values in study.axes_of_parts.values()))
     variables = []
-    for name, entry in SCENE["exact"].items():
-        key = name.removeprefix("exact_")
-        values = np.array([[[getattr(each, key) for each in row] for row in part] for part in answers])
+    for number, (name, entry) in enumerate(SCENE["exact"].items()):
+        values = np.array([[[each[number] for each in row] for row in part] for part in answers])
         # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
         values = np.moveaxis(values, (1, 3, 2), (0, 1, 2))
         values = values.reshape(*values.shape[:3], *others, *values.shape[4:])
@@ -180,17 +180,15 @@ def _changed(study: Study) -> frozenset[str]:
     return frozenset(changed)
 
 
-def _answers(study: Study) -> list[list[ExactAnswer]]:
-    """Exact answers of a part of a study, for all wear coefficients, by frequency and excitation amplitude."""
+def _answers(study: Study) -> list[list[Any]]:
+    """Worn volume and response of a part of a study, for all wear coefficients, by frequency and amplitude."""
     axes, changed = study.axes, _changed(study)
     (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
     counts, given = np.array(study.output_counts), np.array(axes.wear_coefficient)
 
-    def answer(frequency: float, amplitude: float) -> ExactAnswer:
-        asked = WearQuestion(frequency, amplitude, given, counts, study.wear.as_law, depth, changed)
-        return as_scene(study.scene.parameters).exact_answer(asked)
-
-    return [[answer(one, other) for other in axes.excitation_amplitude] for one in axes.frequency]
+    scene: Any = study.scene.parameters
+    rest = (given, counts, study.wear.as_law, depth, changed)
+    return [[scene.exact_answer(one, other, *rest) for other in axes.excitation_amplitude] for one in axes.frequency]
 
 
 def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:

@@ -229,7 +229,8 @@ def _stuck_frequency(model: ReducedModel) -> float:
         found = stuck_frequencies(model)
     except SceneError:
         return math.nan
-    return float(found.frequencies[found.nodal_diameters.index(model.nodal_diameter), 0])
+    # of a wave that travels backwards, those of its image
+    return float(found[min(model.nodal_diameter, abs(model.n_sectors - model.nodal_diameter))][0])
 
 
 def largest_harmonics(model: ReducedModel) -> int | None:

@@ -88,13 +88,15 @@ def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
 def plan_scenes(study: Study, say: Callable[[str], None]) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
     """The scenes of a study, facts of each, or of one that is as large, and the time, s, for building the others.
 
-    Scenes that differ only in numbers with a fraction are taken to have the same sizes; at most eight are built. Raises
-    UserError where a scene is wrong.
+    Scenes that differ only in numbers with a fraction are taken to have the same sizes, but for the blocks of a
+    mission; at most eight are built. Raises UserError where a scene is wrong.
     """
     scenes, built = find_scenes(study), dict[str, SceneFacts]()
     began, facts = time.monotonic(), []
     for number, each in enumerate(scenes.studies):
-        sizes = str([value for _, value in each.scene.parameters if not isinstance(value, float)])
+        # the blocks of a mission have the same pairs, or are refused
+        is_block = bool(study.mission) and number in scenes.of_blocks[0]
+        sizes = str([value for _, value in each.scene.parameters if is_block or not isinstance(value, float)])
         if sizes not in built and len(built) < _MOST_PLANNED:
             say(f"building scene {number + 1} of {len(scenes.studies)}")
             with keys_as_given(keys_below_axes(study.scene_axes)):

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
 
 from studies.fe_models.model_files import ModelFiles
+from studies.fe_models.text import check_there
 from studies.scene import ContactStiffness, as_scene
 from studies.scene_error import SceneError
 from studies.scenes import scene_parameters
@@ -136,12 +137,18 @@ class Origin:
     scene: SceneSection | None = None
 
 
-def parameters_of(model: object, source: str) -> type[BaseModel]:
-    """What [scene] consists of beside `model` and `worn`. Raises UserError where there is no such scene."""
+def parameters_of(model: object, source: str, folder: Path | None = None) -> type[BaseModel]:
+    """What [scene] consists of beside `model` and `worn`. Raises UserError where there is no such scene.
+
+    folder: relative paths start here; None where a result holds the scene.
+    """
     if not isinstance(model, str):
         remedy = "give a bundled scene or the path of a scene file, in quotes"
         raise UserError(source, "scene.model", model, remedy if model is not None else f"missing: {remedy}")
     if _names_model(model):
+        if folder is not None:  # a file that is missing is named before keys that are
+            with scene_errors(source, None):
+                check_there(folder / model)
         from studies.fe_models.from_files.parameters import Parameters  # where it is used: it takes a while to load
 
         return Parameters
@@ -191,10 +198,10 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
 
 def _in_file(scene: SceneSection, path: Path, group: str, origin: Origin) -> SceneSection:
     """The scene in a file, once it is known that it can be read at all."""
-    from studies.scene_file import has_mesh
+    from studies.scene_file import read_mesh
 
     with scene_errors(origin.source, path):
-        offers = scene.offers or (("mesh",) if has_mesh(path, group) else ())
+        offers = scene.offers or (("mesh",) if read_mesh(path, group) is not None else ())
     return scene.model_copy(update={"path": path, "group": group, "offers": offers})
 
 

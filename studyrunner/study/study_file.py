@@ -116,7 +116,7 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     """
     source, tables = origin.source, _tables_of(table, origin.source)
     model, worn = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
-    kind = parameters_of(model, source)
+    kind = parameters_of(model, source, origin.path.parent if origin.archived is None else None)
     worn = None if worn is None else read_worn(worn, source, origin.path.parent)
     solver_axes = tuple(key for key in SOLVER_AXES if key in tables["axes"])
     axes = take_axes(tables, kind, source)

@@ -115,7 +115,7 @@ def replay(
         else:
             seconds = history_seconds(task)
             longest_way = max(longest_way, ways[task.sweep, task.position] + seconds)
-            points = (PointResult(task.points(place), {"outcome": 0}, place) for place in task.order)
+            points = (PointResult({"outcome": 0}, place) for place in task.order)
             results = [(point, seconds / task.n_results) for point in points]
         for result, seconds in results:
             now += seconds

@@ -13,7 +13,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from studies import build_scene
-from studies.scenes.sdof_slider import DenHartogSlider, WearingSlider
+from studies.scenes.sdof_slider import DenHartogSlider, wear_of_slider
 from tests.solver.models import assert_same, march_wear
 from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
 from tests.studies.half_space_twin import limit_depth
@@ -50,8 +50,8 @@ def test_a_wear_that_is_not_reached_changes_nothing():
 
 def exact_count(frequency, depth):
     """Cycles until the slider is worn so deep."""
-    pair = WearingSlider(DenHartogSlider(0.1, 1.6e5, 10.0, 2 * np.pi * frequency), 0.5, 10.0, 1e5, AREA, ARCHARDS_WORK)
-    return brentq(lambda n: pair.worn(WEAR * np.array([0.0, n]))[0][1] - depth, 1.0, 1e6)
+    pair = DenHartogSlider(0.1, 1.6e5, 10.0, 2 * np.pi * frequency), 0.5, 10.0, 1e5, AREA, ARCHARDS_WORK
+    return brentq(lambda n: wear_of_slider(*pair, WEAR * np.array([0.0, n]))[0][1] - depth, 1.0, 1e6)
 
 
 def exact_shift(frequency, depth):

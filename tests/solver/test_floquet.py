@@ -54,7 +54,7 @@ def state_of(kind, seed, damping=1.0):
 
 
 def marched(joint, at, n_samples):
-    return multipliers_of(build_monodromy(joint, joint.model.linear[0], at, n_samples), every=True)
+    return multipliers_of(build_monodromy(joint, at, n_samples), every=True)
 
 
 def largest(multipliers):
@@ -168,7 +168,7 @@ def test_the_largest_multiplier_by_products_is_that_of_all():
     balance, predicted = random_balance(random_model(4, ("3d",) * 6, 12), SolverSettings(3, 24), 4, wear=False)
     at = balance.evaluate(predicted)
     assert switching_pairs(at)[0].any()
-    monodromy = build_monodromy(balance.joint, balance.joint.model.linear[0], at, 64)
+    monodromy = build_monodromy(balance.joint, at, 64)
     every, some = multipliers_of(monodromy, every=True), multipliers_of(monodromy, every=False)
     assert np.abs(some).max() == pytest.approx(np.abs(every).max(), rel=1e-3)
 
@@ -183,7 +183,7 @@ def test_the_march_is_of_second_order_for_the_structure_alone():
     flow = np.vstack([np.eye(len(lower), 2 * len(lower), len(lower)), lower])
     exact = np.abs(np.exp(2.0 * np.pi / balance.joint.omega * np.linalg.eigvals(flow))).max()
     errors = [
-        abs(np.abs(multipliers_of(build_monodromy(balance.joint, linear, at, n_samples), every=True)).max() - exact)
+        abs(np.abs(multipliers_of(build_monodromy(balance.joint, at, n_samples), every=True)).max() - exact)
         for n_samples in (512, 1024, 2048)
     ]
     assert errors[1] < 0.3 * errors[0]

@@ -184,20 +184,6 @@ def test_a_small_travelling_wave_has_the_mode_of_the_glued_sector(nodal_diameter
     assert found.damping_ratio[0] == pytest.approx(0.5 * 5e-5 * omega, rel=1e-9)
 
 
-@pytest.mark.slow
-def test_wear_opens_the_joint_as_a_gap_does():
-    model = foot()
-    depth = 2e-6  # m; 20 of the 50 N are left
-    worn = backbone(model, FOOT_AMPLITUDES[2], 0.5, wear_depth=[depth], settings=FIXED)
-    with_gap = replace(model, contact=replace(model.contact, gap=np.array([depth])))
-    as_gap = backbone(with_gap, FOOT_AMPLITUDES[2], 0.5, settings=FIXED)
-    np.testing.assert_array_equal(worn.damping_ratio, as_gap.damping_ratio)
-    # the mode depends on the amplitude over the normal force alone
-    less = backbone(model, FOOT_AMPLITUDES[2] * 50.0 / 30.0, 0.5, settings=FIXED)
-    assert worn.damping_ratio[0] == pytest.approx(less.damping_ratio[0], rel=1e-2)
-    assert worn.frequency[0] == pytest.approx(less.frequency[0], rel=1e-3)
-
-
 def test_what_has_no_mode_says_so():
     for model, asked, said in ((foot(), {"mode": 4}, "fewer linear modes"), (slider(), {}, 'sweep = "down"')):
         found = backbone(model, 1e-3, 0.5, **asked)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from solver import build_model
 from solver.clock import computing_time
 from solver.contact.coulomb import SLIP
 from solver.harmonic_balance.dlft import Balance
@@ -16,9 +17,10 @@ from solver.newton import linear_solver
 from solver.newton.krylov import STAGNATION_PRODUCTS, build_correction, solve_gmres
 from solver.newton.linear_solver import DENSE_UNKNOWNS, DenseFactor, JacobianSolver, build_factor
 from solver.newton.period_preconditioner import build_period_factor, stiffness_of_most
-from solver.newton.run import Bordered, bordered_step, solve_newton
+from solver.newton.run import Bordered, Run, bordered_step, solve_newton
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
+from solver.structure.joint import build_case
 from tests.solver.models import PRELOAD, random_balance, random_model
 
 
@@ -61,14 +63,13 @@ def test_a_cycle_of_plain_newton_is_broken():
     for point, expected in zip(problem.calls[1:4], (-4.0, 4.0, -4.0), strict=True):
         assert point == pytest.approx(expected * np.ones(3))
     assert result.converged
-    assert result.unknown == pytest.approx(np.zeros(3), abs=1e-10)
+    assert result.evaluation.point == pytest.approx(np.zeros(3), abs=1e-10)
 
 
 def test_where_there_is_no_solution_the_best_point_is_returned():
     problem = Problem(lambda x: x**2 + 1.0, lambda x: np.diag(2 * x))
     result = problem.solve([1.3])
     assert not result.converged
-    assert np.array_equal(result.evaluation.point, result.unknown)
     assert result.evaluation.scaled_residual() == min(np.linalg.norm(x**2 + 1) for x in problem.calls)
 
 
@@ -78,7 +79,7 @@ def test_a_residual_that_is_not_finite_sends_the_iteration_back():
     result = problem.solve([10.0], 1e-12)
     assert problem.calls[1][0] < 0.0
     assert result.converged
-    assert result.unknown[0] == pytest.approx(1.0, rel=1e-10, abs=0.0)
+    assert result.evaluation.point[0] == pytest.approx(1.0, rel=1e-10, abs=0.0)
 
 
 def test_compiling_takes_no_computing_time():
@@ -268,3 +269,12 @@ def test_a_bordered_step_is_that_of_the_whole_jacobian(kinds):
     assert step == pytest.approx(wanted, rel=1e-6, abs=1e-6 * np.abs(wanted).max())
     reduced = problem.own - rows.reshape(2, -1) @ np.linalg.solve(jacobian, by_values)
     assert found == pytest.approx(reduced, rel=1e-6, abs=1e-6)
+
+
+def test_a_direction_without_any_stiffness_is_left_alone():
+    """A free mass on a slider without friction: the Jacobian is singular, and the mean position arbitrary."""
+    model = build_model([[1.0]], None, [[0.0]], [[-1, 0, -1]], 1e-4, load_harmonic=[1.0], normal_load=10.0)
+    joint = build_case(model, 0.0, 1.0, SMALL).joint(1.0, 3.0)
+    end = Run(1e-10).solve(Balance(joint, np.zeros((1, 2)), np.zeros(1)), np.zeros((1, 7)))
+    assert end.converged
+    assert end.evaluation.displacement_h[0, 1, :3] == pytest.approx([0.0, -3.0, 0.0], abs=0.1)

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import Failure
 from solver.newton.run import Run
-from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from studies.model_check import check_model
@@ -38,7 +38,7 @@ def found(seed):
     case = build_case(scene.model, scene.friction, omega, SETTINGS)
     unworn = np.zeros(scene.model.contact.n_contact)
     point = solve_first_state(case, omega, scene.amplitude, unworn, Run(case.settings.tolerance))
-    if isinstance(point, Outcome):
+    if isinstance(point, Failure):
         return None
     return scene, case.joint(omega, scene.amplitude), point
 

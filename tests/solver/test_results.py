@@ -105,18 +105,11 @@ WEAR = 1.1e-11  # 1/Pa
 CYCLES = np.array([0.0, 2000.0, 8000.0, 14000.0, 16000.0])
 
 
-@lru_cache
-def slider_loops(scheme, *rows):
-    """History of the slider, counts by their places in `CYCLES`, and its loops."""
-    model, settings = scene("sdof_slider", 9), SolverSettings(harmonics=9, samples=256)
-    (start,) = branch_states(model, 0.5, 10.0, [2 * np.pi * 160.0], settings)
-    cycles = CYCLES[list(rows)]
-    return march_wear(model, 0.5, start, WEAR, 8000.0, scheme, cycles, settings, loops=(0,))
-
-
 @pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
 def test_the_loop_of_a_sliding_mass_is_a_rectangle_of_the_energy_that_friction_takes(scheme):
-    history = slider_loops(scheme, 0, 1, 2, 3, 4)
+    model, settings = scene("sdof_slider", 9), SolverSettings(harmonics=9, samples=256)
+    (start,) = branch_states(model, 0.5, 10.0, [2 * np.pi * 160.0], settings)
+    history = march_wear(model, 0.5, start, WEAR, 8000.0, scheme, CYCLES, settings, loops=(0,))
     motion, force = history.loop_displacement[:, 0], history.loop_force[:, 0]
     assert motion.shape == force.shape == (CYCLES.size, LOOP_PHASES, 3)
     normal = 10.0 - 1e5 * history.wear_depth[:, 0]
@@ -162,18 +155,6 @@ def test_loops_of_a_joint_keep_the_laws():
     distance = np.linalg.norm(motion[..., :, None, :] - motion[..., None, :, :], axis=-1).max(axis=(-2, -1))
     slips = history.slip_range > 0.5 * history.slip_range.max()
     assert distance[slips] == pytest.approx(history.slip_range[slips], rel=0.1, abs=0.0)
-
-
-def test_between_steps_loops_are_interpolated_like_all_else():
-    ends, between = slider_loops("implicit", 0, 2, 4), slider_loops("implicit", 0, 1, 2, 3, 4)
-    shares = (between.worn_volume[[1, 3]] - ends.worn_volume[:2]) / np.diff(ends.worn_volume)
-    for name in ("loop_displacement", "loop_force", "mean_pressure"):
-        whole, inner = getattr(ends, name), getattr(between, name)
-        scale = np.abs(whole).max()
-        assert inner[[0, 2, 4]] == pytest.approx(whole, rel=0.0, abs=1e-14 * scale)
-        for row, start, share in zip((1, 3), whole[:2], shares, strict=True):
-            expected = start + share * (whole[row // 2 + 1] - start)
-            assert inner[row] == pytest.approx(expected, rel=0.0, abs=1e-12 * scale)
 
 
 # --- outcomes ---

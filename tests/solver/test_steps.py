@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from solver import build_model
-from solver.accuracy.harmonic_levels import left_out
-from solver.accuracy.resolved_state import Estimate
+from solver.accuracy.resolved_state import Estimate, left_out
 from solver.continuation.first_state import solve_static_state
 from solver.continuation.natural import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.harmonic_balance.dlft import Balance

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver.harmonic_balance.state import Failure
 from solver.loading_history import frequency_sweep
 from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
@@ -130,7 +131,7 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
 def test_a_sweep_that_finds_no_state_has_nothing_to_keep(monkeypatch):
     def in_vain(*given):
         given[-1].budget.iterations += 1000
-        return Outcome.STATIC_FAILED
+        return Failure(Outcome.STATIC_FAILED)
 
     monkeypatch.setattr(frequency_sweep, "solve_first_state", in_vain)
     kept: list[Packed | str] = []

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from studies.finite_element import surfaces
-from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene
 from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
 from studies.scenes import shrouded_sector
@@ -17,7 +17,7 @@ def stubby(n_sectors: int) -> shrouded_sector.Parameters:
     return shrouded_sector.Parameters(n_sectors=n_sectors, shroud_angle=20, rotation_speed=0.0, **size)
 
 
-def whole_ring(model: MeshModel, joint: JointDefinition) -> tuple[MeshModel, JointDefinition]:
+def whole_ring(model: FeModel, joint: JointDefinition) -> tuple[FeModel, JointDefinition]:
     """The ring of a sector: nodes of the cut faces are common, contacts join neighbours; responses tip0, tip1, ..."""
     mesh, axis = model.mesh, joint.cut.axis
     n, size = axis.n_sectors, mesh.n_nodes
@@ -42,11 +42,14 @@ def whole_ring(model: MeshModel, joint: JointDefinition) -> tuple[MeshModel, Joi
             first = surfaces.surface_of_nodes(ring, f"first {j}", own[j][each.first.nodes])
             second = surfaces.surface_of_nodes(ring, f"second {j}", own[(j + each.sector) % n][each.second.nodes])
             contacts.append(replace(each, first=first, second=second, sector=0, label=f"{each.name}{j}"))
-    tips = {f"tip{j}": SetMotion(own[j][joint.load.nodes], axis.pitch(j) @ joint.load.direction) for j in range(n)}
-    return MeshModel(ring), JointDefinition(tuple(contacts), held, tips["tip0"], tips)
+    tips = np.zeros((n, len(used), 3))
+    for j in range(n):
+        tips[j, own[j]] = joint.load.reshape(-1, 3) @ axis.pitch(j).T
+    named = {f"tip{j}": tip.ravel() for j, tip in enumerate(tips)}
+    return FeModel(ring), JointDefinition(tuple(contacts), held, named["tip0"], named)
 
 
-def reduced_ring(model: MeshModel, joint: JointDefinition, nodal_diameter: int, n_modes: int, damping: float):
+def reduced_ring(model: FeModel, joint: JointDefinition, nodal_diameter: int, n_modes: int, damping: float):
     """Reduced model of the ring under a travelling wave of unit forces. damping: over the stiffness, s."""
     n = joint.cut.axis.n_sectors
     whole = build_fe_scene(*whole_ring(model, joint), ReductionOptions(0, n_modes), 1).model

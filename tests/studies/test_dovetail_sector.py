@@ -1,11 +1,13 @@
 """The bundled scene `dovetail_sector`."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg
 
 from solver.model import needed_nodal_diameters
-from studies.finite_element.solid_mesh import SolidMesh, assemble_mass, centrifugal_load
+from studies.finite_element.solid_mesh import assemble_mass, centrifugal_load
 from studies.scenes.dovetail_sector import Parameters
 from tests.studies.static_contact import solve_static_contact
 
@@ -58,8 +60,8 @@ def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
     model, _ = Parameters(stress_stiffening=False).define_sector()
     # the blade with the nodes of the disk, which move nothing
     blade = tuple(group for group in model.mesh.groups if group.part == "blade")
-    mass = assemble_mass(SolidMesh(model.coordinates, model.numbers, blade))
-    pull = centrifugal_load(mass, model.coordinates, model.rotation).reshape(-1, 3).sum(axis=0)[0]
+    mass = assemble_mass(replace(model.mesh, groups=blade))
+    pull = centrifugal_load(mass, model.mesh.coordinates, model.rotation).reshape(-1, 3).sum(axis=0)[0]
     for friction_coefficient in (0.5, 1e-6):
         force = solve_static_contact(at_rest, friction_coefficient).reshape(2, 24, 3).sum(axis=1)
         assert np.all(force[:, 0] > 0.0)

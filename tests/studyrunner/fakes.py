@@ -59,9 +59,9 @@ def fake_sweep(task: Sweep) -> Iterator[StartResult]:
 def fake_history(task: History, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> PointResult:
     """A history whose values tell which of the task it is."""
     integrated, number = task.results[place]
-    scaled = integrated.histories[number]
     fingerprint = float(np.dot(task.start.arrays[0], [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
-    fingerprint += scaled.wear_coefficient * 1e9 + scaled.step * 1e-4 + 0.5 * (integrated.scheme == "implicit")
+    fingerprint += integrated.wear_coefficients[number] * 1e9 + integrated.step * 1e-4
+    fingerprint += 0.5 * (integrated.scheme == "implicit")
     pause = seconds * (fingerprint * 7.7 % 1.0) ** 2
     time.sleep(pause)
     sizes = {"contact": len(facts.area), "response": len(facts.response_names)}
@@ -79,7 +79,7 @@ def fake_history(task: History, facts: SceneFacts = FACTS, seconds: float = 0.0,
     totals |= dict.fromkeys(("jump_cycle", "cycles_to_target", "cycles_to_target_error", "fold_frequency"), np.nan)
     totals |= {"step_limit": np.inf, "last_cycle": task.cycles[-1], "newton_iterations": round(fingerprint)}
     totals |= {"run_time": pause, "error_estimate": 0.01, "largest_wear_depth": 1e-6, "message": ""}
-    return PointResult(scaled.points, {**values, **totals}, place)
+    return PointResult({**values, **totals}, place)
 
 
 def changed(result: PointResult, **values: object) -> PointResult:
@@ -124,13 +124,15 @@ def open_completion(study: Study, plan: TaskPlan, path: Path) -> CompletionIndex
     return CompletionIndex(study, plan, FACTS, [FACTS.digest], Store(path))
 
 
-def fake_completion(study: Study, plan: TaskPlan, results: Iterable[PointResult], path: Path) -> CompletionIndex:
-    """The file of a run that had these results and no others, some in a transaction."""
+def fake_completion(
+    study: Study, plan: TaskPlan, results: Iterable[tuple[tuple[Index, ...], PointResult]], path: Path
+) -> CompletionIndex:
+    """The file of a run that had these results, each with its points, and no others, some in a transaction."""
     completion = open_completion(study, plan, path)
     completion.forget_all()
     tasks = {task.points(place): task for task in completion.plan.results for place in task.order}
-    for number, result in enumerate(results):
-        completion.add(tasks[result.points], result)
+    for number, (points, result) in enumerate(results):
+        completion.add(tasks[points], result)
         if number % 3 == 0:
             completion.store.flush()
     completion.store.flush()

@@ -304,7 +304,7 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[PointResult
     variables = {**study.recorded, **study.kind.kept}
     dataset = _empty(axes, sizes, variables)
     dataset["outcome"].values[...] = Outcome.CONVERGED
-    for result, point in [(each, point) for each in results for point in each.points]:
+    for result, point in [(each, point) for points, each in results for point in points]:
         for name, values in result.values.items():
             if name in LOOPS:
                 dataset[name].values[point][:, list(study.outputs.loops)] = values

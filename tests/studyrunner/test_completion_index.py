@@ -119,7 +119,7 @@ def test_all_results_and_tasks_have_names_of_their_own(folder):
         assert compute(completion) == (3 * 2 * 3 * 2, len(plan.results))
         assert completion.n_points_finished == plan.n_points == 648
         tasks = (*plan.sweeps, *plan.results)
-        names = [name for task in tasks for name in (task.key, *completion.names(task))]
+        names = [name for task in tasks for name in (task.key, *task.names)]
         assert len(set(names)) == len(names)
 
 
@@ -138,7 +138,7 @@ def test_a_history_that_ended_its_process_has_failed(folder):
         give_up(completion, task)
         assert completion.n_points_finished == n_before + 1
         assert list(completion.store.crashes) == ["0" * 32]
-        (record,), _ = completion.read_results(completion.names(task))
+        (record,), _ = completion.read_results(task.names)
         assert record["outcome"] == Outcome.CRASHED
         assert np.isnan(record["worn_volume"]).all()
     with completion_of(folder) as completion:
@@ -176,10 +176,10 @@ def test_tasks_with_which_runs_have_crashed_are_tried_one_after_the_other(folder
 def test_only_states_from_which_something_begins_are_asked_for(finished):
     with completion_of(finished) as completion:
         sweep = completion.plan.sweeps[0]
-        for name in completion.names(sweep):
+        for name in sweep.names:
             completion.store.forget(STARTS, name)
         (task,) = [each for each in completion.plan.waiting[0, 1] if each.wear_coefficient == 1e-11]
-        completion.store.forget(RESULTS, completion.names(task)[0])
+        completion.store.forget(RESULTS, task.names[0])
         (left,) = completion.sweeps_left()
         assert left == replace(sweep, known=frozenset({0, 2}))
         assert left.n_results == 1
@@ -208,7 +208,7 @@ def names_of(scene=FACTS.digest):
     study = read_study("sdof_slider", ["axes.frequency=[150, 155]", "axes.scheme=implicit", "axes.step=[100, 150]"])
     plan, identity = plan_of(study, FACTS.n_displacements), Identity((scene,), "kind")
     solver_digest.cache_clear()
-    return {name for task in (*plan.sweeps, *plan.results) for name in task.names(identity)}
+    return {name for task in (*plan.sweeps, *plan.results) for name in task.hashes(identity)}
 
 
 def test_another_scene_version_or_source_of_the_solver_makes_all_results_others(tmp_path, monkeypatch):

@@ -167,8 +167,9 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
     begins = [[block.begin for block in task.blocks] for task in plan.results[:2]]
     assert begins == [["up", "up", "ramp"], ["up", "down", "ramp"]]
     # all blocks have the same pairs
-    assert main(["missions.toml", *options("mission.heavy.area=2e-4")]) == 2
-    assert "missions.toml: mission.heavy: " in capsys.readouterr().err
+    for more in ([], ["--plan"]):
+        assert main(["missions.toml", *options("mission.heavy.area=2e-4"), *more]) == 2
+        assert "missions.toml: mission.heavy: " in capsys.readouterr().err
 
 
 def test_an_engine_order_is_a_frequency_by_the_speed_of_the_block():

@@ -49,24 +49,24 @@ def test_histories_are_shared_where_they_are_the_same(wears, steps, schemes, by_
     axes = [f"axes.{name}=[{', '.join(values)}]" for name, values in (("wear_coefficient", wears), ("step", steps))]
     study = study_of(*axes, f"axes.scheme={schemes}", *["slow_time.largest_depth=1e-6"] * by_depth)
     plan = plan_of(study)
-    shared = [each for task in plan.results for each in task.integrated]
     of_axes = (study.axes.wear_coefficient, study.axes.step, study.axes.scheme)
     found = {}
-    for number, integrated in enumerate(shared):
-        descending = [scaled.wear_coefficient for scaled in integrated.histories]
-        assert descending == sorted(descending, reverse=True)
-        assert integrated.unworn == (descending[0] == 0.0)
-        for scaled in integrated.histories:
-            for index in scaled.points:
+    for task in plan.results:
+        for integrated in task.integrated:
+            descending = list(integrated.wear_coefficients)
+            assert descending == sorted(descending, reverse=True)
+            assert integrated.unworn == (descending[0] == 0.0)
+        for place, (integrated, number) in enumerate(task.results):
+            for index in task.points(place):
                 at = dict(zip(study.dimensions, index, strict=True))
                 places = (at["wear_coefficient"], at["step"], at["scheme"])
-                point = tuple(values[place] for values, place in zip(of_axes, places, strict=True))
-                assert scaled.wear_coefficient == point[0]
-                found[point] = number
+                point = tuple(values[each] for values, each in zip(of_axes, places, strict=True))
+                assert integrated.wear_coefficients[number] == point[0]
+                found[point] = (task.number, integrated)
     assert found.keys() == set(itertools.product(*of_axes))
     for one, other in itertools.combinations(found, 2):
         assert (found[one] == found[other]) == alike(study, one, other)
-    assert sum(plan.left_out.values()) == len(found) - len(shared)
+    assert sum(plan.left_out.values()) == len(found) - len(set(found.values()))
 
 
 ADAPTIVE = ("axes.wear_coefficient=[2e-12, 1e-11, 4e-12]", "axes.scheme=adaptive", "axes.step=[1, 2]")
@@ -90,9 +90,8 @@ def results_of(integrated):
 def test_each_history_has_its_own_counts_and_rates_back():
     task, found = shared_task(), results_of(history(COUNTS))
     assert [result.place for result in found] == [0, 1, 2]
-    assert [result.points for result in found] == [scaled.points for scaled in task.integrated[0].histories]
-    assert [{point[1] for point in result.points} for result in found] == [{1}, {2}, {0}]
-    assert all(len(result.points) == 2 for result in found)
+    assert [{point[1] for point in points} for points in task.indices] == [{1}, {2}, {0}]
+    assert all(len(points) == 2 for points in task.indices)
     assert [result.values["worn_volume"].tolist() for result in found] == [[0.0, 4.0], [0.0, 2.0], [0.0, 1.0]]
     assert [result.values["harmonics_used"].tolist() for result in found] == [[3, 7], [3, 5], [3, 4]]
     np.testing.assert_allclose([result.values["wear_rate"][-1] for result in found], [4.0, 0.4 * 2.0, 0.2 * 1.0])

@@ -172,6 +172,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         scene.contact=[["BLADS","DISKS"]]
         scene.load.set=TOP
         scene.model=none.inp
+        scene={model="none.inp"} -> scene.model
         scene.matrices=none
         scene.n_sectors=47
         scene.friction_coefficient={BLADE=0.3} -> scene.friction_coefficient.BLADE

@@ -66,7 +66,7 @@ def test_a_ramp_is_a_task_at_each_frequency():
 def test_points_know_their_task():
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
     study, plan = tasks_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
-    assert any(len(each.histories) > 1 for task in plan.results for each in task.integrated)
+    assert any(len(each.wear_coefficients) > 1 for task in plan.results for each in task.integrated)
     assert any(len(task.integrated) > 1 for task in plan.results)
     for task in plan.results:
         sweep = plan.sweeps[task.sweep]
@@ -76,12 +76,11 @@ def test_points_know_their_task():
             assert values["excitation_amplitude"] == sweep.excitation_amplitude
             assert values["sweep"] == sweep.direction
             assert values["harmonics"] == task.settings.harmonics == sweep.settings.harmonics
-            own = [(each, scaled) for each in task.integrated for scaled in each.histories if point in scaled.points]
-            ((integrated, scaled),) = own
-            assert values["wear_coefficient"] == scaled.wear_coefficient
+            ((integrated, number),) = [task.results[place] for place in task.order if point in task.points(place)]
+            assert values["wear_coefficient"] == integrated.wear_coefficients[number]
             if not integrated.unworn:
                 assert values["scheme"] == integrated.scheme
-                assert values["step"] == scaled.step or integrated.scheme == "adaptive"
+                assert values["step"] == integrated.step or integrated.scheme == "adaptive"
 
 
 def printed_plan(overrides, capsys, study="sdof_slider"):

@@ -34,7 +34,7 @@ def test_a_history_is_known_by_its_law_and_a_start_state_is_not():
     for wear in ((), ("wear.law=energy",), ("wear.surfaces={support=2.0}",), ("slow_time.until={wear_depth=1}",)):
         plan = plan_of(read_study("sdof_slider", (*SHORT, *wear)), FACTS.n_displacements)
         of = Identity((FACTS.digest,), "kind")
-        found.append((plan.sweeps[0].names(of), plan.results[0].names(of)))
+        found.append((plan.sweeps[0].hashes(of), plan.results[0].hashes(of)))
     starts, histories = map(set, zip(*found, strict=True))
     assert (len(starts), len(histories)) == (1, 4)
 

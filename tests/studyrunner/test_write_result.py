@@ -37,7 +37,7 @@ SHAPE = (2, 1, 1, 1, 2, 1, 2)
 
 def fake_results(*overrides):
     plan = plan_of(read_study("sdof_slider", (*OVERRIDES, *overrides)), FACTS.n_displacements)
-    return [fake_history(task, place=place) for task in started(plan) for place in task.order]
+    return [(task.points(place), fake_history(task, place=place)) for task in started(plan) for place in task.order]
 
 
 def write_study(study, results, path):
@@ -118,10 +118,10 @@ def test_pairs_without_loops_take_no_room(tmp_path):
 
 def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
     results = fake_results()
-    results[0] = without_values(results[0], 6)
+    results[0] = (results[0][0], without_values(results[0][1], 6))
     assert write(results, tmp_path / "out.nc") == {0: 7, 6: 1}
     with xr.open_dataset(tmp_path / "out.nc") as opened:
-        (point,) = results[0].points
+        (point,) = results[0][0]
         assert opened.outcome.values[point] == 6
         meanings = opened.outcome.attrs["flag_meanings"].split()
         assert [meanings[number] for number in (0, 6, 12, 15)] == ["converged", "inaccurate", "crashed", "sensitive"]
@@ -137,7 +137,7 @@ def test_the_file_is_the_one_of_the_plain_twin(overrides, bytes_a_slab, tmp_path
     """Whatever is in memory at once, and in whatever order the results came: every value, attribute and encoding."""
     monkeypatch.setattr(writing, "_BYTES_A_SLAB", bytes_a_slab)
     results = fake_results(*overrides)
-    results[1] = without_values(results[1], 6)
+    results[1] = (results[1][0], without_values(results[1][1], 6))
     shuffled = [results[place] for place in np.random.default_rng(3).permutation(len(results))]
     write(shuffled, tmp_path / "out.nc", *overrides)
     study = read_study("sdof_slider", (*OVERRIDES, *overrides))
@@ -177,7 +177,7 @@ def test_the_examples_of_readme_and_pages_run(tmp_path, monkeypatch):
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]", "outputs.loops=[]"])
     plan = plan_of(study, FACTS.n_displacements)
-    write_study(study, [fake_history(task) for task in started(plan)], tmp_path / "dovetail.nc")
+    write_study(study, [(task.points(0), fake_history(task)) for task in started(plan)], tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     for page, code in zip(pages, (short, example), strict=False):
         exec(compile(code, page, "exec"), {})

@@ -145,9 +145,7 @@ class Block:
 def read_blocks(path: Path, included: list[str]) -> Iterator[Block]:
     """The keywords of a deck, one after the other, those of files that it includes in their places.
 
-    An included file stands in the deck's folder or below; its name is taken from there, and appended to `included`.
-
-    Raises SceneError where a file is missing, is no deck, too large, or includes itself.
+    Included files stand in the deck's folder or below; their names are appended to `included`. Raises SceneError.
     """
     block: Block | None = None
     for each in _lines(path, path.name, path.parent.resolve(), included, ()):
@@ -170,9 +168,9 @@ def read_blocks(path: Path, included: list[str]) -> Iterator[Block]:
 def _lines(
     path: Path, name: str, folder: Path, included: list[str], within: tuple[Path, ...]
 ) -> Iterator[Block | tuple[str, tuple[str, int]]]:
-    """Keywords without data lines, and data lines with their places; those of included files in their places.
+    """Keywords without data lines, and data lines with their places. within: files that are open.
 
-    An included file does not end a keyword: data lines may follow in it, and behind it. within: files that are open.
+    An included file does not end a keyword: data lines may follow in it, and behind it.
     """
     check_file(path, _LARGEST_DECK)
     within = (*within, path.resolve())
@@ -266,8 +264,7 @@ def read_points(block: Block) -> tuple[IntArray, FloatArray]:
 def read_records(block: Block, length: int, what: str) -> IntArray:
     """Records (n, length) of whole numbers, each from the beginning of a line over one or more lines.
 
-    Raises SceneError where a line is none of numbers, or a record is too short or too long. what: of the record, for
-    the message.
+    what: of the record, for the message. Raises SceneError.
     """
     values = array("q")
     started = 0  # numbers of records before the present one

@@ -74,11 +74,11 @@ class CyclicSymmetry:
 
 
 @dataclass(frozen=True)
-class Boundary:
-    """Prescribed displacements of nodes (p,); value 0 for held ones.
+class NodalValue:
+    """A displacement, 0 where it is held, or a force of each of some nodes (p,) along the dofs from first to last.
 
-    first_dof, last_dof: 1 to 3 are displacements along x, y and z, or along the directions of a `Transform`; 4 to 6
-    rotations of reference points; larger numbers are possible.
+    Dofs 1 to 3 are along x, y and z, or along the directions of a `Transform`; 4 to 6 are rotations of reference
+    points; larger numbers are possible.
     """
 
     place: str
@@ -104,7 +104,7 @@ class Transform:
 
 @dataclass(frozen=True)
 class Equation:
-    """`sum(coefficients * u) = 0` of nodes and dofs (t,) as in `Boundary`; the first term depends on the others."""
+    """`sum(coefficients * u) = 0` of nodes and dofs (t,) as in `NodalValue`; the first term depends on the others."""
 
     place: str
     nodes: IntArray
@@ -126,16 +126,6 @@ class RigidMotion:
     reference: int
     rotation: int = 0
     turns: bool = True
-
-
-@dataclass(frozen=True)
-class NodalForce:
-    """A constant force on each of some nodes (p,) along a dof as in `Boundary`."""
-
-    place: str
-    nodes: IntArray
-    dof: int
-    value: float
 
 
 @dataclass(frozen=True)
@@ -211,14 +201,14 @@ class Deck:
     contact_pairs: tuple[SurfacePair, ...] = ()
     cyclic: CyclicSymmetry | None = None
     cut_faces: tuple[tuple[str, str], ...] = ()
-    boundaries: tuple[Boundary, ...] = ()
+    boundaries: tuple[NodalValue, ...] = ()
     transforms: tuple[Transform, ...] = ()
     equations: tuple[Equation, ...] = ()
     rigid_motions: tuple[RigidMotion, ...] = ()
     materials: Mapping[str, Material] = field(default_factory=dict)
     sections: tuple[Section, ...] = ()
     centrifugal: tuple[CentrifugalLoad, ...] = ()
-    forces: tuple[NodalForce, ...] = ()
+    forces: tuple[NodalValue, ...] = ()
     pressures: tuple[Pressure, ...] = ()
     gravity: FloatArray | None = None
     unassembled: tuple[str, ...] = ()

@@ -55,9 +55,9 @@ class Draft:
 class Mesh:
     """Nodes, elements, sets and surfaces of a draft under the numbers that they have in the deck.
 
-    offsets: what is added to the numbers of every scope. numbers (n,), coordinates (n, 3): of the nodes. blocks:
-    elements, one block a kind, by ascending number. all_elements, kinds, solid (m,): numbers of all elements, their
-    kinds, and whether these are read. Raises SceneError where numbers or names are missing or do not fit.
+    offsets: what is added to the numbers of every scope. numbers (n,), coordinates (n, 3): of the nodes. blocks: by
+    kind. all_elements, kinds, solid (m,): numbers of all elements, their kinds, and whether these are read. Raises
+    SceneError where numbers or names are missing or do not fit.
     """
 
     def __init__(self, draft: Draft) -> None:

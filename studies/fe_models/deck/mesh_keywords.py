@@ -40,7 +40,7 @@ _MOST_MADE = 4_000_000  # nodes or elements that one keyword may make
 def read_mesh_keyword(draft: Draft, block: Block) -> None:
     """Acts on a keyword of the mesh; others are put aside, as all keywords of a part are until it has an instance."""
     block = replace(block, scope=draft.scope)
-    if draft.part and block.keyword not in ("PART", "ENDPART", "INSTANCE"):
+    if draft.part and block.keyword not in ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE"):
         draft.parts[draft.part].append(block)
     elif block.keyword in KEYWORDS and KEYWORDS[block.keyword].of_mesh:
         find_keyword(block).reader(draft, block)
@@ -213,7 +213,7 @@ def _fill(
 ) -> None:
     """Nodes between those of two sets, at equal distances on straight lines."""
     first, last = ends
-    if len(first) != len(last) or n_intervals * len(first) > _MOST_MADE:
+    if len(first) != len(last) or n_intervals < 1 or n_intervals * len(first) > _MOST_MADE:
         found = f"{n_intervals} intervals between {len(first)} and {len(last)} nodes"
         raise place.wrong(found, f"give as many nodes at both ends, and at most {_MOST_MADE} between them")
     numbers = (first[:, None] + step * np.arange(1, n_intervals)).ravel()
@@ -262,10 +262,8 @@ def _placement(block: Block) -> tuple[FloatArray, FloatArray]:
         shift = np.array((block.reals(0, 0) + [0.0] * 3)[:3])
     if len(block.lines) > 1:
         values = np.array(block.reals(1, 7))
-        point = values[:3]
-        turn = turn_about(
-            unit(values[3:6] - point, block.place, "two points of the axis"), float(np.radians(values[6]))
-        )
+        point, angle = values[:3], float(np.radians(values[6]))
+        turn = turn_about(unit(values[3:6] - point, block.place, "two points of the axis"), angle)
         shift = turn @ (shift - point) + point
     return shift, turn
 

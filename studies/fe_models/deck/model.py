@@ -25,7 +25,6 @@ from studies.fe_models.text import FloatArray, IntArray, Place, shown
 from studies.scene_error import SceneError
 
 _SAME_AXIS = 1e-6  # distance of two axes over the distance of the points that give them
-_MOST_SKIPPED = 1000
 
 
 @dataclass
@@ -102,8 +101,7 @@ class Model:
 
     def skip(self, block: Block) -> None:
         """Notes a keyword that cannot change the model."""
-        if len(self.skipped) < _MOST_SKIPPED:
-            self.skipped.append(str(block.place))
+        self.skipped.append(str(block.place))
 
     def deck(self) -> Deck:
         """The deck. Raises SceneError where names are missing or do not fit."""

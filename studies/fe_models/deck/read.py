@@ -23,12 +23,10 @@ _LOADS = ("CLOAD", "DSLOAD", "TEMPERATURE")  # of steps that are not static they
 
 
 def read_deck(path: Path) -> Deck:
-    """The model of a deck of CalculiX or Abaqus, in units of the file. Files that it includes are in its folder or
-    below.
+    """The model of a deck of CalculiX or Abaqus, in units of the file, with the files that it includes.
 
-    Keywords that cannot change the model are named in `skipped`. Numbers of the first instance are those of its part;
-    of the others they are so many thousands larger as a note says. Raises SceneError about "model" where the deck
-    cannot be read, makes no sense, or has a keyword that may change the model and is not read.
+    Numbers of the first instance are those of its part; of the others they are larger, as a note says. Raises
+    SceneError about "model" where the deck makes no sense, or has what may change the model and is not read.
     """
     draft = Draft(path.name)
     for block in read_blocks(path, draft.included):

@@ -75,6 +75,7 @@ def find_key(items: Container[Key], instances: Mapping[str, object], reference: 
     return (found[0], key[1]) if found else None
 
 
+@dataclass
 class Resolver:
     """Sets as numbers that exist.
 
@@ -83,19 +84,14 @@ class Resolver:
     nodes_of: the nodes of a set of elements. notes: what is named and does not exist.
     """
 
-    def __init__(
-        self,
-        sets: SetDefinitions,
-        existing: IntArray,
-        offsets: Mapping[str, int],
-        everything: str,
-        nodes_of: Callable[[Reference], IntArray] = lambda _: NONE,
-    ) -> None:
-        self.sets, self.existing, self.offsets = sets, existing, offsets
-        self.everything, self.nodes_of = everything, nodes_of
-        self.notes: list[str] = []
-        self._done: dict[Key, IntArray] = {}
-        self._open: list[Key] = []
+    sets: SetDefinitions
+    existing: IntArray
+    offsets: Mapping[str, int]
+    everything: str
+    nodes_of: Callable[[Reference], IntArray] = lambda _: NONE
+    notes: list[str] = field(default_factory=list)
+    _done: dict[Key, IntArray] = field(default_factory=dict)
+    _open: list[Key] = field(default_factory=list)
 
     def find(self, reference: Reference) -> IntArray:
         """Numbers (m,) that a reference stands for, ascending. Raises SceneError where there is no such set."""

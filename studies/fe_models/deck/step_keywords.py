@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from studies.fe_models.deck.blocks import Block, Row
-from studies.fe_models.deck.contents import Boundary, CentrifugalLoad, NodalForce, Pressure, SurfacePair
+from studies.fe_models.deck.contents import CentrifugalLoad, NodalValue, Pressure, SurfacePair
 from studies.fe_models.deck.keywords import keyword
 from studies.fe_models.deck.model import Interaction, Model, Step
 from studies.fe_models.text import is_integer, read_float, read_name, shown, unit
@@ -193,7 +193,7 @@ def _boundary(model: Model, block: Block) -> None:
                 raise row.place.wrong(f"dofs from {first} to {last}", "give the smaller one first")
             held, value = ((first, last),), 0.0 if "FIXED" in block.parameters else row.real(3)
         nodes = model.mesh.nodes(row.reference(0))
-        model.add("boundaries", *(Boundary(str(row.place), nodes, *dofs, value) for dofs in held))
+        model.add("boundaries", *(NodalValue(str(row.place), nodes, *dofs, value) for dofs in held))
 
 
 def _step_of(model: Model, block: Block) -> Step:
@@ -220,7 +220,7 @@ def _cload(model: Model, block: Block) -> None:
         nodes, dof, value = row.reference(0), row.whole(1, "a dof"), row.real(2)
         if dof > 3 and value and step.loads_count:
             raise row.place.wrong(f"a load along dof {dof}", "give forces: a moment is not read")
-        force = NodalForce(str(row.place), model.mesh.nodes(nodes), dof, value)
+        force = NodalValue(str(row.place), model.mesh.nodes(nodes), dof, dof, value)
         model.add("forces", force, key=(nodes.scope, nodes.target, dof))
 
 

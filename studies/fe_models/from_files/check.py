@@ -11,7 +11,6 @@ from solver import SolverSettings, march_wear
 from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
 from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.finite_element.joint_model import MatrixModel
 from studies.finite_element.reduced_joint import FeScene, Progress, glued_frequencies, prepare_model, silent
 from studies.scene import make_compliant
 
@@ -28,7 +27,7 @@ def describe_model(
     loaded: LoadedModel, scene: FeScene, parameters: Parameters, progress: Progress = silent
 ) -> list[tuple[str, str]]:
     """Label and text of each line. scene: the reduced model. Raises SceneError."""
-    deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.coordinates
+    deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.mesh.coordinates
     prepared = prepare_model(loaded.model, joint)
     free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
     if joint.cut is not None:
@@ -53,7 +52,7 @@ def describe_model(
     turning = glued_frequencies(prepared, k, N_FREQUENCIES)
     where = f"nodal diameter {k}: " if joint.cut is not None else ""
     glued = f"{where}{_frequencies(turning)} Hz without prestress"
-    if isinstance(loaded.model, MatrixModel):
+    if loaded.model.forms is not None:
         glued = f"{where}{_frequencies(turning)} Hz, with what the matrices hold"
     elif prepared.at_rest is not None:
         still = prepared.at_rest.frequencies(k, N_FREQUENCIES) / (2.0 * np.pi)
@@ -66,8 +65,10 @@ def describe_model(
     progress("reduction with twice the modes")
     rows.append(("reduction", _reduction_error(loaded, scene.model, parameters)))
     rows.append(("rigid", f"{count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
-    if count_free_motions(scene.model):
-        rows.append(("warning", "motions are held by friction alone: give retention_stiffness"))
+    held = count_free_motions(scene.model)
+    if held:
+        verb = "motion is" if held == 1 else "motions are"
+        rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
     total = prepared.static_load.reshape(-1, 3)[placed].sum(axis=0)
     rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
     progress("state at rest")
@@ -166,7 +167,7 @@ def _sum(forces: FloatArray) -> str:
 
 
 def _held(loaded: LoadedModel) -> str:
-    if not isinstance(loaded.model, MatrixModel):
+    if loaded.model.forms is None:
         return ""
     if loaded.omega_squared_held is None:
         return "; the matrices do not tell theirs"

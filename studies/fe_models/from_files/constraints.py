@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.fe_models.deck.contents import Deck, Equation, RigidMotion, Transform
+from studies.fe_models.deck.contents import Deck, Equation, RigidMotion
 from studies.fe_models.model_files import Units
 from studies.finite_element.constraints import Constraints, Dependence, eliminate
 from studies.scene_error import SceneError
@@ -41,25 +41,28 @@ def find_constraints(
     place of the deck's boundary conditions; None of none. cut: rows of nodes on cut faces. Raises SceneError where a
     displacement depends on others and is held, depends twice, or nodes are missing.
     """
-    return _Builder(deck, numbers, units, set(cut.tolist())).build(clamped)
+    rows = {number: row for row, number in enumerate(numbers.tolist())}
+    return _Builder(deck, numbers, units, set(cut.tolist()), rows).build(clamped)
 
 
 @dataclass
 class _Builder:
-    """Nodes of the model and those beside it: reference nodes, their rotations, and nodes in their own directions."""
+    """rows: of the nodes of the model and of reference nodes. others: of rotations of reference nodes, and of nodes in
+    their own directions. extra: numbers of all that is not in the model.
+    """
 
     deck: Deck
     numbers: IntArray
     units: Units
     cut: set[int]
-    oblique: dict[int, FloatArray] = field(default_factory=dict)
+    rows: dict[int, int]
+    others: dict[tuple[str, int], int] = field(default_factory=dict)
     extra: list[int] = field(default_factory=list)
-    rows: dict[tuple[str, int], int] = field(default_factory=dict)
+    oblique: dict[int, FloatArray] = field(default_factory=dict)
     entries: list[Dependence] = field(default_factory=list)
 
     def build(self, clamped: BoolArray | None) -> Supported:
         deck = self.deck
-        self.order = np.argsort(self.numbers)
         self.first_terms = {int(equation.nodes[0]) for equation in deck.equations}
         self.frames = {int(node): each for each in deck.transforms for node in each.nodes}
         for motion in deck.rigid_motions:
@@ -79,33 +82,35 @@ class _Builder:
             forces[dof] += value
         own: BoolArray = np.isin(np.arange(len(forces)), list(held)).reshape(-1, 3)
         extra = np.array(self.extra, dtype=np.int64)
-        references = {number: row for (kind, number), row in self.rows.items() if kind == "node"}
-        if not self.entries and not self.oblique:
-            return Supported(own, extra, None, own.copy(), forces, references)
-        everything = np.concatenate([self.numbers, extra])
-        constraints, fixed = eliminate(self.entries, own, self.oblique, everything, len(self.numbers))
+        references = {number: row for number, row in self.rows.items() if row >= len(self.numbers)}
+        constraints, fixed = None, own.copy()
+        if self.entries or self.oblique:
+            everything = np.concatenate([self.numbers, extra])
+            constraints, fixed = eliminate(self.entries, own, self.oblique, everything, len(self.numbers))
         return Supported(fixed, extra, constraints, own, forces, references)
+
+    def _new(self, number: int) -> int:
+        self.extra.append(number)
+        return len(self.numbers) + len(self.extra) - 1
 
     def _row(self, number: int, place: str) -> int:
         """Row of a node; one without elements is added. Raises SceneError where it does not exist."""
-        at = min(int(np.searchsorted(self.numbers, number, sorter=self.order)), len(self.numbers) - 1)
-        if self.numbers[self.order[at]] == number:
-            return int(self.order[at])
-        if not np.isin(number, self.deck.node_numbers):
-            raise SceneError("model", f"{place}: there is no node {number}", "define it with *NODE")
-        return self._added("node", number)
+        if number not in self.rows:
+            if not np.isin(number, self.deck.node_numbers):
+                raise SceneError("model", f"{place}: there is no node {number}", "define it with *NODE")
+            self.rows[number] = self._new(number)
+        return self.rows[number]
 
-    def _added(self, kind: str, number: int) -> int:
-        if (kind, number) not in self.rows:
-            self.rows[kind, number] = len(self.numbers) + len(self.extra)
-            self.extra.append(number)
-        return self.rows[kind, number]
+    def _other(self, kind: str, number: int) -> int:
+        if (kind, number) not in self.others:
+            self.others[kind, number] = self._new(number)
+        return self.others[kind, number]
 
     def _turn(self, motion: RigidMotion) -> int:
         """Row of the rotations of a reference node."""
         if motion.rotation:
             return self._row(motion.rotation, motion.place)
-        return self._added("turn", motion.reference)
+        return self._other("turn", motion.reference)
 
     def _rigid(self, motion: RigidMotion) -> None:
         """`u = u_reference + theta x arm` for each node."""
@@ -142,16 +147,15 @@ class _Builder:
             for node in boundary.nodes:
                 wanted.setdefault(int(node), set()).update(range(first, last + 1))
         turns = {motion.reference: self._turn(motion) for motion in self.deck.rigid_motions if motion.turns}
-        inside = set(self.numbers.tolist()) | {number for kind, number in self.rows if kind == "node"}
         for node, dofs in wanted.items():
-            if node in inside:
+            if node in self.rows:
                 held.update(self._held(node, sorted(dof - 1 for dof in dofs if dof <= 3)))
             if node in turns:
                 held.update(3 * turns[node] + dof - 4 for dof in dofs if dof > 3)
 
     def _held(self, node: int, local: list[int]) -> list[int]:
         """Displacements that are 0 where those along some directions of a node are."""
-        row = self._row(node, "")
+        row = self.rows[node]
         if node not in self.frames:
             return [3 * row + k for k in local]
         frame = self._frame(node)
@@ -166,8 +170,8 @@ class _Builder:
 
     def _localised(self, node: int) -> int:
         """Row of a node in its own directions, on which the node of the model depends."""
-        new = ("local", node) not in self.rows
-        row, own = self._added("local", node), self._row(node, "")
+        new = ("local", node) not in self.others
+        row, own = self._other("local", node), self.rows[node]
         if new:
             frame = self._frame(node)
             rows, columns = np.divmod(np.arange(9), 3)
@@ -176,12 +180,23 @@ class _Builder:
         return row
 
     def _frame(self, node: int) -> FloatArray:
-        """Directions (3, 3) of the dofs 1 to 3 of a node, one a row."""
+        """Unit vectors (3, 3), one a row, of the dofs 1 to 3 of a node. Raises SceneError of a node on the axis."""
         transform = self.frames.get(node)
         if transform is None:
             return np.eye(3)
-        place = self.deck.coordinates[self.deck.rows_of_nodes(np.array([node]))][0]
-        return _directions(transform, place, node)
+        start, end = transform.points
+        if not transform.cylindrical:
+            third = np.cross(start, end)
+            frame = np.stack([start, np.cross(third, start), third])
+        else:
+            arm = self.deck.coordinates[self.deck.rows_of_nodes(np.array([node]))][0] - start
+            axis = (end - start) / np.linalg.norm(end - start)
+            radial = arm - (arm @ axis) * axis
+            if not np.linalg.norm(radial) > _ROUND_OFF * np.linalg.norm(end - start):
+                found = f"{transform.place}: node {node} is on the axis"
+                raise SceneError("model", found, "take it out of the set: it has no radial direction")
+            frame = np.stack([radial, np.cross(axis, radial), axis])
+        return np.asarray(frame / np.linalg.norm(frame, axis=1, keepdims=True))
 
     def _equation(self, equation: Equation) -> None:
         """The first term from the others."""
@@ -189,7 +204,7 @@ class _Builder:
         for at, (node, dof, value) in enumerate(zip(equation.nodes, equation.dofs, equation.coefficients, strict=True)):
             row, number = self._row(int(node), equation.place), int(node)
             if dof > 3:
-                row = self.rows.get(("turn", number), -1)
+                row = self.others.get(("turn", number), -1)
                 if row < 0 or dof > 6:
                     found = f"{equation.place}: node {number} has no dof {dof}"
                     raise SceneError("model", found, "give displacements 1 to 3, or the rotation of a reference node")
@@ -197,9 +212,9 @@ class _Builder:
                 continue
             direction = self._frame(number)[dof - 1]
             axis = int(np.argmax(np.abs(direction)))
-            if abs(direction[axis]) > 1.0 - _ROUND_OFF and ("local", number) not in self.rows:
+            if abs(direction[axis]) > 1.0 - _ROUND_OFF and ("local", number) not in self.others:
                 terms.append((3 * row + axis, value * float(np.sign(direction[axis]))))
-            elif at == 0 or ("local", number) in self.rows:
+            elif at == 0 or ("local", number) in self.others:
                 terms.append((3 * self._localised(number) + int(dof) - 1, float(value)))
             else:
                 terms += [(3 * row + k, float(value * direction[k])) for k in range(3)]
@@ -210,32 +225,14 @@ class _Builder:
         self.entries.append(Dependence(np.array([dependent]), rows, columns, values, equation.place))
 
     def _forces(self) -> Iterator[tuple[int, float]]:
-        """Displacement and force, N, of each component; the unit of force has that of mass times length."""
-        newton = self.units.mass * self.units.length
-        inside = set(self.numbers.tolist()) | {number for kind, number in self.rows if kind == "node"}
+        """Displacement and force, N, of each component."""
         for force in self.deck.forces:
             for node in force.nodes:
-                if int(node) not in inside or force.dof > 3:
+                if int(node) not in self.rows or force.first_dof > 3:
                     if force.value == 0.0:
                         continue
-                    found = f"{force.place}: node {node} has no dof {force.dof}"
+                    found = f"{force.place}: node {node} has no dof {force.first_dof}"
                     raise SceneError("model", found, "give forces on nodes of elements, or of reference nodes")
-                for k, share in enumerate(self._frame(int(node))[force.dof - 1]):
+                for k, share in enumerate(self._frame(int(node))[force.first_dof - 1]):
                     if share:
-                        yield 3 * self._row(int(node), force.place) + k, newton * force.value * float(share)
-
-
-def _directions(transform: Transform, place: FloatArray, node: int) -> FloatArray:
-    """Unit vectors (3, 3), one a row, of the displacements 1 to 3 of a node at a place (3,)."""
-    start, end = transform.points
-    if not transform.cylindrical:
-        third = np.cross(start, end)
-        frame = np.stack([start, np.cross(third, start), third])
-    else:
-        axis = (end - start) / np.linalg.norm(end - start)
-        radial = place - start - ((place - start) @ axis) * axis
-        if not np.linalg.norm(radial) > _ROUND_OFF * np.linalg.norm(end - start):
-            found = f"{transform.place}: node {node} is on the axis"
-            raise SceneError("model", found, "take it out of the set: it has no radial direction")
-        frame = np.stack([radial, np.cross(axis, radial), axis])
-    return np.asarray(frame / np.linalg.norm(frame, axis=1, keepdims=True))
+                        yield 3 * self.rows[int(node)] + k, self.units.force * force.value * float(share)

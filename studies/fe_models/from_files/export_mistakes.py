@@ -16,38 +16,18 @@ from studies.fe_models.from_files.solid import SPEED_AGREES
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.model_files import Units
 from studies.fe_models.text import FloatArray, IntArray
-from studies.finite_element.element_matrices import element_volumes
 from studies.finite_element.elements import ELEMENT_KINDS
-from studies.finite_element.solid_mesh import Rotation
+from studies.finite_element.solid_mesh import Rotation, volumes_of_points
 from studies.scene_error import SceneError
 
+_PAIR, _CONTACT = "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair", "remove the contact between them"
 # of each program: to export free nodes, to take contact out, to keep the prestress
 _REMEDIES = {
-    "calculix": (
-        "export with *EQUATION,REMOVE ALL",
-        "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair",
-        "write *STEP,PERTURBATION",
-    ),
-    "abaqus": (
-        "export without ties and boundary conditions: remove them in the step of *MATRIX GENERATE",
-        "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair",
-        "write *STEP,NLGEOM for the static step",
-    ),
-    "ansys": (
-        "export without constraint equations and displacements: CEDELE and DDELE before the solution",
-        "remove the contact elements between them",
-        "write PSTRES,ON for the static solution",
-    ),
-    "nastran": (
-        "export without SPC and MPC on them",
-        "remove the contact between them",
-        "name the static subcase with STATSUB",
-    ),
-    "table": (
-        "export without ties and boundary conditions",
-        "remove the contact between them",
-        "export the prestressed stiffness",
-    ),
+    "calculix": ("export with *EQUATION,REMOVE ALL", _PAIR, "write *STEP,PERTURBATION"),
+    "abaqus": ("remove ties and *BOUNDARY in the step of *MATRIX GENERATE", _PAIR, "write *STEP,NLGEOM before it"),
+    "ansys": ("write CEDELE and DDELE before the solution", _CONTACT, "write PSTRES,ON for the static solution"),
+    "nastran": ("export without SPC and MPC on them", _CONTACT, "name the static subcase with STATSUB"),
+    "table": ("export without ties and boundary conditions", _CONTACT, "export the prestressed stiffness"),
 }
 
 _COUPLED = 1e-9
@@ -82,11 +62,8 @@ def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> Non
         return
     where = matrices.files[-1] if matrices.code == "calculix" else matrices.files[0]
     some = "have no dof" if not np.isin(wanted, found[counts < 3]).any() else "lack dofs"
-    raise SceneError(
-        "matrices",
-        f"{name}: {n_missing} of {wanted.size} nodes {some} in {where} (tied or fixed)",
-        _REMEDIES[matrices.code][0],
-    )
+    found_missing = f"{name}: {n_missing} of {wanted.size} nodes {some} in {where} (tied or fixed)"
+    raise SceneError("matrices", found_missing, _REMEDIES[matrices.code][0])
 
 
 def check_contact_removed(
@@ -122,10 +99,7 @@ def _share_element(deck: Deck, one: IntArray, other: IntArray) -> NDArray[np.boo
 
 
 def translation(deck: Deck, matrices: Matrices, direction: FloatArray) -> FloatArray:
-    """A rigid translation (n_dof,) by the vector (3,), at the nodes of the mesh.
-
-    Rows of other nodes are amplitudes inside of elements (C3D8I), which take no part.
-    """
+    """A rigid translation (n_dof,) by the vector (3,); rows of nodes inside of elements (C3D8I) take no part."""
     return np.where(np.isin(matrices.node, deck.node_numbers), direction[matrices.direction], 0.0)
 
 
@@ -135,27 +109,19 @@ def mass_of(deck: Deck, matrices: Matrices) -> float:
     return float(np.mean([motion @ (matrices.mass @ motion) for motion in motions]))
 
 
-def mass_by_density(deck: Deck) -> float | None:
-    """Mass of the elements in units of the file, by their volumes; None where the deck lacks a density."""
-    mass = 0.0
+def check_mass(deck: Deck, matrices: Matrices, units: Units) -> None:
+    """The matrices have the mass that density and volume of the deck give; less where they lack nodes of the deck."""
+    expected, found = 0.0, mass_of(deck, matrices)
     for block in deck.blocks:
         density = np.full(block.numbers.size, np.nan)
         for section in deck.sections:
-            found = deck.materials.get(section.material)
-            if found is not None and found.density is not None:
-                density[np.isin(block.numbers, section.elements)] = found.density
+            density[np.isin(block.numbers, section.elements)] = deck.materials[section.material].density
         places = deck.coordinates[deck.rows_of_nodes(block.nodes)]
-        mass += float(density @ element_volumes(ELEMENT_KINDS[block.kind], places))
-    return None if math.isnan(mass) else mass
-
-
-def check_mass(deck: Deck, matrices: Matrices, units: Units) -> None:
-    """The matrices have the mass that density and volume of the deck give; less where they lack nodes of the deck."""
-    expected, found = mass_by_density(deck), mass_of(deck, matrices)
-    if expected is None:
-        return
+        expected += float((density @ volumes_of_points(ELEMENT_KINDS[block.kind], places)).sum())
     whole = np.isin(np.concatenate([block.nodes.ravel() for block in deck.blocks]), matrices.node).all()
-    if not (1 - _MASS_AGREES if whole else _LEAST_SHARE) <= found / expected <= 1 + _MASS_AGREES:
+    least = 1 - _MASS_AGREES if whole else _LEAST_SHARE
+    # of a deck that lacks a density nothing is known
+    if not math.isnan(expected) and not least <= found / expected <= 1 + _MASS_AGREES:
         masses = f"{found * units.mass:.3g} kg in the matrices, {expected * units.mass:.3g} kg by density and volume"
         remedy = "give both of one run and in the same units, or a deck without *DENSITY"
         raise SceneError("matrices", f"{matrices.files[0]} and {deck.path}: {masses}", remedy)

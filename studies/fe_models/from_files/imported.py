@@ -26,32 +26,32 @@ from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.model_files import ModelFiles, Units
 from studies.fe_models.text import library_errors
-from studies.finite_element.joint_model import MatrixModel, RowMotion
 from studies.finite_element.pairing import ContactSurfaces
-from studies.finite_element.solid_mesh import Rotation
+from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.scene_error import SceneError
 
 
 @dataclass(frozen=True)
 class NodalMatrices:
-    """Matrices of another program, and a model of them with displacements node by node in x, y, z: nodes of the mesh,
-    then those of the matrices alone.
+    """Matrices of another program, and forms of them by name with displacements node by node in x, y, z: nodes of the
+    mesh, then those of the matrices alone, then rows of no place, as modal coordinates, three by three.
 
-    Rows that are no displacement of a node, as modal coordinates, stand three by three at the end, as if of nodes
-    without a place. missing (n_nodes, 3): displacements that the matrices do not have, which must be held. place
-    (n_dof,): of each row of the matrices in the displacements of the model. omega_squared_held: square of the speed at
-    which they were made, rad2/s2; None where they do not tell.
+    missing (n_nodes, 3): displacements that the matrices do not have, which must be held. place (n_dof,): of each row
+    of the matrices in the displacements of the model. omega_squared_held: square of the speed at which they were made,
+    rad2/s2; None where they do not tell.
     """
 
     matrices: Matrices
-    model: MatrixModel
+    mesh: SolidMesh
+    forms: Mapping[str, sparse.csr_matrix]
     missing: BoolArray
     place: IntArray
     omega_squared_held: float | None = None
 
 
-def order_by_nodes(matrices: Matrices, units: Units, numbers: IntArray, coordinates: FloatArray) -> NodalMatrices:
-    """Matrices in the order of the nodes of a mesh. numbers (n_mesh,), coordinates (n_mesh, 3), m: its nodes."""
+def order_by_nodes(matrices: Matrices, units: Units, mesh: SolidMesh) -> NodalMatrices:
+    """Matrices in the order of the nodes of a mesh."""
+    numbers = mesh.numbers
     node, direction = matrices.node.copy(), matrices.direction.copy()
     other = np.flatnonzero((direction < 0) | (direction > 2))
     first = min(0, int(node.min(initial=0)), int(numbers.min(initial=0))) - 1
@@ -68,15 +68,11 @@ def order_by_nodes(matrices: Matrices, units: Units, numbers: IntArray, coordina
 
     missing = np.ones(n, dtype=np.bool_)
     missing[place] = False
-    model = MatrixModel(
-        coordinates=np.vstack([coordinates, np.full((len(extra), 3), np.nan)]),
-        numbers=everything,
-        stiffness=ordered(matrices.stiffness),
-        mass=ordered(matrices.mass),
+    forms = {"stiffness": ordered(matrices.stiffness), "mass": ordered(matrices.mass)}
+    if matrices.damping is not None:
         # seconds in all systems of units: N s/m from a damping as N/m from a stiffness
-        damping=None if matrices.damping is None else ordered(matrices.damping),
-    )
-    return NodalMatrices(matrices, model, missing.reshape(-1, 3), place)
+        forms["damping"] = ordered(matrices.damping)
+    return NodalMatrices(matrices, mesh.with_nodes(extra), forms, missing.reshape(-1, 3), place)
 
 
 def import_matrices(
@@ -112,7 +108,7 @@ def import_matrices(
             held_speed = check_speed(deck, matrices, rotation, of_study=parameters.rotation_speed is not None)
     else:
         _check_table(matrices, selections, on_cut)
-    return replace(order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates), omega_squared_held=held_speed)
+    return replace(order_by_nodes(matrices, units, mesh), omega_squared_held=held_speed)
 
 
 def _check_table(matrices: Matrices, selections: Selections, on_cut: IntArray) -> None:
@@ -135,7 +131,9 @@ def _check_table(matrices: Matrices, selections: Selections, on_cut: IntArray) -
         raise SceneError("cut_faces", found, "reduce the sector to the displacements of its cut faces")
 
 
-def read_recovery(path: Path, imported: NodalMatrices, units: Units, taken: Collection[str]) -> Mapping[str, RowMotion]:
+def read_recovery(
+    path: Path, imported: NodalMatrices, units: Units, taken: Collection[str]
+) -> Mapping[str, FloatArray]:
     """Quantities by name, as sums over the displacements of a model.
 
     A quantity with a unit in its name, as "root stress [MPa]", has this unit; one without is a displacement, m. taken:
@@ -159,7 +157,7 @@ def read_recovery(path: Path, imported: NodalMatrices, units: Units, taken: Coll
         raise SceneError("recovery", f"{path.name}: a response has the name {twice[0]} as well", "give another name")
     motions = {}
     for name, column in zip(names, values.T, strict=True):
-        weights = np.zeros(imported.missing.size)
+        weights = np.zeros(imported.forms["mass"].shape[0])
         np.add.at(weights, imported.place[own], column / (units.length if name.endswith("]") else 1.0))
-        motions[name] = RowMotion(weights)
+        motions[name] = weights
     return motions

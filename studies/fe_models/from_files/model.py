@@ -20,22 +20,14 @@ from studies.fe_models.from_files.selections import Selections, find_clamped, fi
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_cyclic_axis, find_rotation
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
-from studies.fe_models.model_files import ModelFiles, Units, file_digest, find_units
+from studies.fe_models.model_files import UNITS, ModelFiles, Units, file_digest
 from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.joint_model import (
-    JointDefinition,
-    MatrixModel,
-    MeshModel,
-    ReductionOptions,
-    Retainer,
-    RowMotion,
-    SetMotion,
-)
+from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
 from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
-from studies.finite_element.surfaces import describe_mesh, loops_of_faces, pressure_forces
+from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
 from studies.scene import SurfaceMesh, build_compliant
 from studies.scene_error import SceneError
 
@@ -51,7 +43,7 @@ class LoadedModel:
     deck: Deck
     units: Units
     mesh: SolidMesh
-    model: MeshModel | MatrixModel
+    model: FeModel
     joint: JointDefinition
     omega_squared_held: float | None
 
@@ -63,10 +55,7 @@ def checked(parameters: BaseModel) -> Parameters:
 
 
 def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
-    """The files of a model, whose names are relative to a folder.
-
-    Raises SceneError where there are none of these names.
-    """
+    """The files of a model, whose names are relative to a folder. Raises SceneError where one is missing."""
     mesh, recovery = folder / model, None
     matrices = () if parameters.matrices is None else find_matrix_files(folder / parameters.matrices)
     if parameters.recovery is not None:
@@ -81,10 +70,7 @@ def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
 
 
 def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: Progress = silent) -> ReducedModel:
-    """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see.
-
-    Raises SceneError where the files or parameters describe no possible joint.
-    """
+    """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see. Raises SceneError."""
     own = checked(parameters)
 
     def reduced() -> ReducedModel:
@@ -105,14 +91,11 @@ def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, 
 def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:
     """Outer faces of the mesh. Raises SceneError."""
     own = checked(parameters)
-    return describe_mesh(build_solid_mesh(read_mesh_file(files.mesh), own, find_units(own.units)))
+    return describe_mesh(build_solid_mesh(read_mesh_file(files.mesh), own, UNITS[own.units]))
 
 
 def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
-    """Attributes of a scene or result file: the files with their SHA-256, their units, and what reduced them.
-
-    Raises SceneError or OSError where a file cannot be read.
-    """
+    """Attributes of a scene or result file: the files with their SHA-256, their units, and what reduced them."""
     mesh, *others = files.all
     paths = (mesh, *(mesh.parent / name for name in read_mesh_file(mesh).included), *others)
     return {
@@ -123,11 +106,8 @@ def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
 
 
 def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = silent) -> LoadedModel:
-    """Reads the files and puts the model together.
-
-    Raises SceneError where a file cannot be read, the study names what is not there, or what was exported is of no use.
-    """
-    units = find_units(parameters.units)
+    """Reads the files and puts the model together. Raises SceneError."""
+    units = UNITS[parameters.units]
     progress(f"reading {files.mesh.name}")
     deck = read_mesh_file(files.mesh)
     mesh = build_solid_mesh(deck, parameters, units)
@@ -142,39 +122,41 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     if files.matrices:
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
         imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
-    numbers = mesh.numbers if imported is None else imported.model.numbers
+    nodes = mesh if imported is None else imported.mesh
+    numbers = nodes.numbers
     if clamped is not None:
         clamped = np.pad(clamped, ((0, len(numbers) - len(clamped)), (0, 0)))
     supported = find_constraints(deck, numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
-    responses: dict[str, SetMotion | RowMotion] = {
-        name: _motion(selections, each, f"response.{name}.set") for name, each in parameters.responses.items()
+    n_nodes, forms = len(supported.held), None
+    responses = {
+        name: _motion(selections, each, f"response.{name}.set", n_nodes) for name, each in parameters.responses.items()
     }
-    model: MeshModel | MatrixModel
-    if imported is None:
-        model = MeshModel(mesh, rotation, parameters.stress_stiffening, preload, gravity, extra=supported.extra)
-    else:
+    if imported is not None:
         if imported.matrices.load is not None:
             preload[imported.place] += imported.matrices.load[:, 0] * units.force
         if deck.contact_nodes is None:
             free = mesh.numbers[~supported.own[: mesh.n_nodes].all(axis=1)]
             check_nodes_have_dofs(imported.matrices, free, "the mesh without its clamps")
         supported.held[: len(imported.missing)] |= imported.missing
-        model = imported.model.with_nodes(supported.extra)
-        model = replace(model, rotation=rotation, preload=preload, gravity=gravity)
+        forms = imported.forms
+        for form in forms.values():
+            form.resize((3 * n_nodes, 3 * n_nodes))
         if files.recovery is not None:
             responses |= read_recovery(files.recovery, imported, units, responses)
+    whole = nodes.with_nodes(supported.extra)
+    model = FeModel(whole, rotation, parameters.stress_stiffening, preload, gravity, forms)
     joint = JointDefinition(
         contacts=contacts,
         held=supported.held,
-        load=_motion(selections, parameters.load, "load.set"),
+        load=_motion(selections, parameters.load, "load.set", n_nodes),
         responses=responses,
         cut=cut,
         retainer=_retainer(parameters, None if cut is None else cut.axis.axis, rotation),
         ties=ties,
         constraints=supported.constraints,
-        pairs=_pairs_of_table(selections, model, contacts, axis),
+        pairs=_pairs_of_table(selections, whole, contacts, axis),
     )
     return LoadedModel(deck, units, mesh, model, joint, None if imported is None else imported.omega_squared_held)
 
@@ -191,7 +173,7 @@ def _check_assembled(deck: Deck, units: Units) -> None:
 
 def _pairs_of_table(
     selections: Selections,
-    model: MeshModel | MatrixModel,
+    mesh: SolidMesh,
     contacts: tuple[ContactSurfaces, ...],
     axis: CyclicAxis | None,
 ) -> ContactPairs | None:
@@ -199,31 +181,31 @@ def _pairs_of_table(
     table, length = selections.deck.contact_nodes, selections.units.length
     if table is None:
         return None
-    others = len(model.numbers) - len(table.area)
+    others = mesh.n_nodes - len(table.area)
     area, gap = (
         np.pad(each, (0, others), constant_values=np.nan) for each in (table.area * length**2, table.gap * length)
     )
     normals = np.pad(table.normals, ((0, others), (0, 0)), constant_values=np.nan)
-    return match_nodes(model.coordinates, model.numbers, contacts, (area, normals, gap), axis)
+    return match_nodes(mesh, contacts, (area, normals, gap), axis)
 
 
 def _preload(selections: Selections, supported: Supported) -> FloatArray:
     """Constant nodal forces (3 n_nodes,), N: those of the study, else forces and pressures of the deck."""
     n_nodes, given, mesh = len(supported.held), selections.parameters.preload, selections.mesh
     if given:
-        rows = [each.force * _motion(selections, each, "preload.set").row(n_nodes) for each in given]
+        rows = [each.force * _motion(selections, each, "preload.set", n_nodes) for each in given]
         return np.asarray(np.sum(rows, axis=0))
     forces = np.zeros(3 * n_nodes)
     for each in selections.deck.pressures:
         kept = np.isin(each.elements, np.concatenate([group.numbers for group in mesh.groups]))
-        loops, _ = loops_of_faces(mesh, each.place, each.elements[kept], each.faces[kept])
+        faces = faces_of_elements(mesh, each.place, each.elements[kept], each.faces[kept])
         pressure = each.value * selections.units.stress
-        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, loops, pressure)
+        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, faces, pressure)
     return np.asarray(supported.forces + forces)
 
 
-def _motion(selections: Selections, given: SetDirection, key: str) -> SetMotion:
-    return SetMotion(selections.nodes(given.set, key), np.array(given.direction))
+def _motion(selections: Selections, given: SetDirection, key: str, n_nodes: int) -> FloatArray:
+    return mean_motion(selections.nodes(given.set, key), np.array(given.direction), n_nodes)
 
 
 def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:

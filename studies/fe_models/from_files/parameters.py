@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from studies.scene import ContactStiffness
-from studies.scene_error import SceneError
 
 
 def _as_tuple(value: object) -> object:
@@ -85,7 +84,7 @@ class Parameters(Table):
         " surface of each; which side the neighbour is on is found",
     )
     load: SetDirection = Field(description="where the harmonic load of 1 N acts: {set, direction}")
-    response: dict[str, SetDirection] | None = Field(
+    response: Annotated[dict[str, SetDirection], Field(min_length=1)] | None = Field(
         None, description="mean displacements by name: {name = {set, direction}}; default: that of the load"
     )
     recovery: str | None = Field(
@@ -127,11 +126,5 @@ class Parameters(Table):
 
     @property
     def responses(self) -> Mapping[str, SetDirection]:
-        """Responses by name, that of the load if none is given. Raises SceneError where the table is empty."""
-        if self.response is None:
-            return {"load": self.load}
-        if not self.response:
-            raise SceneError(
-                "response", "an empty table", "give at least one {name = {set, direction}}, or leave it out"
-            )
-        return self.response
+        """Responses by name, that of the load if none is given."""
+        return self.response or {"load": self.load}

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from solver.model import FloatArray
 from studies.fe_models.from_files.model import LoadedModel
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduced_joint import FeScene
@@ -23,8 +21,7 @@ _ASIDE = (1.0, 0.5, 0.4)  # from where a surface is looked at, in its mean frame
 def draw_pairs(loaded: LoadedModel, scene: FeScene, path: Path) -> None:
     """Writes a PNG with one part for each pair of surfaces. Raises OSError."""
     n = len(scene.pairs.moving_name)
-    columns = min(n, 3)
-    rows = -(-n // columns)
+    rows, columns = -(-n // 3), min(n, 3)
     figure = Figure(figsize=(7.0 * columns, 6.5 * rows), layout="constrained")
     for place in range(n):
         _draw_surface(figure, (rows, columns, place + 1), loaded, scene.pairs, place)
@@ -60,13 +57,8 @@ def _draw_surface(
     half = 0.5 * np.ptp(position, axis=0).max() + length
     limits = {f"{name}lim": (at - half, at + half) for name, at in zip("xyz", middle, strict=True)}
     axes.set(**limits, box_aspect=(1, 1, 1))
-    _look_at(axes, _ASIDE @ np.average(pairs.frames[own], axis=0, weights=pairs.area[own]))
-    axes.legend(fontsize=7, loc="upper right")
-
-
-def _look_at(axes: Any, direction: FloatArray) -> None:
-    """Looks from a direction (3,), of any length; that of a closed surface has none."""
-    length = np.linalg.norm(direction)
-    if length > 0.1:
-        x, y, z = direction / length
+    aside = _ASIDE @ np.average(pairs.frames[own], axis=0, weights=pairs.area[own])
+    if np.linalg.norm(aside) > 0.1:  # a closed surface has no mean normal
+        x, y, z = aside / np.linalg.norm(aside)
         axes.view_init(elev=np.degrees(np.arcsin(z)), azim=np.degrees(np.arctan2(y, x)))
+    axes.legend(fontsize=7, loc="upper right")

@@ -207,9 +207,7 @@ def _friction(chosen: list[SurfacePair], parameters: Parameters, deck: Deck) -> 
 def find_cut(selections: Selections, axis: CyclicAxis | None, contacts: Sequence[ContactSurfaces]) -> CutFaces | None:
     """Cut faces that the study names, else those of the deck, else all nodes that are images; None of no sector.
 
-    contacts: nodes of those with the next sector are on no cut face that is found.
-
-    Raises SceneError where they are not one sector apart.
+    contacts: nodes of those with the next sector are on no cut face that is found. Raises SceneError.
     """
     if axis is None:
         return None
@@ -224,10 +222,7 @@ def find_cut(selections: Selections, axis: CyclicAxis | None, contacts: Sequence
 
 
 def find_clamped(selections: Selections) -> BoolArray | None:
-    """Displacements (n_nodes, 3) of the nodes that the study clamps; None where the deck says what is held.
-
-    Raises SceneError where a set does not exist.
-    """
+    """Displacements (n_nodes, 3) of the nodes that the study clamps; None where the deck says what is held."""
     if selections.parameters.clamp is None:
         return None
     held = np.zeros((selections.mesh.n_nodes, 3), dtype=np.bool_)

@@ -13,8 +13,7 @@ from studies.fe_models.deck.contents import Deck
 from studies.fe_models.from_files.parameters import MaterialTable, Parameters
 from studies.fe_models.model_files import Units
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.element_matrices import Material
-from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
+from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.scene_error import SceneError
 
 SPEED_AGREES = 1e-3
@@ -93,10 +92,7 @@ def _own(table: MaterialTable) -> Material:
 
 
 def find_rotation(deck: Deck, parameters: Parameters, units: Units) -> Rotation | None:
-    """Rotation that the study gives, else that of the deck, SI; None where the model stands still.
-
-    Raises SceneError where a speed has no axis, or parts of the deck turn differently.
-    """
+    """Rotation that the study gives, else that of the deck, SI; None where it stands still. Raises SceneError."""
     speed = parameters.rotation_speed
     own = None if speed is not None and parameters.axis is not None else rotation_of_deck(deck, units)
     if speed == 0.0 or (speed is None and own is None):
@@ -111,10 +107,7 @@ def find_rotation(deck: Deck, parameters: Parameters, units: Units) -> Rotation 
 
 
 def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
-    """The rotation, SI, of the centrifugal loads, None where there is none.
-
-    Raises SceneError where parts of the model turn differently, or not at all.
-    """
+    """The rotation, SI, of the centrifugal loads, None of none. Raises SceneError where parts turn differently."""
     loads = deck.centrifugal
     if not loads:
         return None
@@ -133,10 +126,7 @@ def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
 
 
 def find_cyclic_axis(deck: Deck, parameters: Parameters, units: Units) -> CyclicAxis | None:
-    """Axis and number of sectors that the study gives, else those of the deck; None of no sector.
-
-    Raises SceneError where there is one without the other.
-    """
+    """Axis and number of sectors that the study gives, else those of the deck; None of no sector. Raises SceneError."""
     n_sectors = parameters.n_sectors
     if n_sectors is None and deck.cyclic is not None:
         n_sectors = deck.cyclic.n_sectors

@@ -76,10 +76,7 @@ def label(node: IntArray, dof: IntArray, file: str) -> IntArray:
 
 
 def of_table(file: str, matrix: object, labels: IntArray) -> Entries:
-    """Entries of a matrix, dense or sparse, or of a column of forces, whose rows have labels (n_dof,).
-
-    Raises SceneError where the sizes do not fit or numbers are complex.
-    """
+    """Entries of a matrix, dense or sparse, or of forces, whose rows have labels (n_dof,). Raises SceneError."""
     try:
         found = sp.coo_array(matrix if sp.issparse(matrix) else np.atleast_2d(np.asarray(matrix)))
     except (ValueError, TypeError) as error:
@@ -101,8 +98,7 @@ def of_table(file: str, matrix: object, labels: IntArray) -> Entries:
 def assemble(parts: Mapping[str, Entries], files: tuple[str, ...], code: str) -> Matrices:
     """The matrices of entries by name: "stiffness" and "mass"; "damping" and "load" may be missing.
 
-    Raises SceneError where an entry is not finite or given twice, a matrix is not symmetric, or rows are held or too
-    many.
+    Raises SceneError where entries are not finite or not symmetric, or rows are held or too many.
     """
     square = {name: each for name, each in parts.items() if name != "load"}
     for name in ("stiffness", "mass"):
@@ -125,10 +121,7 @@ def assemble(parts: Mapping[str, Entries], files: tuple[str, ...], code: str) ->
 
 
 def _symmetric(entries: Entries, labels: IntArray) -> sp.csr_array:
-    """The matrix of entries that stand for both triangles, or of both where any is there twice.
-
-    A triangle in the order of the program need not be one in the order of the rows.
-    """
+    """The matrix of a triangle of entries, or of both where any is there twice; its own order need not be ours."""
     file, values, n = entries.file, entries.values, labels.size
     if not np.isfinite(values).all():
         wrong(file, "an entry is not a finite number", "export it again")

@@ -39,10 +39,7 @@ Strings = Iterator[tuple[int, int, np.ndarray]]
 
 
 def _names_of_matrices(names: Iterable[str], file: str) -> dict[str, str]:
-    """Stiffness, mass, damping and load by the names of Nastran: KAAX, or the only one with the letter K, and so on.
-
-    Raises SceneError where stiffness or mass is missing, or there are several.
-    """
+    """Stiffness, mass, damping and load by the names of Nastran: KAAX, or the only one with the letter K, and so on."""
     found = {}
     for name, usual in _USUAL.items():
         own = [each for each in names if each[:1] == usual[0] and not each.startswith("K4")]
@@ -56,10 +53,7 @@ def _names_of_matrices(names: Iterable[str], file: str) -> dict[str, str]:
 
 
 def read_punch(files: Mapping[str, Path]) -> Matrices:
-    """Matrices of a punch file with DMIG entries; other entries in it are passed over.
-
-    Raises SceneError about "matrices", in particular for complex matrices, and displacements along other axes.
-    """
+    """Matrices of a punch file with DMIG entries; others are passed over. Raises SceneError about "matrices"."""
     path = files["matrices"]
     check_file(path, LARGEST_FILE, "matrices")
     columns: dict[str, list[np.ndarray]] = {}
@@ -111,7 +105,7 @@ def _entries(lines: Iterable[str]) -> Iterator[tuple[int, str, list[str]]]:
 def _take(fields: list[str], columns: dict[str, list[np.ndarray]], passed: set[str]) -> None:
     """Takes a header, or a column with its entries: rows (m, 5) of node, dof, node and dof of the column, value.
 
-    Complex matrices are passed over, as forces of a frequency, but not stiffness and mass. Raises ValueError.
+    Complex matrices are passed over, but not stiffness and mass. Raises ValueError.
     """
     name, node, component = fields[0].upper(), fields[1], fields[2]
     if node == "0":

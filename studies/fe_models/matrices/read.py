@@ -44,19 +44,15 @@ FORMATS = (
 
 
 def find_matrix_files(path: Path) -> tuple[Path, ...]:
-    """The files that belong to a name.
+    """The files that belong to the name that they have in common, or to one of them.
 
-    path: the name that the files have in common, or one of the files. Raises SceneError about "matrices" where there
-    are none, or of more than one kind.
+    Raises SceneError about "matrices" where there are none, or of more than one kind.
     """
     return tuple(_find(path)[1].values())
 
 
 def read_matrices(path: Path) -> Matrices:
-    """The matrices of a model, by the name that their files have in common or one of the files.
-
-    Raises SceneError about "matrices", in one sentence: where files are missing, damaged or do not belong together.
-    """
+    """The matrices of these files. Raises SceneError about "matrices"."""
     reader, files = _find(path)
     return reader(files)
 

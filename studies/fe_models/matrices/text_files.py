@@ -1,15 +1,13 @@
 """Matrices in text files of CalculiX and Abaqus.
 
-CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes job.sti and job.mas with lines "row column value", from 1, the upper
-triangle column by column, and job.dof with a line "node.direction" for every row, no number: 10.1 is not 10.10.
+CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes job.sti and job.mas, the upper triangle in lines "row column value"
+from 1, and job.dof with a line "node.direction" for every row, no number: 10.1 is not 10.10.
 
-Abaqus: `*MATRIX GENERATE, STIFFNESS, MASS` writes job_STIF1.mtx and job_MASS1.mtx (and job_DMPV1.mtx, job_LOAD1.mtx)
-with lines "node, dof, node, dof, value" (FORMAT=MATRIX INPUT), one triangle or both. Internal nodes are negative. A dof
-that a boundary condition holds has 1e36 on its diagonal.
+Abaqus: `*MATRIX GENERATE, STIFFNESS, MASS` writes job_STIF1.mtx and job_MASS1.mtx, one triangle or both in lines "node,
+dof, node, dof, value" (FORMAT=MATRIX INPUT). Internal nodes are negative. A held dof has 1e36 on its diagonal.
 
-Substructures: `*SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED` writes one file with a `*USER ELEMENT`, the
-numbers of its nodes in comments, their dofs, and the upper triangle of each `*MATRIX` column by column. Nodes may be
-repeated.
+Substructures: `*SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED` writes a `*USER ELEMENT`, its nodes in comments,
+which may be repeated, their dofs, and the upper triangle of each `*MATRIX` column by column.
 """
 
 from __future__ import annotations
@@ -19,7 +17,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from studies.fe_models.matrices.matrices import Entries, IntArray, Matrices, assemble, label, wrong
 from studies.fe_models.text import LARGEST_FILE, check_file, shown
@@ -38,7 +35,7 @@ def read_calculix(files: Mapping[str, Path]) -> Matrices:
     parts = {}
     for name in ("stiffness", "mass"):
         path = files[name]
-        rows, columns, values = _read_columns(path, " ", (int, int, float))
+        rows, columns, values = _read_columns(path, None, (int, int, float))
         size = int(max(rows.max(), columns.max()))
         if size == 2 * n_dof:
             found = f"{size} rows for {n_dof} dofs in {dofs.name}, written for a nodal diameter"
@@ -118,40 +115,23 @@ def _labels(nodes: list[int], dofs: list[list[int]], file: str) -> IntArray:
     return label(node, dof, file)
 
 
-def _read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: str | None = None) -> list[np.ndarray]:
-    """Columns of a text file, one array each, of the given types.
+def _read_columns(
+    path: Path, separator: str | None, kinds: tuple[type, ...], comment: str | None = None
+) -> list[np.ndarray]:
+    """Columns of a text file, one array each, of the given types, int or float. Raises SceneError about "matrices".
 
-    separator: between the numbers; " " for any blanks. kinds: int or float of each column. comment: character with
-    which lines begin that hold no numbers.
-
-    Raises SceneError about "matrices" where a line is no such row.
+    separator: between the numbers; None for any blanks. comment: character with which lines begin without numbers.
     """
     check_file(path, LARGEST_FILE, "matrices")
-    names = [f"c{place}" for place in range(len(kinds))]
+    columns = [(f"{place}", np.int64 if kind is int else np.float64) for place, kind in enumerate(kinds)]
     try:
         with warnings.catch_warnings():
-            # a row that is longer than the others, and a number that is none of the type
-            warnings.simplefilter("error", pd.errors.ParserWarning)
-            warnings.simplefilter("ignore", RuntimeWarning)
-            frame = pd.read_csv(
-                path,
-                sep=r"\s+" if separator == " " else separator,
-                header=None,
-                names=names,
-                index_col=False,
-                dtype=dict(zip(names, ("int64" if kind is int else "float64" for kind in kinds), strict=True)),
-                comment=comment,
-                encoding="latin-1",
-                quoting=3,
-                na_values=[],
-                keep_default_na=False,
-                engine="c",
-            )
-    except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
+            warnings.simplefilter("ignore", UserWarning)  # of a file without data
+            table = np.loadtxt(path, columns, comment, separator, encoding="latin-1", ndmin=1)
+    except (ValueError, OverflowError) as error:
         what = f"give lines of {kinds.count(int)} whole numbers and {kinds.count(float)} values"
         remedy = what + (", of Abaqus FORMAT=MATRIX INPUT" if separator == "," else "")
         wrong(path.name, f"a line is no row of numbers ({shown(str(error))})", remedy)
-    columns = [frame[name].to_numpy() for name in names]
-    if not columns[0].size:
+    if not table.size:
         wrong(path.name, "no entries in the file", "export it again")
-    return columns
+    return [table[name] for name, _ in columns]

@@ -4,7 +4,7 @@ import numpy as np
 
 from studies.finite_element.cut_faces import CyclicAxis, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
-from studies.finite_element.joint_model import JointDefinition, MeshModel, SetMotion
+from studies.finite_element.joint_model import FeModel, JointDefinition, mean_motion
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.surfaces import surface_of_faces
@@ -78,7 +78,7 @@ class Sector:
         held = np.zeros((self.mesh.n_nodes, 3), dtype=bool)
         held[self.bore] = True
         axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
-        tip = SetMotion(self.tip, np.array([0.0, 2.0, 0.0]))
+        tip = mean_motion(self.tip, np.array([0.0, 2.0, 0.0]), self.mesh.n_nodes)
         given = {
             "contacts": (ContactSurfaces(*self.surfaces, tolerance=1e-6),),
             "held": held,
@@ -90,4 +90,4 @@ class Sector:
 
     def model(self, prestress=True):
         rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
-        return MeshModel(self.mesh, rotation if prestress else None)
+        return FeModel(self.mesh, rotation if prestress else None)

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.finite_element.element_matrices import Material
 from studies.finite_element.elements import ELEMENT_KINDS
-from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
+from studies.finite_element.solid_mesh import ElementGroup, Material, SolidMesh
 
 STEEL = Material(210e9, 0.3, 7800.0)
 

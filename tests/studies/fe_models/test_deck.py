@@ -73,7 +73,7 @@ def test_steps(cubes):
     assert load.axis.tolist() == [0, 0, 1]
     assert cubes.gravity.tolist() == [0, 0, -9810]
     (force,) = cubes.forces
-    assert (force.nodes.tolist(), force.dof, force.value) == ([15, 16, 17, 18], 3, -5.0)
+    assert (force.nodes.tolist(), force.first_dof, force.value) == ([15, 16, 17, 18], 3, -5.0)
 
 
 def test_part_and_instance(tmp_path):

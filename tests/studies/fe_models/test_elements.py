@@ -5,10 +5,10 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from studies.fe_models.matrices.read import read_matrices
-from studies.finite_element.element_matrices import Material
 from studies.finite_element.elements import ASSEMBLED_KINDS
 from studies.finite_element.solid_mesh import (
     ElementGroup,
+    Material,
     Rotation,
     SolidMesh,
     assemble_mass,

@@ -8,18 +8,16 @@ from scipy import linalg
 
 from studies.fe_models.from_files.check import describe_rest
 from studies.finite_element import reduction
-from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import (
+    FeModel,
     JointDefinition,
-    MatrixModel,
-    MeshModel,
     ReductionOptions,
     Retainer,
-    SetMotion,
+    mean_motion,
 )
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
-from studies.finite_element.solid_mesh import Rotation, assemble_mass, assemble_stiffness, spin_softening
+from studies.finite_element.solid_mesh import Material, Rotation, assemble_mass, assemble_stiffness, spin_softening
 from studies.finite_element.surfaces import surface_of_nodes
 from studies.model_check import check_model
 from studies.scene_error import SceneError
@@ -89,7 +87,7 @@ def test_reduction_against_dense_constraints(name, nodal_diameter):
     joint = sector.joint(held=plane_of_symmetry(sector)) if name == "plane of symmetry" else sector.joint()
     prepared = prepare_model(sector.model(), joint)
     pairs, forms = prepared.pairs, prepared.reduction.forms
-    load = np.stack([prepared.static_load, joint.load.row(sector.mesh.n_nodes)], axis=1)
+    load = np.stack([prepared.static_load, joint.load], axis=1)
     n_modes = 5
     own = prepared.reduction.reduce(nodal_diameter, n_modes, load)
     shapes, stiffness, mass, frequencies = dense_twin(sector, joint, pairs, forms, nodal_diameter, n_modes)
@@ -137,9 +135,9 @@ def plates():
     up = surface_where(mesh, "UP", upper_nodes & touching)
     held = np.zeros((mesh.n_nodes, 3), dtype=bool)
     held[x < 1e-9] = True
-    end = SetMotion(np.flatnonzero(upper_nodes & (x > 0.0999)), np.array([0.0, 0.0, 1.0]))
+    end = mean_motion(np.flatnonzero(upper_nodes & (x > 0.0999)), Z, mesh.n_nodes)
     joint = JointDefinition((ContactSurfaces(low, up, friction_coefficient=0.3),), held, end, {"end": end})
-    return MeshModel(mesh), joint
+    return FeModel(mesh), joint
 
 
 def test_plain_assembly_without_cyclic_symmetry():
@@ -174,10 +172,10 @@ def bars(lift, load=0.0):
     z = np.append(a[:, 2], 10.0 + b[:, 2])
     surfaces = (surface_where(mesh, name, z == at) for name, at in (("LOW", 1.0), ("UP", 10.0)))
     held = np.repeat(((z == 0.0) | (z == 11.0))[:, None], 3, axis=1)
-    end = SetMotion(np.flatnonzero(z == 10.0), -Z)
+    end = mean_motion(np.flatnonzero(z == 10.0), -Z, mesh.n_nodes)
     joint = JointDefinition((ContactSurfaces(*surfaces, 0.1, with_gaps=True),), held, end, {"end": end})
-    preload = load * end.row(mesh.n_nodes) if load else None
-    return build_fe_scene(MeshModel(mesh, preload=preload), joint, ReductionOptions(n_modes=6), 1).model
+    preload = load * end if load else None
+    return build_fe_scene(FeModel(mesh, preload=preload), joint, ReductionOptions(n_modes=6), 1).model
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
@@ -228,7 +226,7 @@ def test_reduced_frequencies_come_down_to_the_exact_ones():
     bottom, top = np.flatnonzero(a[:, 2] == 1.0), lower.n_nodes + np.flatnonzero(b[:, 2] == 0.0)
     held = np.zeros((mesh.n_nodes, 3), dtype=bool)
     held[np.flatnonzero(a[:, 2] == 0.0)] = True
-    tip = SetMotion(top, Z)
+    tip = mean_motion(top, Z, mesh.n_nodes)
     faces = (surface_of_nodes(mesh, name, nodes) for name, nodes in (("TOP", top), ("BOTTOM", bottom)))
     joint = JointDefinition((ContactSurfaces(*faces),), held, tip, {"tip": tip})
     stiffness, mass = (each(mesh).toarray() for each in (assemble_stiffness, assemble_mass))
@@ -245,7 +243,7 @@ def test_reduced_frequencies_come_down_to_the_exact_ones():
     exact = lowest(*(basis.T @ form @ basis for form in (stiffness, mass)))
     errors = []
     for n_modes in (20, 80):
-        model = build_fe_scene(MeshModel(mesh), joint, ReductionOptions(n_modes=n_modes), 0).model
+        model = build_fe_scene(FeModel(mesh), joint, ReductionOptions(n_modes=n_modes), 0).model
         linear, open_ = model.linear[0], model.contact.dofs[:, 0]
         own = lowest(*(np.delete(np.delete(form, open_, 0), open_, 1) for form in (linear.stiffness, linear.mass)))
         # The upper brick slides in two directions and turns: three rigid modes.
@@ -278,7 +276,7 @@ def test_what_cannot_be_is_said():
         build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=7), 1)
     mass = assemble_mass(sector.mesh)
     softened = assemble_stiffness(sector.mesh) + spin_softening(mass, Rotation(1e9, np.zeros(3), Z))
-    fast = MatrixModel(sector.mesh.coordinates, sector.mesh.numbers, softened, mass)
+    fast = FeModel(sector.mesh, forms={"stiffness": softened, "mass": mass})
     with pytest.raises(SceneError, match="unstable: spin softening exceeds its stiffness"):
         build_fe_scene(fast, sector.joint(), ReductionOptions(), 1)
     slanted = np.zeros((sector.mesh.n_nodes, 3), dtype=bool)

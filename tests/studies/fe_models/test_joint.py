@@ -10,7 +10,7 @@ from studies.finite_element.closest_points import closest_points
 from studies.finite_element.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
-from studies.finite_element.surfaces import loops_of_faces, pressure_forces, surface_of_faces, surface_of_nodes
+from studies.finite_element.surfaces import faces_of_elements, pressure_forces, surface_of_faces, surface_of_nodes
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, surface_where
 from tests.studies.fe_models.solid_meshes import block, joined
@@ -31,7 +31,7 @@ def test_forces_of_a_pressure(kind):
     """5 Pa on a face of 2 by 3 m: its resultant and moments, of quadratic faces the second moment as well."""
     mesh, _ = block(kind, (2, 2, 2), lambda points: points * [2.0, 3.0, 1.0])
     faces = faces_where(mesh, np.abs(mesh.coordinates[:, 2] - 1.0) < 1e-9)
-    forces = pressure_forces(mesh.coordinates, loops_of_faces(mesh, "TOP", *faces)[0], 5.0).reshape(-1, 3)
+    forces = pressure_forces(mesh.coordinates, faces_of_elements(mesh, "TOP", *faces), 5.0).reshape(-1, 3)
     np.testing.assert_allclose(forces.sum(axis=0), [0.0, 0.0, -30.0], atol=1e-12)
     np.testing.assert_allclose(np.cross(mesh.coordinates, forces).sum(axis=0), [-45.0, 30.0, 0.0], atol=1e-12)
     if ELEMENT_KINDS[kind].reference.edges:
@@ -95,7 +95,7 @@ def blocks_on_each_other(lower, upper, lower_divisions, upper_divisions, lift=0.
 @pytest.mark.parametrize(("lower", "upper"), [("C3D8", "C3D10"), ("C3D20R", "C3D15"), ("C3D10", "C3D4")])
 def test_pairs_interpolate_what_a_face_can_hold(lower, upper):
     mesh, low, up = blocks_on_each_other(lower, upper, (2, 3, 1), (7, 7, 1), lift=0.01)
-    pairs = build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up, 0.02, with_gaps=True)], Z)
+    pairs = build_contact_pairs(mesh, [ContactSurfaces(low, up, 0.02, with_gaps=True)], Z)
     assert pairs.moving_name == ("UP",)
     assert np.array_equal(pairs.moving, up.nodes)
     assert pairs.area.sum() == pytest.approx(1.0, rel=1e-12)
@@ -113,7 +113,7 @@ def test_a_coarse_surface_inside_a_finer_one_moves():
     mesh = joined(first, second)
     low = surface_of_nodes(mesh, "LOW", np.flatnonzero(a[:, 2] == 1.0))
     up = surface_of_nodes(mesh, "UP", first.n_nodes + np.flatnonzero(b[:, 2] == 0.0))
-    pairs = build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up)], Z)
+    pairs = build_contact_pairs(mesh, [ContactSurfaces(low, up)], Z)
     assert pairs.moving_name == ("UP",)
     assert pairs.area.sum() == pytest.approx(0.25)
 
@@ -124,15 +124,15 @@ def test_no_pair_goes_through_a_body(layers, tolerance):
     mesh, reference = block("C3D8", (2, 2, layers), lambda points: points * [1.0, 1.0, 0.02])
     top, bottom = (surface_where(mesh, name, reference[:, 2] == z) for name, z in (("A", 1.0), ("B", 0.0)))
     with pytest.raises(SceneError, match=r"between A and B there is material: at 9 of 9 nodes B is up to 0.02 m below"):
-        build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(top, bottom, tolerance)], Z)
+        build_contact_pairs(mesh, [ContactSurfaces(top, bottom, tolerance)], Z)
 
 
 def test_wrong_surfaces_are_named():
     mesh, low, up = blocks_on_each_other("C3D8", "C3D8", (2, 2, 1), (3, 3, 1), lift=0.02)
     with pytest.raises(SceneError, match=r"16 of 16 nodes of UP are farther than 0\.01 m from LOW"):
-        build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up, tolerance=0.01)], Z)
+        build_contact_pairs(mesh, [ContactSurfaces(low, up, tolerance=0.01)], Z)
     with pytest.raises(SceneError, match="LOW and LOW share 9 nodes"):
-        build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, low)], Z)
+        build_contact_pairs(mesh, [ContactSurfaces(low, low)], Z)
     with pytest.raises(SceneError, match=r"face S5 of element 1 \(C3D4\)"):
         surface_of_faces(block("C3D4", (1, 1, 1))[0], "S", np.array([1]), np.array([5]))
     with pytest.raises(SceneError, match="names element 99"):

@@ -10,8 +10,8 @@ from studies.fe_models.from_files.imported import order_by_nodes
 from studies.fe_models.from_files.model import find_files, load_model, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.matrices.read import read_matrices
-from studies.fe_models.model_files import find_units
-from studies.finite_element.joint_model import ReductionOptions
+from studies.fe_models.model_files import UNITS
+from studies.finite_element.joint_model import FeModel, ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
@@ -82,9 +82,9 @@ def test_matrices_of_calculix(kind, tmp_path):
     run_ccx(tmp_path, [*lines, "*STEP, PERTURBATION", "*BOUNDARY, OP=NEW", *EXPORT])
     rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
     given = read_matrices(tmp_path / "job")
-    ordered = order_by_nodes(given, find_units("SI"), sector.mesh.numbers, sector.mesh.coordinates)
+    ordered = order_by_nodes(given, UNITS["SI"], sector.mesh)
     assert not ordered.missing.any()
-    model = replace(ordered.model, rotation=rotation)
+    model = FeModel(ordered.mesh, rotation, forms=ordered.forms)
     scene = build_fe_scene(model, sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
     expected = calculix_frequencies(tmp_path, lines, (0, 3, 6), "*STEP, PERTURBATION")
     own = np.array([scene.glued_frequencies[k] for k in (0, 3, 6)])

@@ -46,7 +46,7 @@ class Sector:
         loose = ~self.joint.held.any(axis=1)
         self.left, self.right = cut.left[loose[cut.left]], cut.right[loose[cut.right]]
         self.first, self.second = contact.first, contact.second
-        tip = self.joint.load.nodes
+        tip = self.tip = np.flatnonzero(self.joint.load.reshape(-1, 3).any(axis=1))
         self.nodes = np.unique(np.concatenate([self.left, self.right, self.first.nodes, self.second.nodes, tip]))
         kept = (3 * self.nodes[:, None] + np.arange(3)).ravel()
         inner = np.setdiff1d(np.flatnonzero(np.repeat(loose, 3)), kept)
@@ -63,13 +63,13 @@ class Sector:
         self.named["load"] = shapes.T @ forces.ravel()
         labels = np.stack([np.repeat(self.mesh.numbers[self.nodes], 3), np.tile([1, 2, 3], len(self.nodes))], axis=1)
         self.rows = np.concatenate([labels, [[9001 + n, 0] for n in range(N_MODES)]])
-        mean = np.append(self.joint.load.row(self.mesh.n_nodes)[kept], np.zeros(N_MODES))
+        mean = np.append(self.joint.load[kept], np.zeros(N_MODES))
         self.weights = np.stack([mean, np.random.default_rng(3).normal(size=len(self.rows)) * 1e5])
 
     def table(self):
         """The table of the nodes."""
         area, normals = self.first.areas_and_normals(self.mesh.coordinates)
-        groups = {"LEFT": self.left, "RIGHT": self.right, "TIP": self.joint.load.nodes}
+        groups = {"LEFT": self.left, "RIGHT": self.right, "TIP": self.tip}
         groups |= {"LEADING": self.first.nodes, "TRAILING": self.second.nodes}
         lines = ["node,x,y,z,sets,area,normal_x,normal_y,normal_z,gap"]
         for node in self.nodes:
@@ -167,7 +167,7 @@ def test_tables_of_nodes_and_matrices_give_the_complex_matrices_of_each_nodal_di
     assert set(found.linear) == set(expected.linear)
     assert found.response_names == expected.response_names
     np.testing.assert_allclose(found.contact.gap, expected.contact.gap, rtol=1e-12)
-    stuck = (stuck_frequencies(each).frequencies for each in (found, expected))
+    stuck = (np.array([*stuck_frequencies(each).values()]) for each in (found, expected))
     np.testing.assert_allclose(*stuck, rtol=1e-9)
     for k in expected.linear:
         for omega in (0.0, 3e3, 2e4):
