@@ -46,7 +46,7 @@ class FretwearAccessor:
     def summary(self) -> Summary:
         """What came out: where the joint wears most, how much, how deep, how well that is known, what failed.
 
-        `print` shows it as the last lines of a run do. ValueError: the dataset is no result of a study.
+        `print` shows it as the last lines of a run do, `.values` has the numbers. ValueError: no result of a study.
         """
         if "study" not in self._dataset.attrs:
             raise ValueError("this dataset is no result of a study: give one of open_result or run_study")
@@ -153,32 +153,24 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
             if not other[each].variable.equals(first[each].variable):  # type: ignore[no-untyped-call]
                 raise ValueError(f"The results have different contact pairs: see {each}.")
     models = {name: array for one in datasets for name, array in one.data_vars.items()}
-    gaps = {name: _gap(str(name), array) for name, array in models.items()}
+    gaps: dict[Any, Any] = {name: {"f": math.nan}.get(array.dtype.kind, 0) for name, array in models.items()}
+    gaps |= {name: "" for name, array in models.items() if array.dtype.kind in "OU"} | {"outcome": _NOT_COMPUTED}
     texts = [d for d in axes if first[d].dtype.kind in "OU"]
     as_they_come = {d: list(dict.fromkeys(text for one in datasets for text in one[d].values.tolist())) for d in texts}
-    joined, *parts = (part.sel(as_they_come) for part in xr.align(*datasets, join="outer", fill_value=gaps))
-    for later in parts:
-        is_there = later["outcome"] != _NOT_COMPUTED
-        for name, gap in gaps.items():
-            model = later.get(name, joined.get(name, models[name]))
-            if not set(axes) <= set(model.dims):
-                # one without the axes, as a mesh, is the same in all results
-                joined = joined.assign({name: model})
-            elif name in later or name in joined:
-                new, old = (part.get(name, xr.full_like(model, gap)) for part in (later, joined))
-                taken = new.where(is_there, old).transpose(*model.dims)
-                joined = joined.assign({name: taken.assign_attrs(model.attrs)})
+    parts = [part.sel(as_they_come) for part in xr.align(*datasets, join="outer", fill_value=gaps)]
+    joined = parts[0].drop_vars(models, errors="ignore")
+    for name, model in models.items():
+        # one without the axes, as a mesh, is the same in all results
+        if set(axes) <= set(model.dims):
+            taken = blank = xr.full_like(next(part[name] for part in parts if name in part), gaps[name])
+            for part in parts:
+                taken = part.get(name, blank).where(part["outcome"] != _NOT_COMPUTED, taken)
+            model = taken.transpose(*model.dims).assign_attrs(model.attrs)
+        joined = joined.assign({name: model})
     common = {key: text for key, text in first.attrs.items() if all(one.attrs.get(key) == text for one in datasets)}
     history = [f"joined of {len(datasets)} results", *dict.fromkeys(str(one.attrs.get("history")) for one in datasets)]
     joined.attrs = {**common, "history": "\n".join(history)}
     return joined.assign_coords({ENDED: outcome_words(joined["outcome"])}) if in_words else joined
-
-
-def _gap(name: str, array: xr.DataArray) -> Any:
-    """What stands in a variable at a point in none of the results."""
-    if name == "outcome":
-        return _NOT_COMPUTED
-    return math.nan if array.dtype.kind == "f" else "" if array.dtype.kind in "OU" else 0
 
 
 def _with_axis(dataset: xr.Dataset, key: str) -> xr.Dataset:

@@ -125,7 +125,7 @@ def _open_completion(
     """The tasks of a study, and what of them is finished and wanted. facts: of all scenes."""
     plan = build_tasks(study, scenes.scenes, scenes.facts)
     completion = CompletionIndex(study, plan, facts, [each.digest for each in scenes.facts], store)
-    store.note_study(identity_of(study))
+    store.note_study(identity_of(study.study.name, study.scene.model))
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:

@@ -174,7 +174,7 @@ def _condense_each(
 def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray, load: ComplexArray) -> Moving:
     """As `_condense_each`, of a real structure, with matrices shared by all harmonics."""
     others = _others(load.size, relative)
-    exponents: ComplexArray = 1j * rates[:, None, None]
+    exponents: ComplexArray = np.asarray(1j * rates[:, None, None], complex)
     rows = np.vstack([linear.response, load.conj()])
     inner, to_pairs = (_dynamic_stiffness(linear, exponents, np.ix_(others, at)) for at in (others, relative))
     compliance = cast("ComplexArray", np.linalg.inv(inner))

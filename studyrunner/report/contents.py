@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, cast
 
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, as_sentences, style
@@ -19,10 +18,7 @@ WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
 
 _BANDS, _BARS = "Bands: estimated errors", "Bars: estimated errors, none where they are smaller than the markers"
 _OTHERS = "Each point is another joint, which wore at its own value of the horizontal axis"
-_QUANTILES = (
-    "So much is worn at most in 5, 25, 50, 75 and 95 % of the samples. Dashed: 5 and 95 %, with every sample less or"
-    " more its numerical error"
-)
+_QUANTILES = "So much is worn at most in 5, 25, 50, 75 and 95 % of the samples, each less or more its numerical error"
 CAPTIONS = {
     "blocks": "Cycles of one mission. A passage whose rate is far below (zeta f)² wears as its steady states do",
     "block_shares": f"Above, shares of the blocks in the volume worn in one mission. {_BANDS}",
@@ -60,15 +56,16 @@ CAPTIONS = {
 class Entry:
     """One figure or table of the report.
 
-    title: with {slow} for cycles or missions and {over} for the axis that figures are drawn over. kinds: of results
-    that have it. needs: variables without which a sentence says what to ask for. scene: variables of which the scene of
-    the shown point is drawn. at: what the title names, the "point" that is shown or its "course". always: also where no
-    point has a result.
+    title: with {slow} for cycles or missions and {over} for the axis that figures are drawn over. of: what `draw` is
+    given beside the result; of a table of variables all are needed. kinds: of results that have it. needs: variables
+    without which a sentence says what to ask for. scene: variables of which the scene of the shown point is drawn. at:
+    what the title names, the "point" that is shown or its "course". always: also where no point has a result.
     """
 
     name: str
     title: str
-    draw: Callable[[Result], Drawn]
+    draw: Callable[..., Drawn]
+    of: Any = None
     kinds: tuple[str, ...] = (WEAR, MISSIONS)
     needs: tuple[str, ...] = ()
     scene: tuple[str, ...] = ()
@@ -80,7 +77,8 @@ class Entry:
         axis, how = course_axis(result) or "", CAPTIONS.get(self.name, "")
         title = self.title.format(slow=result.counted, over=axis.replace("_", " ")).removesuffix(" (table)")
         shown = of_shown_scene(result, self.scene) if self.scene else result
-        drawn = result.lacks(*self.needs) or self._drawn(shown, WIDTH)
+        needs = (*self.needs, *(self.of if isinstance(self.of, dict) else ()))
+        drawn = result.lacks(*needs) or self._drawn(shown, WIDTH)
         if drawn is None:
             return None
         if isinstance(drawn, str):
@@ -97,49 +95,46 @@ class Entry:
     def _drawn(self, result: Result, width: float) -> Drawn:
         # the style is that of the whole process: the caller does not run with it
         with style(width):
-            drawn = self.draw(result)
+            drawn = self.draw(result) if self.of is None else self.draw(result, self.of)
             if isinstance(drawn, tuple) and not drawn[0].legends:
                 add_legend(drawn[0])
         return drawn
 
 
+_ALL, _OF_MODES, _OF_WEAR, _OF_MISSIONS = (WEAR, MISSIONS, MODES), (MODES,), (WEAR,), (MISSIONS,)
 _ONE: dict[str, Any] = {"scene": OF_PAIRS, "at": "point"}
-_BLOCK: dict[str, Any] = {"kinds": (MISSIONS,), "at": "point"}
-_MODE: dict[str, Any] = {"kinds": (MODES,)}
-_WEAR: dict[str, Any] = {"kinds": (WEAR,)}
-_OF_ONE = {**_WEAR, **_ONE}
-_WORN: dict[str, Any] = {"needs": ("worn_volume",)}
-_RESPONSE: dict[str, Any] = {**_WEAR, "needs": ("response_amplitude",)}
-_ALL: dict[str, Any] = {"kinds": (WEAR, MISSIONS, MODES)}
+_BLOCK: dict[str, Any] = {"kinds": _OF_MISSIONS, "at": "point"}
+_LOOPS: dict[str, Any] = {"kinds": _OF_WEAR, **_ONE}
+_RESPONSE: dict[str, Any] = {"kinds": _OF_WEAR, "needs": ("response_amplitude",)}
 _SECTOR: dict[str, Any] = {"scene": root.OF_SECTOR, "always": True, "needs": ("natural_frequency",)}
+_WORN = ("worn_volume",)
 
 
-def _of(draw: Callable[..., Drawn], name: str, title: str, **options: Any) -> Entry:
-    """A figure of the variable of its name."""
-    options["needs"] = (*options.get("needs", ()), name.removesuffix("_map"))
-    return Entry(name, title, partial(draw, name=options["needs"][-1]), **options)
-
-
-def _of_blocks(name: str, title: str, names: Mapping[str, str]) -> Entry:
-    return Entry(name, title, partial(wear.draw_blocks, names=names), needs=tuple(names), **_BLOCK)
+def _mode(draw: Callable[[Result, Any], Drawn], name: str, title: str, **options: Any) -> Entry:
+    """A figure of the variable of modes of its name."""
+    return Entry(name, title, draw, name, _OF_MODES, (name,), **options)
 
 
 FIGURES = (
     Entry("blocks", "Blocks of the mission with their wear (table)", wear.list_blocks, needs=wear.LISTED, **_BLOCK),
-    _of_blocks("block_shares", "Wear by block over the missions", wear.SHARES),
-    _of_blocks("block_responses", "Vibration of each block over the missions", wear.RESPONSES),
-    _of(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude", **_MODE),
-    _of(response.draw_mode, "damping_ratio", "Damping ratio of a mode over its amplitude", **_MODE),
-    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", partial(points.draw_bands, over="cycle")),
-    Entry(
-        "worn_volume_bands_course", "Worn volume of the samples over {over}", partial(points.draw_bands, over="course")
-    ),
+    Entry("block_shares", "Wear by block over the missions", wear.draw_blocks, wear.SHARES, **_BLOCK),
+    Entry("block_responses", "Vibration of each block over the missions", wear.draw_blocks, wear.RESPONSES, **_BLOCK),
+    _mode(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude"),
+    _mode(response.draw_mode, "damping_ratio", "Damping ratio of a mode over its amplitude"),
+    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", points.draw_bands, "cycle"),
+    Entry("worn_volume_bands_course", "Worn volume of the samples over {over}", points.draw_bands, "course"),
     Entry("exceedance", "Probability of more wear", points.draw_exceedance),
     Entry("deciding_inputs", "What decides the worn volume", points.draw_deciding_inputs),
-    Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, **_WORN, at="course"),
-    Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, **_WORN),
-    _of(wear.draw_map, "worn_volume_map", "Worn volume over {over} and {slow}"),
-    _of(wear.draw_map, "wear_rate_map", "Wear rate over {over} and {slow}", **_WORN),
+    Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, needs=_WORN, at="course"),
+    Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, needs=_WORN),
+    Entry("worn_volume_map", "Worn volume over {over} and {slow}", wear.draw_map, "worn_volume", needs=_WORN),
+    Entry(
+        "wear_rate_map",
+        "Wear rate over {over} and {slow}",
+        wear.draw_map,
+        "wear_rate",
+        needs=("worn_volume", "wear_rate"),
+    ),
     Entry("frequency_response", "Frequency response of one joint, new and worn", response.draw_responses, **_RESPONSE),
     Entry(
         "response_after_own_wear",
@@ -148,29 +143,27 @@ FIGURES = (
         **_RESPONSE,
     ),
     Entry(
-        "excitation_frequency", "Frequency of an excitation that follows the resonance", wear.draw_excitation, **_WEAR
+        "excitation_frequency",
+        "Frequency of an excitation that follows the resonance",
+        wear.draw_excitation,
+        kinds=_OF_WEAR,
     ),
     Entry("trends", "Trends along the axes of the study", points.draw_trends),
     Entry("worn_root", "The worn root", root.draw_root, **_ONE),
     Entry("whole_disk", "The whole disk", root.draw_disk, scene=OF_PAIRS),
     Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, **_ONE),
     Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, **_ONE),
-    Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, **_OF_ONE, needs=("mean_pressure",)),
-    Entry("fretting_loops", "Fretting loops", partial(response.draw_loops, name="fretting_loops"), **_OF_ONE),
-    Entry("normal_load", "Normal force through a period", partial(response.draw_loops, name="normal_load"), **_OF_ONE),
-    Entry(
-        "pair_motion",
-        "Motion of the pairs in the contact plane",
-        partial(response.draw_loops, name="pair_motion"),
-        **_OF_ONE,
-    ),
-    _of(root.draw_fraction, "slip_fraction", "Where the joint slips", **_MODE, **_ONE),
-    _of(root.draw_fraction, "open_fraction", "Where the joint opens", **_MODE, **_ONE),
-    Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS, **_ALL),
+    Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, needs=("mean_pressure",), **_LOOPS),
+    Entry("fretting_loops", "Fretting loops", response.draw_loops, "fretting_loops", **_LOOPS),
+    Entry("normal_load", "Normal force through a period", response.draw_loops, "normal_load", **_LOOPS),
+    Entry("pair_motion", "Motion of the pairs in the contact plane", response.draw_loops, "pair_motion", **_LOOPS),
+    _mode(root.draw_fraction, "slip_fraction", "Where the joint slips", **_ONE),
+    _mode(root.draw_fraction, "open_fraction", "Where the joint opens", **_ONE),
+    Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS, kinds=_ALL),
     Entry("natural_frequencies", "Sector and its natural frequencies, joint stuck", root.draw_sector, **_SECTOR),
-    Entry("outcome_map", "How the points ended", points.draw_outcomes, always=True, **_ALL),
+    Entry("outcome_map", "How the points ended", points.draw_outcomes, always=True, kinds=_ALL),
     Entry("certificates", "Certificates: how right the states are (table)", points.list_certificates),
-    Entry("precision", "Error against run time", precision.draw_precision, **_WEAR),
+    Entry("precision", "Error against run time", precision.draw_precision, kinds=_OF_WEAR),
 )
 """The figures of all results."""
 

@@ -91,9 +91,13 @@ class RootSurface:
         """Factor 1, 2 or 5 times a power of ten with which a depth, m, is well seen; 1 where nothing is worn."""
         if not deepest > 0.0 or not math.isfinite(deepest) or not self.well_seen > 0.0:
             return 1.0
-        wanted = self.well_seen / deepest
-        power = 10.0 ** math.floor(math.log10(wanted))
-        return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= wanted * (1.0 + 1e-9))
+        return _round_below(self.well_seen / deepest)
+
+
+def _round_below(value: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above a value, which is above 0."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(factor * power for factor in (1.0, 2.0, 5.0) if factor == 1.0 or factor * power <= value * (1.0 + 1e-9))
 
 
 def read_root(result: Result) -> RootSurface | None:
@@ -280,8 +284,7 @@ def draw_scale_bar(panel: Axes, nodes: Floats, view: View) -> None:
     size = float((high - low).max())
     if not size > 0.0:
         return
-    power = 10.0 ** np.floor(np.log10(0.4 * size))
-    length = power * max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= 0.4 * size or factor == 1.0)
+    length = _round_below(0.4 * size)
     bottom, middle = low[1] - 0.05 * size, low[0] + 0.5 * length
     panel.plot([low[0], low[0] + length], [bottom, bottom], color="0.1", linewidth=2.5, label="_")
     panel.text(middle, bottom - 0.02 * size, f"{length:g} mm", ha="center", va="top")

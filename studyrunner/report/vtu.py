@@ -1,7 +1,4 @@
-"""The root as files for ParaView: one VTU file a cycle count, and a PVD file that makes a time series of them.
-
-By hand is the PVD file alone: `meshio` writes none.
-"""
+"""The root as files for ParaView: one VTU file a cycle count, and a PVD file, by hand, that makes a series of them."""
 
 from __future__ import annotations
 
@@ -43,48 +40,35 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> int:
 
     Points are those of the mesh before wear, m. At the points: `FIELDS` with their units in the name, as
     "wear_depth (m)", NaN where there is no contact; "worn_displacement (m)", of 3 components, from there to the worn
-    surface, which ParaView's filter "Warp By Vector" exaggerates. Of the cells: `body` and `contact_surface`, numbers
-    as in a comment of the PVD file, -1 where there is no contact. The time of the series is the cycle count.
+    surface, which ParaView's filter "Warp By Vector" exaggerates. Of the faces: `body` and `contact_surface`, numbers
+    in the order of the file, -1 where there is no contact. The time of the series is the cycle count.
 
     Returns the number of VTU files. Raises OSError where a file cannot be written.
     """
     import meshio
 
-    shown = result.shown
+    shown, at_points = result.shown, dict[str, np.ndarray]()
     fields = {"wear_depth": depths(result, shown)} if has_depths(result) else {}
     fields |= {name: result.at(name, shown).values for name in FIELDS if name not in fields and result.has(name)}
-    units = {name: str(result.dataset[name].attrs.get("units", "1")) for name in fields if result.has(name)}
-    triangle = surface.faces[:, 2] == surface.faces[:, 3]
-    # a block without cells would be one of no type
-    chosen = [rows for rows in (np.flatnonzero(triangle), np.flatnonzero(~triangle)) if len(rows)]
-    cells = [
-        ("triangle", surface.faces[rows, :3]) if triangle[rows[0]] else ("quad", surface.faces[rows]) for rows in chosen
-    ]
-    of_cells = {"body": surface.body, "contact_surface": surface.flank}
-    at_cells = {key: [values[rows] for rows in chosen] for key, values in of_cells.items()}
+    units = {name: str(result.dataset[name].attrs.get("units", "1")) if result.has(name) else "m" for name in fields}
+    at_faces = {"body": [surface.body], "contact_surface": [surface.flank]}
     (folder / "vtu").mkdir(exist_ok=True)
     for old in (folder / "vtu").glob("root_*.vtu"):
         old.unlink()
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
-    names = [", ".join(f"{n} {each}" for n, each in enumerate(found)) for found in (surface.bodies, surface.flanks)]
-    text = f"{result.title}; {result.describe(shown, result.axes)}; time: {result.counted}"
-    text = f" {text}; body: {names[0]}; contact_surface: {names[1]} "
-    # two hyphens must not meet in a comment
-    root.append(ElementTree.Comment(text.replace("--", "- -")))
     collection = ElementTree.SubElement(root, "Collection")
     known = np.flatnonzero(np.all([np.isfinite(values).all(axis=1) for values in fields.values()], axis=0))
     for place, number in enumerate(known.tolist()):
-        at_points = {}
         for field, values in fields.items():
-            unit = units.get(field, "m")
-            field = field if unit == "1" else f"{field} ({unit})"
-            at_points[field] = np.full(len(surface.nodes), np.nan)
-            at_points[field][surface.own] = values[number][surface.pairs]
+            at_nodes = np.full(len(surface.nodes), np.nan)
+            at_nodes[surface.own] = values[number][surface.pairs]
+            at_points[field if units[field] == "1" else f"{field} ({units[field]})"] = at_nodes
         if "wear_depth" in fields:
             at_points["worn_displacement (m)"] = surface.worn(fields["wear_depth"][number], 1.0) - surface.nodes
-        name = f"vtu/root_{place:04d}.vtu"
-        meshio.vtu.write(folder / name, meshio.Mesh(surface.nodes, cells, point_data=at_points, cell_data=at_cells))
-        count = repr(float(result.cycles[number]))
+        # a triangle is a quadrilateral that repeats its last node
+        mesh = meshio.Mesh(surface.nodes, [("quad", surface.faces)], point_data=at_points, cell_data=at_faces)
+        name, count = f"vtu/root_{place:04d}.vtu", repr(float(result.cycles[number]))
+        meshio.vtu.write(folder / name, mesh)
         ElementTree.SubElement(collection, "DataSet", timestep=count, group="", part="0", file=name)
     ElementTree.indent(root)
     ElementTree.ElementTree(root).write(folder / SERIES, encoding="utf-8", xml_declaration=True)

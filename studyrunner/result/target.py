@@ -40,13 +40,11 @@ class Target:
         return self.path.with_name(f"{self.path.name}.progress")
 
 
-def identity_of(study: Study) -> str:
-    """Identity of a study in words: the same study with other values, such as a finer axis, has the same."""
-    return _identity(study.study.name, study.scene.model)
+def identity_of(name: str, model: str) -> str:
+    """Identity of a study in words: the same study with other values, such as a finer axis, has the same.
 
-
-def _identity(name: str, model: str) -> str:
-    """name: of the study. model: of its scene; of a file the name without folders."""
+    name: of the study. model: of its scene; of a file the name without folders.
+    """
     return f'study "{name}" (scene {os.path.basename(model)})'  # noqa: PTH119 - of an empty text as well
 
 
@@ -58,7 +56,23 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
     """
     try:
         target = Path(os.path.realpath(path))
-        remedy = _obstacle(option, path, target, inputs)
+        # the libraries that write it are given a text, not bytes
+        str(target).encode(sys.getfilesystemencoding())
+        # what leads to a stream, or to a file without a name, exists although its target does not
+        is_there, is_file = os.path.lexists(target) or path.exists(), target.is_file()
+        progress = Target(target).progress
+        is_input = is_file and any(source.exists() and target.samefile(source) for source in inputs)
+        faults = (
+            (not target.parent.is_dir(), f"give a file in a folder that exists: there is no folder {path.parent}"),
+            (is_there and not is_file, "give the name of an ordinary file"),
+            (is_file and not os.access(target, os.W_OK), "give a file that may be written: this is write-protected"),
+            (is_input, f"give another file with {option}: this one is read by the run"),
+            (
+                os.path.lexists(progress) and (progress.is_symlink() or not progress.is_file()),
+                f"give another name: {progress.name}, which the run needs, is no plain file",
+            ),
+        )
+        remedy = next((text for is_wrong, text in faults if is_wrong), "")
         if not remedy:
             trial = new_partial(target)
             with trial.open("xb") as file:
@@ -76,26 +90,6 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
     return target
 
 
-def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> str:
-    """Remedy for what keeps a file from being written to `target`; "" for nothing. Raises OSError."""
-    # the libraries that write it are given a text, not bytes
-    str(target).encode(sys.getfilesystemencoding())
-    if not target.parent.is_dir():
-        return f"give a file in a folder that exists: there is no folder {path.parent}"
-    # what leads to a stream, or to a file without a name, exists although its target does not
-    if os.path.lexists(target) or path.exists():
-        if not target.is_file():
-            return "give the name of an ordinary file"
-        if not os.access(target, os.W_OK):
-            return "give a file that may be written: this one is write-protected"
-        if any(source.exists() and target.samefile(source) for source in inputs):
-            return f"give another file with {option}: this one is read by the run"
-    progress = Target(target).progress
-    if os.path.lexists(progress) and (progress.is_symlink() or not progress.is_file()):
-        return f"give another name: {progress.name}, which the run needs, is no plain file"
-    return ""
-
-
 def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
     """Target of a result, after `check_output` and a test that nothing forbids to replace what exists there.
 
@@ -103,7 +97,7 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
     UserError where what exists, or its progress, is no result of run-study or belongs to another study.
     """
     target = Target(check_output(option, path, study.files))
-    own, (standing, finished) = identity_of(study), _read_result(option, target.path)
+    own, (standing, finished) = identity_of(study.study.name, study.scene.model), _read_result(option, target.path)
     for what, found in ((target.path, standing), (target.progress, read_study(target.progress))):
         if found is not None and found != own and not overwrite:
             remedy = f"give another name or {how}: {what.name} is of {found}, this is {own}"
@@ -129,7 +123,7 @@ def _read_result(option: str, path: Path) -> tuple[str | None, bool]:
             text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
             stored: Any = b"" if text is None else text.item()
             table: Any = read_toml(stored if isinstance(stored, bytes) else stored.encode(), "")
-            found = _identity(str(table["study"]["name"]), str(table["scene"]["model"]))
+            found = identity_of(str(table["study"]["name"]), str(table["scene"]["model"]))
             # version 0.4.0 does not say how many points are left
             return found, left is None or left.item() == 0
     remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"

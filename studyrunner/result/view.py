@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from studyrunner.result.opening import as_history, find_value, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
-from studyrunner.units import show_cycles, show_value
+from studyrunner.units import show_cycles, show_percent, show_value
 from studyrunner.user_error import show_text
 
 if TYPE_CHECKING:
@@ -299,6 +299,10 @@ class Result:
             if known.max() > 0.0:
                 break
         return self.largest(known)
+
+    def show_error(self, point: Point) -> str:
+        """Error of the worn volume of a point as text: "2.6 %"."""
+        return show_percent(float(self.errors[self.place(point)]), float(self.rtol[self.place(point)]))
 
     def largest(self, values: NDArray[Any]) -> dict[str, int]:
         """The point at which an array of points is largest."""

@@ -70,7 +70,12 @@ def write_result(
             file.setncatts(origin)
             variables = _create_all(file, study, facts, slab, arrays)
             for region, records in _slabs(shape, slab, completion, keys):
-                _write_slab(file, region, variables, study.outputs.loops, records)
+                for name, entry in variables.items():
+                    values = records[name].reshape(*(at.stop - at.start for at in region), *records[name].shape[1:])
+                    if name not in LOOPS:
+                        file[name][(*region, ...)] = values.astype(object) if entry.is_text else values
+                    for place, pair in enumerate(study.outputs.loops if name in LOOPS else ()):
+                        file[name][(*region, slice(None), pair)] = values[..., place, :, :]
                 outcomes.update(records["outcome"].tolist())
             file.setncattr(POINTS_LEFT, np.int32(outcomes[Outcome.NOT_COMPUTED]))
             for array in arrays:
@@ -114,20 +119,14 @@ def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
     return tuple(reversed(lengths))
 
 
-def _regions(shape: Sequence[int], slab: Sequence[int]) -> Iterator[Region]:
-    """Regions of the axes, in the order of the file."""
-    for corner in itertools.product(*(range(0, size, length) for size, length in zip(shape, slab, strict=True))):
-        yield tuple(
-            slice(start, min(start + length, size)) for start, length, size in zip(corner, slab, shape, strict=True)
-        )
-
-
 def _slabs(
     shape: Sequence[int], slab: Sequence[int], completion: CompletionIndex, keys: NDArray[np.bytes_]
 ) -> Iterator[tuple[Region, NDArray[np.void]]]:
     """Regions of the axes, each with the records of its points. Raises StorageError."""
-    first = 0
-    for region in _regions(shape, slab):
+    first, starts = 0, (range(0, size, length) for size, length in zip(shape, slab, strict=True))
+    for corner in itertools.product(*starts):
+        ends = (min(start + length, size) for start, length, size in zip(corner, slab, shape, strict=True))
+        region = tuple(itertools.starmap(slice, zip(corner, ends, strict=True)))
         last = first + math.prod(at.stop - at.start for at in region)
         names = keys[first:last]
         records, there = completion.read_results([name.decode() for name in names.tolist()])
@@ -179,24 +178,6 @@ def _create(
     return variable
 
 
-def _write_slab(
-    file: netCDF4.Dataset,
-    region: Region,
-    variables: Mapping[str, Variable],
-    loops: Sequence[int],
-    records: NDArray[np.void],
-) -> None:
-    """Writes the records of all points of a region."""
-    lengths = [at.stop - at.start for at in region]
-    for name, entry in variables.items():
-        values = records[name].reshape(*lengths, *records[name].shape[1:])
-        if name not in LOOPS:
-            file[name][(*region, ...)] = values.astype(object) if entry.is_text else values
-            continue
-        for place, pair in enumerate(loops):
-            file[name][(*region, slice(None), pair)] = values[..., place, :, :]
-
-
 def _write_array(file: netCDF4.Dataset, shape: Sequence[int], slab: Sequence[int], array: SmallArray) -> None:
     """Writes a coordinate or another small array; one with the axes of the study in slabs."""
     values = array.values
@@ -206,9 +187,7 @@ def _write_array(file: netCDF4.Dataset, shape: Sequence[int], slab: Sequence[int
     if array.over_axes:
         own = values.shape[len(shape) :]
         variable = _create(file, array.name, array.entry, array.dimensions, (*slab, *own))
-        values = np.broadcast_to(values, (*shape, *own))
-        for region in _regions(shape, slab):
-            variable[region] = values[region]
+        variable[...] = np.broadcast_to(values, (*shape, *own))
         return
     is_text = values.dtype.kind == "U"
     variable = file.createVariable(array.name, str if is_text else values.dtype, array.dimensions)

@@ -151,8 +151,8 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     answers = [_answers(part.study) for part in parts_of(study)]
     others = (*(1,) * (len(study.own_axes) - 3), *(len(values) for values in study.axes_of_parts.values()))
     variables = []
-    for number, (name, entry) in enumerate(SCENE["exact"].items()):
-        values = np.array([[[each[number] for each in row] for row in part] for part in answers])
+    for place, (name, entry) in enumerate(SCENE["exact"].items()):
+        values = np.array([[[each[place] for each in row] for row in part] for part in answers])
         # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
         values = np.moveaxis(values, (1, 3, 2), (0, 1, 2))
         values = values.reshape(*values.shape[:3], *others, *values.shape[4:])
@@ -181,13 +181,13 @@ def _changed(study: Study) -> frozenset[str]:
 
 
 def _answers(study: Study) -> list[list[Any]]:
-    """Worn volume and response of a part of a study, for all wear coefficients, by frequency and amplitude."""
+    """Exact answers of a part of a study, for all wear coefficients, by frequency and excitation amplitude."""
     axes, changed = study.axes, _changed(study)
     (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
     counts, given = np.array(study.output_counts), np.array(axes.wear_coefficient)
 
     scene: Any = study.scene.parameters
-    rest = (given, counts, study.wear.as_law, depth, changed)
+    rest = given, counts, study.wear.as_law, depth, changed
     return [[scene.exact_answer(one, other, *rest) for other in axes.excitation_amplitude] for one in axes.frequency]
 
 

@@ -88,8 +88,8 @@ def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
 def plan_scenes(study: Study, say: Callable[[str], None]) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
     """The scenes of a study, facts of each, or of one that is as large, and the time, s, for building the others.
 
-    Scenes that differ only in numbers with a fraction are taken to have the same sizes, but for the blocks of a
-    mission; at most eight are built. Raises UserError where a scene is wrong.
+    Scenes that differ only in numbers with a fraction are taken to have the same sizes; at most eight are built. Raises
+    UserError where a scene is wrong.
     """
     scenes, built = find_scenes(study), dict[str, SceneFacts]()
     began, facts = time.monotonic(), []

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, ended_points
 from studyrunner.result.opening import as_history
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import COMPLETE_WORDS, Result
+from studyrunner.summary.certainty import ADVICE, certainty_of, first_ended
 from studyrunner.summary.findings import (
-    Life,
-    MeshChange,
-    ModeRange,
-    MostWear,
-    NothingWore,
-    Vibration,
+    Finding,
     compare_meshes,
-    describe_samples,
     mode_ranges,
-    most_wear,
     shortest_life,
-    vibration_of,
+    wear_and_response,
     where_is,
 )
 from studyrunner.system.progress import count
-from studyrunner.units import show_percent
 
 MOST_LINES = 9
 
@@ -43,89 +38,33 @@ _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sq
 
 
 @dataclass(frozen=True)
-class Failure:
-    """Points that ended in one way but `converged`."""
+class Summary:
+    """What came out. `print` shows its first lines. n_complete: points computed to the end. findings: all there are."""
 
-    word: str
-    is_complete: bool  # computed to the end, and uncertain only
     n_points: int
-    sentence: str
-    advice: str
-    where: str  # the first of these points in words, empty where the study has one point
-    reason: str  # its message
+    n_complete: int
+    findings: tuple[Finding, ...]
 
     @property
-    def text(self) -> str:
-        """What it means, what may help, and the first of the points."""
-        cut = len(self.reason) > _LONGEST
-        reason = f"{self.reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if cut else self.reason
-        first = ": ".join(filter(None, (self.where, reason)))
-        said = (self.sentence, self.advice, f"First: {first}" if self.where else reason[:1].upper() + reason[1:])
-        return ". ".join(filter(None, said))
+    def values(self) -> dict[str, Mapping[str, Any]]:
+        """Numbers and words of the findings by their names, as values["wear"]["worn_volume"]."""
+        return {each.name: each.values for each in self.findings}
 
-
-@dataclass(frozen=True)
-class Summary:
-    """What came out. `print` shows its `lines`."""
-
-    n_points: int
-    n_complete: int  # computed to the end
-    counted: str  # "cycles" or "missions"
-    failures: tuple[Failure, ...]  # of each way to fail
-    certainty: Certainty | None
-    wear: MostWear | NothingWore | None = None  # None where it is not known or not asked for
-    samples: str = ""  # with [scatter]: range and median of the worn volumes
-    ranking: str = ""  # which input decides
-    vibration: Vibration | None = None
-    life: Life | None = None  # with a target
-    mesh: MeshChange | None = None  # where meshes can be compared
-    modes: tuple[ModeRange, ...] = ()
-    stuck_frequency: float = math.nan  # Hz, of the joint that sticks; NaN where there is none, or several
-    doubts: tuple[str, ...] = ()  # sentences on values that are hardly what was meant
-
-    def __str__(self) -> str:
-        """The summary as text."""
-        return "\n".join(self.lines)
+    @property
+    def rows(self) -> tuple[tuple[str, str], ...]:
+        """Label and text, in the order in which an engineer asks: the answer, failures, certainty."""
+        rows = [(each.label, each.text) for each in self.findings]
+        last = [row for row in rows[-1:] if row[0] == "certainty"]
+        return (*rows[: len(rows) - len(last)][: MOST_LINES - 1], *last)
 
     @property
     def lines(self) -> tuple[str, ...]:
         """Lines of plain text: label and text of each row."""
         return tuple(f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in self.rows)
 
-    @property
-    def rows(self) -> tuple[tuple[str, str], ...]:
-        """Label and text, in the order in which an engineer asks: the answer, failures, certainty."""
-        wear, vibration, rows = self.wear, self.vibration, list[tuple[str, str]]()
-        stuck = f"first resonance {self.stuck_frequency:.4g} Hz when all pairs stick"
-        stuck = stuck if math.isfinite(self.stuck_frequency) else ""
-        if isinstance(wear, NothingWore):
-            rows.append(("wear", f"{wear.text} ({stuck})" if stuck else wear.text))
-        elif isinstance(wear, MostWear):
-            label = "most wear" if wear.n_compared > 1 else "wear"
-            rows.append(("wear", self.samples) if self.samples else (label, wear.text(self.counted)))
-            rows.append(("input", self.ranking))
-            at = f" in the sample that wears most ({wear.where})" if self.samples else ""
-            rows.append(("deepest", wear.deepest.text + at))
-            shares = ", ".join(f"{name} {show_percent(share)}" for name, share in wear.blocks)
-            rows.append(("blocks", shares and f"share of the wear: {shares}"))
-        elif self.certainty is not None and self.certainty.of == "worn volume":
-            rows.append(("wear", "no worn volume is known within 50 %"))
-        if vibration is not None:
-            wears = isinstance(wear, MostWear)
-            text = vibration.text(wears, self.n_points == 1)
-            rows.append((vibration.followed or "response", f"{text}; {stuck}" if wears and stuck else text))
-        rows += [(f"mode {mode.number}", mode.text) for mode in self.modes[:_MOST_MODES]]
-        rows.append(("life", self.life.text(self.counted) if self.life else ""))
-        rows.append(("mesh", self.mesh.text if self.mesh else ""))
-        for each in self.failures[:_MOST_FAILURES]:
-            of = f"{each.n_points} of {count(self.n_points, 'point')}: " if self.n_points > 1 else ""
-            rows.append(("uncertain" if each.is_complete else "failed", f"{of}{each.text}"))
-        if left := self.failures[_MOST_FAILURES:]:
-            n_left = count(sum(each.n_points for each in left), "more point")
-            rows.append(("uncertain" if left[0].is_complete else "failed", f"{n_left} in other ways"))
-        rows.append(("beware", next(iter(self.doubts), "")))
-        rows = [(label, text) for label, text in rows if text][: MOST_LINES - 1]
-        return (*rows, *([("certainty", self.certainty.sentence)] if self.certainty else []))
+    def __str__(self) -> str:
+        """The summary as text."""
+        return "\n".join(self.lines)
 
 
 def summary(dataset: xr.Dataset) -> Summary:
@@ -136,40 +75,54 @@ def summary(dataset: xr.Dataset) -> Summary:
 
 def summarise(result: Result) -> Summary:
     """The summary of a result that is opened for the report."""
-    numbers = result.computed.size, int(result.computed.sum()), result.counted, _failures(result)
-    if result.has_modes:
-        return Summary(*numbers, certainty_of(result), modes=mode_ranges(result))
-    wear = most_wear(result)
     of_scenes = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
-    stuck = float(of_scenes) if of_scenes.ndim == 0 else math.nan
-    return Summary(
-        *numbers,
-        certainty_of(result, wore=not isinstance(wear, NothingWore)),
-        wear,
-        *(describe_samples(result) if isinstance(wear, MostWear) else ("", "")),
-        vibration_of(result, wear),
-        shortest_life(result),
-        compare_meshes(result),
-        stuck_frequency=stuck,
-        doubts=tuple(filter(None, (_not_small(result), _in_radians(result, stuck), _too_few_counts(result)))),
-    )
+    stuck, findings, doubts = float(of_scenes) if of_scenes.ndim == 0 else math.nan, list[Finding](), list[str]()
+    if result.has_modes:
+        findings += itertools.islice(mode_ranges(result), _MOST_MODES)
+    else:
+        findings += [*wear_and_response(result, stuck), *filter(None, (shortest_life(result), compare_meshes(result)))]
+        doubts += filter(None, (_not_small(result), _in_radians(result, stuck), _too_few_counts(result)))
+    wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
+    findings += [*_failures(result), *(Finding("doubt", "beware", doubt) for doubt in doubts[:1])]
+    if certainty := certainty_of(result, wore=wore):
+        findings.append(certainty)
+    return Summary(result.computed.size, int(result.computed.sum()), tuple(findings))
 
 
-def _failures(result: Result) -> tuple[Failure, ...]:
+def _failures(result: Result) -> Iterator[Finding]:
+    """Of each way to end but `converged` what it means, what may help, and the first of the points.
+
+    Those that failed come before those that are uncertain only; of many ways the last are counted.
+    """
     numbers, counts = np.unique(result.dataset["outcome"].values, return_counts=True)
     found = []
     for number, n_points in zip(numbers.tolist(), counts.tolist(), strict=True):
         ending = result.endings[number]
         if ending.word == "converged":
             continue
-        point, reason = next(ended_points(result, number))
-        sentence = re.split(r"[.:](?:\s|$)", ending.sentence)[0] or ending.word
-        where = where_is(result, point) if result.varying else ""
+        point, reason = first_ended(result, number)
         # what the message of a sensitive one holds is no result
         reason = "" if ending.word == "sensitive" else reason
-        is_complete, advice = ending.word in COMPLETE_WORDS, advise_ended(result, number).rstrip(".")
-        found.append(Failure(ending.word, is_complete, n_points, sentence, advice, where, reason))
-    return tuple(sorted(found, key=lambda each: (each.is_complete, -each.n_points)))
+        reason = f"{reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if len(reason) > _LONGEST else reason
+        advice, first = ADVICE.get(ending.word, ""), reason[:1].upper() + reason[1:]
+        if result.varying:
+            first = f"First: {': '.join(filter(None, (where_is(result, point), reason)))}"
+        said = (re.split(r"[.:](?:\s|$)", ending.sentence)[0] or ending.word, advice, first)
+        of = f"{n_points} of {count(result.computed.size, 'point')}: " if result.computed.size > 1 else ""
+        values = {
+            "n_points": n_points,
+            "is_complete": ending.word in COMPLETE_WORDS,
+            "reason": reason,
+            "advice": advice,
+        }
+        label = "uncertain" if ending.word in COMPLETE_WORDS else "failed"
+        found.append(Finding(ending.word, label, of + ". ".join(filter(None, said)), values))
+    found.sort(key=lambda each: (each.values["is_complete"], -each.values["n_points"]))
+    yield from found[:_MOST_FAILURES]
+    if left := found[_MOST_FAILURES:]:
+        n_left = sum(each.values["n_points"] for each in left)
+        text = f"{count(n_left, 'more point')}: {', '.join(each.name.replace('_', ' ') for each in left)}"
+        yield Finding("others", left[0].label, text, {"n_points": n_left})
 
 
 def _not_small(result: Result) -> str:

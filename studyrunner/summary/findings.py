@@ -1,4 +1,4 @@
-"""What came out of a study, piece by piece, with its words: the most wear, the response, the life, meshes, modes.
+"""What came out of a study, a finding each: the most wear or why nothing wore, the response, life, meshes, modes.
 
 Only results are in it: a history that was not computed to the end, or is known to a factor of two only, has no number.
 """
@@ -6,11 +6,12 @@ Only results are in it: a history that was not computed to the end, or is known 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_VOLUME, WELL_ENOUGH, Point, Result
@@ -26,183 +27,16 @@ _SHARE = 0.5
 
 
 @dataclass(frozen=True)
-class Number:
-    """A value and its absolute error, NaN where that was not estimated; SI."""
+class Finding:
+    """One line of a summary. name: of what it says. label, text: as printed. values: its numbers in SI, and words.
 
-    value: float
-    error: float = math.nan
+    Errors are absolute, NaN where they were not estimated.
+    """
 
-    def show(self, units: str) -> str:
-        """The number with its error: "1.52 mm3 ± 1.3 %"."""
-        if math.isnan(self.value):
-            return "not known"
-        text = scale_for(units, self.value).show(self.value)
-        if math.isnan(self.error):
-            return f"{text} (error not known)"
-        return f"{text} ± {show_percent(max(self.error / self.value, _LEAST))}" if self.value > 0.0 else text
-
-
-@dataclass(frozen=True)
-class Deepest:
-    """The deepest pair of a point; None and NaN where the file holds no depths of single pairs, or no places."""
-
-    depth: Number  # m
-    pair: int | None = None  # index along `contact`
-    surface: str = ""
-    position: tuple[float, ...] = (math.nan,) * 3  # m
-    edge_share: float = math.nan  # of the volume of its surface, what belongs to pairs at the edge of the contact
-    edge_area: float = math.nan  # the same of the area
-
-    @property
-    def text(self) -> str:
-        """How deep and where; whether most is worn at the edge."""
-        text = self.depth.show("m")
-        if self.pair is not None:
-            text += f" at contact pair {self.pair}" + (f" of {self.surface}" if self.surface else "")
-            if all(map(math.isfinite, self.position)):
-                text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in self.position)}) mm"
-        if self.edge_share > max(_SHARE, self.edge_area):
-            text += (
-                f"; {show_percent(self.edge_share)} of the wear of {self.surface or 'its surface'} is in edge pairs:"
-            )
-            text += " valid if the real contact ends there, else extend the model"
-        return text
-
-
-@dataclass(frozen=True)
-class MostWear:
-    """The point with the largest worn volume, of points that differ in numerical settings only the best known one."""
-
-    point: dict[str, int]  # index along each axis
-    where: str  # the point in words
-    n_compared: int  # cases that it is the largest of
-    n_left_out: int  # cases without a known worn volume, which may wear more
-    count: float  # cycles or missions
-    volume: Number  # m3
-    deepest: Deepest
-    blocks: tuple[tuple[str, float], ...] = ()  # of missions, share of each block
-
-    def text(self, counted: str) -> str:
-        """How much, when and where. counted: what slow time counts."""
-        text = f"{self.volume.show('m3')} after {show_cycles(self.count, counted)} at {self.where}"
-        if self.n_left_out:
-            more = f"{count(self.n_left_out, 'case')} without a known volume"
-            text += f", the most of {self.n_compared} cases; {more} may wear more"
-        return text
-
-
-@dataclass(frozen=True)
-class NothingWore:
-    """No point that was computed to the end wears."""
-
-    largest_slip: float  # m, of any pair, 0 where all stick; NaN where the file does not say
-    where: str  # these points in words, as "at 212 Hz" or "at all 3 points"
-
-    @property
-    def text(self) -> str:
-        """Why nothing wore, and where."""
-        why = ": all pairs stick" if self.largest_slip == 0.0 else ""
-        if self.largest_slip > 0.0:
-            why = f": pairs slip by up to {scale_for('m', self.largest_slip).show(self.largest_slip)} without wear"
-        return f"nothing wore{why} {self.where}"
-
-
-@dataclass(frozen=True)
-class Vibration:
-    """How the joint responds at a point; amplitudes are NaN where they are known to a factor of two only."""
-
-    of: str  # name of the response
-    where: str  # the point in words
-    followed: str  # "resonance" or "peak", whose frequency changes while the joint wears; else empty
-    # Hz, followed: first and last; else where the unworn joint responds most, NaN at the ends of the frequencies
-    frequency: tuple[float, Number]
-    amplitude: tuple[Number, Number]  # m, of the unworn and of the worn joint; 0 where the joint does not move
-    peak: float = math.nan  # m, of the unworn joint at frequency[0]
-
-    def text(self, wears: bool, alone: bool) -> str:
-        """wears: whether the joint does. alone: whether the study has one point."""
-        if all(each.value == 0.0 for each in self.amplitude):
-            return f"{self.of} does not move"
-        (first, last), (start, end) = self.amplitude, self.frequency
-        if self.followed:
-            known = "" if math.isnan(end.error) else f" ± {end.error:.2g}"
-            moved = f"moved from {start:.6g} to {end.value:.6g}{known} Hz" if wears else f"at {start:.6g} Hz"
-            return f"{moved}, response of {self.of} {first.show('m')}" + (f" to {last.show('m')}" if wears else "")
-        case = "" if alone else " in this case" if wears else f", most at {self.where}"
-        text = f"{self.of}{case}: amplitude {first.show('m')}"
-        if wears:
-            elsewhere = " (its resonance may lie elsewhere)" if last.value < first.value else ""
-            text += f" when new, {last.show('m')} when worn{elsewhere}"
-        if math.isfinite(start):
-            text += f"; the new joint responds most at {start:.6g} Hz ({scale_for('m', self.peak).show(self.peak)})"
-        return text
-
-
-@dataclass(frozen=True)
-class Life:
-    """The shortest life."""
-
-    quantity: str  # of slow_time.until
-    target: float
-    count: Number  # NaN where no point reaches the target
-    where: str
-    n_beyond: int  # points computed to the end that do not reach the target
-    n_unsure: int = 0  # points whose life is known to a factor of two only
-
-    def text(self, counted: str) -> str:
-        """The shortest life, and how many points have none. counted: what slow time counts."""
-        units = {"wear_depth": "m", "worn_volume": "m3"}.get(self.quantity, "1")
-        target = f"{self.quantity.replace('_', ' ')} {scale_for(units, self.target).show(self.target)}"
-        unsure = f"; the life of {count(self.n_unsure, 'point')} is not known" if self.n_unsure else ""
-        if math.isnan(self.count.value):
-            return f"no {'other ' if unsure else ''}point computed to the end reaches {target}{unsure}"
-        known = "(error not known)"
-        if math.isfinite(self.count.error):
-            known = f"± {show_percent(self.count.error / self.count.value)}"
-        text = f"{show_cycles(round(self.count.value), counted)} {known} to {target} at {self.where}{unsure}"
-        return text + (f"; not reached by {count(self.n_beyond, 'point')}" if self.n_beyond else "")
-
-
-@dataclass(frozen=True)
-class MeshChange:
-    """How far the worn volumes of two meshes are apart, relative."""
-
-    meshes: tuple[float, float]
-    at: str  # "at the resonance", "at equal frequency ratio"
-    median: float
-    largest: float
-
-    @property
-    def text(self) -> str:
-        """Both meshes and their differences."""
-        coarse, fine = map(show_number, self.meshes)
-        text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(self.median)} {self.at}"
-        return f"{text}, at most {show_percent(self.largest)}" if self.largest > self.median else text
-
-
-@dataclass(frozen=True)
-class ModeRange:
-    """Natural frequency, Hz, and damping ratio of a mode: ends of their ranges over the points that were found."""
-
-    number: int
-    over: str  # what varies, in words
-    frequency: tuple[float, float]
-    damping: tuple[float, float]
-    n_found: int
-    n_points: int
-
-    @property
-    def text(self) -> str:
-        """The ranges and how many points they are of."""
-        found = f"found at {self.n_found} of {count(self.n_points, 'point')}"
-        ranges = ("natural frequency", self.frequency, 1.0, 6, " Hz"), ("damping ratio", self.damping, 100.0, 3, " %")
-        known = [
-            f"{name} {' to '.join(dict.fromkeys(f'{factor * each:.{digits}g}' for each in ends))}{unit}"
-            for name, ends, factor, digits, unit in ranges
-            if not math.isnan(ends[0])
-        ]
-        text = ", ".join(known) + (f" over {self.over}" if known and self.over else "")
-        return text if known and self.n_found == self.n_points else ", ".join(filter(None, (text, found)))
+    name: str
+    label: str
+    text: str
+    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 def where_is(result: Result, point: Point) -> str:
@@ -210,77 +44,72 @@ def where_is(result: Result, point: Point) -> str:
     return result.describe(point, result.varying or ("frequency",)) or "the only point"
 
 
-# --- wear ---
+def _show(value: float, units: str) -> str:
+    return scale_for(units, value).show(value)
 
 
-def most_wear(result: Result) -> MostWear | NothingWore | None:
-    """The point that wears most; None where no wear was asked for, or no worn volume is known."""
-    best = result.best_known
-    if not result.wears or not result.has("worn_volume") or not best.any():
-        return None
-    worn = np.where(best, result.worn, -1.0)
-    if worn.max() <= NO_VOLUME:
-        return _nothing(result, best)
-    point = result.largest(worn)
-    place, at = result.place(point), result.last_reached(point)
-    volume = float(worn[place])
+def _known(value: float, error: float, units: str) -> str:
+    """A number with its error: "1.52 mm3 ± 1.3 %"."""
+    if math.isnan(value):
+        return "not known"
+    text = _show(value, units)
+    if math.isnan(error):
+        return f"{text} (error not known)"
+    return f"{text} ± {show_percent(max(error / value, _LEAST))}" if value > 0.0 else text
+
+
+# --- wear and vibration ---
+
+
+def wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
+    """The point that wears most, of points that differ in numerical settings only the best known one; its response.
+
+    Where no wear is known, the response of the point that figures show. stuck: first frequency with the joint stuck,
+    Hz, NaN where it is not known.
+    """
+    best, point, wears = result.best_known, result.shown, False
+    resonance = f"first resonance {stuck:.4g} Hz when all pairs stick" if math.isfinite(stuck) else ""
+    if result.wears and result.has("worn_volume") and best.any():
+        worn = np.where(best, result.worn, -1.0)
+        wears = float(worn.max()) > NO_VOLUME
+        point = result.largest(worn) if wears else point
+        yield from _of_wear(result, point) if wears else [_nothing(result, resonance)]
+    elif result.wears and result.has("worn_volume", "error_estimate") and result.computed.any():
+        yield Finding("wear", "wear", "no worn volume is known within 50 %")
+    if result.blocks is None and result.has("response_amplitude") and result.computed[result.place(point)]:
+        yield _response(result, point, wears, resonance)
+
+
+def _of_wear(result: Result, point: dict[str, int]) -> Iterator[Finding]:
+    place, at, where = result.place(point), result.last_reached(point), where_is(result, point)
+    volume, end = float(result.worn[place]), float(result.counts(point)[at])
+    error = volume * float(result.errors[place])
     # points that differ in more than steps
-    known = xr.DataArray(best, dims=result.axes).any(result.numerical).values
-    shares: tuple[tuple[str, float], ...] = ()
+    known = xr.DataArray(result.best_known, dims=result.axes).any(result.numerical).values
+    n_compared, n_left_out = int(known.sum()), int(known.size - known.sum())
+    text = f"{_known(volume, error, 'm3')} after {show_cycles(end, result.counted)} at {where}"
+    if n_left_out:
+        more = f"{count(n_left_out, 'case')} without a known volume"
+        text += f", the most of {n_compared} cases; {more} may wear more"
+    volumes, ranking = _of_samples(result)
+    values = {"point": point, "worn_volume": volume, "error": error, "count": end}
+    values |= {"n_compared": n_compared, "n_left_out": n_left_out}
+    yield Finding("wear", "wear" if volumes or n_compared == 1 else "most wear", volumes or text, values)
+    if ranking:
+        yield Finding("input", "input", ranking)
+    yield _deepest(result, point, at, f" in the sample that wears most ({where})" if volumes else "")
     if result.blocks is not None and "block_worn_volume" in result.blocks:
         own = result.blocks["block_worn_volume"].isel(point).isel(cycle=at)
-        shares = tuple(zip(own["block"].values.tolist(), (own.values / volume).tolist(), strict=True))
-    return MostWear(
-        point=point,
-        where=where_is(result, point),
-        n_compared=int(known.sum()),
-        n_left_out=int(known.size - known.sum()),
-        count=float(result.counts(point)[at]),
-        volume=Number(volume, volume * float(result.errors[place])),
-        deepest=_deepest(result, point, at),
-        blocks=shares,
-    )
+        shares = dict(zip(own["block"].values.tolist(), (own.values / volume).tolist(), strict=True))
+        text = ", ".join(f"{name} {show_percent(share)}" for name, share in shares.items())
+        yield Finding("blocks", "blocks", f"share of the wear: {text}", shares)
 
 
-def _deepest(result: Result, point: Point, at: int) -> Deepest:
-    def read(name: str, *index: int) -> float:
-        return float(result.at(name, point, at).values[index]) if result.has(name) else math.nan
-
-    if not has_depths(result):
-        return Deepest(Number(read("largest_wear_depth")))
-    depth = np.nan_to_num(last_depth(result, point), nan=0.0)
-    pair, pairs = int(np.argmax(depth)), contact_pairs(result, point)
-    error = read("wear_depth_error", pair) if result.has("wear_depth_error") else read("wear_depth_max_error")
-    share = of_area = math.nan
-    if result.has("contact_surface", "contact_area", "contact_edge"):
-        own, edge = pairs.surface == pairs.surface[pair], result.at("contact_edge", point).values != 0
-        if edge[own].any() and depth[own].any():
-            ratios = (each[own & edge].sum() / each[own].sum() for each in (depth * pairs.area, pairs.area))
-            share, of_area = map(float, ratios)
-    surface = str(pairs.surface[pair]) if result.has("contact_surface") else ""
-    number = int(result.dataset["contact"].values[pair])
-    place = tuple(pairs.position[pair].tolist())
-    return Deepest(Number(float(depth[pair]), error), number, surface, place, share, of_area)
-
-
-def _nothing(result: Result, best: NDArray[np.bool_]) -> NothingWore:
-    slip = math.nan
-    if result.has("slip_range"):
-        largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=-1))
-        slip = float(largest[best].max())
-    n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
-    where = f"at all {n_points} points" if n_points > 1 else f"at {where_is(result, result.shown)}"
-    if n_computed < n_points:
-        where = f"at {n_computed} of {n_points} points, the others have no result"
-    return NothingWore(0.0 if slip < _NO_MOTION else slip, where)
-
-
-def describe_samples(result: Result) -> tuple[str, str]:
+def _of_samples(result: Result) -> tuple[str, str]:
     """Worn volumes of the samples where their median is largest, and which input decides; empty without samples."""
-    statistics = result.statistics
-    if statistics is None:
+    if result.statistics is None:
         return "", ""
-    last = statistics.isel(cycle=-1, missing_dims="ignore")
+    last = result.statistics.isel(cycle=-1, missing_dims="ignore")
     medians = last["worn_volume_quantile"].sel(quantile=0.5).isel(bound=0)
     place = np.unravel_index(int(np.argmax(medians.values)), medians.shape)
     point = dict(zip(map(str, medians.dims), map(int, place), strict=True))
@@ -290,29 +119,83 @@ def describe_samples(result: Result) -> tuple[str, str]:
     return f"{describe_volumes(last.isel(point))}{after}{more}", describe_ranking(last.isel(point))
 
 
-# --- vibration ---
+def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
+    """The deepest pair of a point, and whether most is worn at the edge of its surface."""
+
+    def read(name: str, *index: int) -> float:
+        return float(result.at(name, point, at).values[index]) if result.has(name) else math.nan
+
+    if not has_depths(result):
+        depth = read("largest_wear_depth")
+        return Finding("deepest", "deepest", _known(depth, math.nan, "m") + where, {"wear_depth": depth})
+    depths = np.nan_to_num(last_depth(result, point), nan=0.0)
+    pair, pairs = int(np.argmax(depths)), contact_pairs(result, point)
+    error = read("wear_depth_error", pair) if result.has("wear_depth_error") else read("wear_depth_max_error")
+    surface = str(pairs.surface[pair]) if result.has("contact_surface") else ""
+    number, place = int(result.dataset["contact"].values[pair]), pairs.position[pair].tolist()
+    text = f"{_known(depths[pair], error, 'm')} at contact pair {number}" + (f" of {surface}" if surface else "")
+    if np.isfinite(place).all():
+        text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in place)}) mm"
+    text, share = text + where, math.nan
+    if result.has("contact_surface", "contact_area", "contact_edge"):
+        own, edge = pairs.surface == surface, result.at("contact_edge", point).values != 0
+        if edge[own].any() and depths[own].any():
+            share, of_area = (each[own & edge].sum() / each[own].sum() for each in (depths * pairs.area, pairs.area))
+            if share > max(_SHARE, of_area):
+                text += f"; {show_percent(share)} of the wear of {surface} is in edge pairs:"
+                text += " valid if the real contact ends there, else extend the model"
+    values = {"wear_depth": float(depths[pair]), "error": error, "contact": number, "surface": surface}
+    return Finding("deepest", "deepest", text, values | {"position": place, "edge_share": float(share)})
 
 
-def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibration | None:
-    """How the joint responds at the point that wears most, else at the one that is shown."""
-    point = wear.point if isinstance(wear, MostWear) else result.shown
-    if result.blocks is not None or not result.has("response_amplitude") or not result.computed[result.place(point)]:
-        return None
+def _nothing(result: Result, resonance: str) -> Finding:
+    """Why no point that was computed to the end wears."""
+    slip, why = math.nan, ""
+    if result.has("slip_range"):
+        largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=-1))
+        slip = float(largest[result.best_known].max())
+        slip = slip if slip >= _NO_MOTION else 0.0
+        why = f": pairs slip by up to {_show(slip, 'm')} without wear" if slip else ": all pairs stick"
+    n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
+    where = f"at all {n_points} points" if n_points > 1 else f"at {where_is(result, result.shown)}"
+    if n_computed < n_points:
+        where = f"at {n_computed} of {n_points} points, the others have no result"
+    text = f"nothing wore{why} {where}" + (f" ({resonance})" if resonance else "")
+    return Finding("wear", "wear", text, {"worn_volume": 0.0, "largest_slip": slip})
+
+
+def _response(result: Result, point: Point, wears: bool, resonance: str) -> Finding:
+    """Amplitudes of the response that is largest at a point, new and worn; NaN where known to a factor of two only."""
     ends = [0, result.last_reached(point)]
     amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
     of = int(np.argmax(amplitude[0]))
-    values = np.where(amplitude[:, of] > _NO_MOTION, amplitude[:, of], 0.0)
-    errors = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
-    values = np.where((errors > WELL_ENOUGH) & (values > 0.0), np.nan, values)
-    new, worn = map(Number, values.tolist(), (errors * values).tolist())
-    name, where = result.responses[of], where_is(result, point)
+    both = np.where(amplitude[:, of] > _NO_MOTION, amplitude[:, of], 0.0)
+    wrong = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
+    both = np.where((wrong > WELL_ENOUGH) & (both > 0.0), np.nan, both)
+    errors, name = wrong * both, result.responses[of]
+    new, worn = (_known(value, error, "m") for value, error in zip(both.tolist(), errors.tolist(), strict=True))
+    values: dict[str, Any] = {"response": name, "amplitude": both.tolist(), "error": errors.tolist()}
     if result.followed and result.has("excitation_frequency"):
-        first, last = result.at("excitation_frequency", point, ends).values.tolist()
-        known = result.has("excitation_frequency_error")
-        error = float(result.at("excitation_frequency_error", point, ends[1])) if known else math.nan
-        return Vibration(name, where, result.followed, (first, Number(last, error)), (new, worn))
+        start, end = result.at("excitation_frequency", point, ends).values.tolist()
+        has_error = result.has("excitation_frequency_error")
+        error = float(result.at("excitation_frequency_error", point, ends[1])) if has_error else math.nan
+        shown = f"{end:.6g}" + ("" if math.isnan(error) else f" ± {error:.2g}")
+        moved = f"moved from {start:.6g} to {shown} Hz" if wears else f"at {start:.6g} Hz"
+        text = f"{moved}, response of {name} {new}" + (f" to {worn}" if wears else "")
+        values |= {"frequency": [start, end], "frequency_error": error}
+        return Finding("response", result.followed, text, values)
+    if not both.any():
+        return Finding("response", "response", f"{name} does not move", values)
+    case = " in this case" if wears else f", most at {where_is(result, point)}"
+    text = f"{name}{case if result.computed.size > 1 else ''}: amplitude {new}"
+    if wears:
+        elsewhere = " (its resonance may lie elsewhere)" if both[1] < both[0] else ""
+        text += f" when new, {worn} when worn{elsewhere}"
     frequency, peak = _peak(result, point, of)
-    return Vibration(name, where, "", (frequency, Number(math.nan)), (new, worn), peak)
+    if math.isfinite(frequency):
+        text += f"; the new joint responds most at {frequency:.6g} Hz ({_show(peak, 'm')})"
+    text += f"; {resonance}" if wears and resonance else ""
+    return Finding("response", "response", text, values | {"peak": frequency})
 
 
 def _peak(result: Result, point: Point, of: int) -> tuple[float, float]:
@@ -330,28 +213,32 @@ def _peak(result: Result, point: Point, of: int) -> tuple[float, float]:
     return float(row["frequency"].values[order][top]), float(values[top])
 
 
-def mode_ranges(result: Result) -> tuple[ModeRange, ...]:
-    """Each mode over all other axes."""
+# --- modes, life, meshes ---
+
+
+def mode_ranges(result: Result) -> Iterator[Finding]:
+    """Of each mode the ends of natural frequency and damping ratio over the points where it was found."""
     numbers = [name for name in result.varying if name != "mode" and result.dataset[name].dtype.kind in "iuf"]
     ends = {name: [show_number(float(result.dataset[name].values[place])) for place in (0, -1)] for name in numbers}
     over = ", ".join(f"{name.replace('_', ' ')} {' to '.join(each)}" for name, each in ends.items())
-    axis, found = result.axes.index("mode"), []
+    axis, shown = result.axes.index("mode"), {"natural_frequency": (1.0, 6, " Hz"), "damping_ratio": (100.0, 3, " %")}
     for index, number in enumerate(result.dataset["mode"].values.tolist()):
         computed = result.computed.take(index, axis=axis)
-        ranges = list[tuple[float, float]]()
-        for name in ("natural_frequency", "damping_ratio"):
-            there = result.has(name) and computed.any()
-            values = result.dataset[name].values.take(index, axis=axis)[computed] if there else np.array([np.nan])
-            ranges.append((float(values.min()), float(values.max())))
-        frequency, damping = ranges
-        found.append(ModeRange(int(number), over, frequency, damping, int(computed.sum()), computed.size))
-    return tuple(found)
+        values: dict[str, Any] = {"n_found": int(computed.sum())}
+        said = []
+        for name, (factor, digits, unit) in shown.items():
+            if result.has(name) and computed.any():
+                own = result.dataset[name].values.take(index, axis=axis)[computed]
+                values[name] = [float(own.min()), float(own.max())]
+                texts = dict.fromkeys(f"{factor * each:.{digits}g}" for each in values[name])
+                said.append(f"{name.replace('_', ' ')} {' to '.join(texts)}{unit}")
+        text = ", ".join(said) + (f" over {over}" if said and over else "")
+        if not said or not computed.all():
+            text += f"{', ' if text else ''}found at {values['n_found']} of {count(computed.size, 'point')}"
+        yield Finding(f"mode {number}", f"mode {number}", text, values)
 
 
-# --- life and meshes ---
-
-
-def shortest_life(result: Result) -> Life | None:
+def shortest_life(result: Result) -> Finding | None:
     """The shortest life of the points of a study with a target; None without a target."""
     until = result.study.get("slow_time", {}).get("until")
     if not isinstance(until, dict) or not result.has("cycles_to_target"):
@@ -359,18 +246,26 @@ def shortest_life(result: Result) -> Life | None:
     (quantity, target), *_ = until.items()
     found = result.computed & ~result.ended("sensitive")
     lives, errors = (result.dataset[name].values for name in ("cycles_to_target", "cycles_to_target_error"))
-    unsure = found & (errors > WELL_ENOUGH * lives)
-    counts = int(np.count_nonzero(found & np.isnan(lives))), int(np.count_nonzero(unsure))
-    lives = np.where(found & ~unsure, lives, np.nan)
-    shortest, where = Number(math.nan), ""
-    if not np.isnan(lives).all():
-        point = result.largest(-np.nan_to_num(lives, nan=np.inf))
-        place = result.place(point)
-        shortest, where = Number(float(lives[place]), float(errors[place])), where_is(result, point)
-    return Life(str(quantity), float(target), shortest, where, *counts)
+    unknown = found & (errors > WELL_ENOUGH * lives)
+    n_beyond, n_unsure = int(np.count_nonzero(found & np.isnan(lives))), int(np.count_nonzero(unknown))
+    lives = np.where(found & ~unknown, lives, np.nan)
+    reaches = (
+        f"{quantity.replace('_', ' ')} {_show(target, {'wear_depth': 'm', 'worn_volume': 'm3'}.get(quantity, '1'))}"
+    )
+    unsure = f"; the life of {count(n_unsure, 'point')} is not known" if n_unsure else ""
+    values = {"target": target, "count": math.nan, "n_beyond": n_beyond, "n_unsure": n_unsure}
+    if np.isnan(lives).all():
+        text = f"no {'other ' if unsure else ''}point computed to the end reaches {reaches}{unsure}"
+        return Finding("life", "life", text, values)
+    point = result.largest(-np.nan_to_num(lives, nan=np.inf))
+    life, error = (float(each[result.place(point)]) for each in (lives, errors))
+    known = f"± {show_percent(error / life)}" if math.isfinite(error) else "(error not known)"
+    text = f"{show_cycles(round(life), result.counted)} {known} to {reaches} at {where_is(result, point)}{unsure}"
+    text += f"; not reached by {count(n_beyond, 'point')}" if n_beyond else ""
+    return Finding("life", "life", text, values | {"count": life, "error": error, "point": point})
 
 
-def compare_meshes(result: Result) -> MeshChange | None:
+def compare_meshes(result: Result) -> Finding | None:
     """How far worn volumes of the two finest meshes are apart, at equal distance to the resonance; else None.
 
     The resonance moves with the mesh: at one frequency one mesh may wear a multiple of the other.
@@ -386,4 +281,8 @@ def compare_meshes(result: Result) -> MeshChange | None:
     apart = np.abs(np.diff(volumes, axis=axis).squeeze(axis)) / np.where(larger > NO_VOLUME, larger, np.nan)
     if np.isnan(apart).all():
         return None
-    return MeshChange((meshes[two[0]], meshes[two[1]]), at, float(np.nanmedian(apart)), float(np.nanmax(apart)))
+    median, largest = float(np.nanmedian(apart)), float(np.nanmax(apart))
+    coarse, fine = (show_number(each) for each in meshes[two].tolist())
+    text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(median)} {at}"
+    text += f", at most {show_percent(largest)}" if largest > median else ""
+    return Finding("mesh", "mesh", text, {"meshes": meshes[two].tolist(), "median": median, "largest": largest})

@@ -127,4 +127,6 @@ def test_every_point_of_the_extremes_is_whole_or_says_why_not():
     assert (result.harmonics_used.where(~computed, 0) == 0).all()
     found = summary(result)
     assert found.n_points == result.outcome.size
-    assert found.n_points - found.n_complete == sum(each.n_points for each in found.failures if not each.is_complete)
+    assert found.n_points - found.n_complete == sum(
+        each.values["n_points"] for each in found.findings if each.label == "failed"
+    )

@@ -1,14 +1,15 @@
-"""Nothing is replaced unasked: results, finished or not, those of others, and files of runs that were killed."""
+"""Nothing is replaced unasked: results, finished or not, those of others, files of runs that were killed. Dates."""
 
 import os
 from pathlib import Path
 
+import netCDF4
 import pytest
 import xarray as xr
 
 from studyrunner import UserError, run_study
 from studyrunner.cli import main
-from studyrunner.result.provenance import POINTS_LEFT
+from studyrunner.result.provenance import POINTS_LEFT, check_date
 from tests.studyrunner.faked_runs import SMALL
 
 pytestmark = pytest.mark.usefixtures("solver", "folder")
@@ -150,3 +151,44 @@ def test_what_a_killed_run_has_left_of_a_result_goes(folder):
     left = {path.name for path in folder.iterdir()}
     foreign = {".out.nc.99.partial", ".out.nc.notes.partial", ".other.nc.4711.partial"}
     assert left == {"out.nc", "out.nc.progress", *foreign}
+
+
+# --- the date of a result ---
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("20261123", "2026-11-23"),
+        ("2026-11-23 14:05Z", "2026-11-23T14:05:00Z"),
+        ("20261123T140500+0100", "2026-11-23T14:05:00+01:00"),
+        ("now", "now"),
+    ],
+)
+def test_dates_are_kept_in_the_extended_form(given, kept):
+    assert check_date(given, "command line", "--date") == kept
+
+
+def test_a_wrong_date_is_bad_input(capsys):
+    assert main(["sdof_slider", "--date=2026-02-29"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--date" in line
+    assert list(Path().iterdir()) == []
+    with pytest.raises(UserError, match="run_study: date"):
+        run_study("sdof_slider", date="")
+
+
+def test_the_date_stands_in_the_result_and_changes_nothing_else(solver):
+    def run(*more):
+        solver.begin_again()
+        assert main([*SMALL, *more]) == 0
+        with netCDF4.Dataset("out.nc") as file:
+            return {name: file.getncattr(name) for name in file.ncattrs()}
+
+    there = run()
+    # what is finished is known by the same hashes whatever the date
+    assert run("--date=2026-11-23") == there | {"date_created": "2026-11-23"}
+    assert solver.n_results == 0
+    now = run("--date")
+    assert str(now.pop("date_created")).endswith("Z")
+    assert now == there

@@ -95,7 +95,7 @@ def test_the_result_has_missions_and_blocks_and_the_values_of_the_solver(blocks)
         "outcome": 0,
     }.items():
         np.testing.assert_array_equal(at[name], values, err_msg=name)
-    shares = dict(summary(result).wear.blocks)
+    shares = summary(result).values["blocks"]
     assert list(shares) == result.block.values.tolist()
     assert sum(shares.values()) == pytest.approx(1.0)
     np.testing.assert_allclose(at.block_share.sum("block"), 1.0)
@@ -144,7 +144,7 @@ def test_a_target_ends_the_missions(blocks):
     assert fast == pytest.approx(0.5 * slow, rel=0.05)
     assert (result.missions_to_target_error > 0.0).all()
     assert all("later missions are not computed" in message for message in result.message.values.ravel())
-    assert summary(result).life.count.value == fast
+    assert summary(result).values["life"]["count"] == fast
 
 
 @pytest.mark.slow

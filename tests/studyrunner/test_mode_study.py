@@ -88,9 +88,9 @@ def test_a_mode_that_is_not_there_says_so(result):
     assert "followed down to the amplitude" in said.sel(mode=1, modal_amplitude=1e-6).item()
     assert "fewer linear modes" in said.sel(mode=3)[0].item()
     found = result.natural_frequency.sel(mode=1, modal_amplitude=[1e-4, 1e-3])
-    first, third = summary(result).modes
-    assert (first.number, first.frequency) == (1, (found.min(), found.max()))
-    assert (third.number, third.n_found, third.n_points) == (3, 0, 12)
+    modes = summary(result).values
+    assert modes["mode 1"]["natural_frequency"] == [found.min(), found.max()]
+    assert modes["mode 3"] == {"n_found": 0}
 
 
 def test_points_are_the_same_in_another_list(study, result):
@@ -98,7 +98,7 @@ def test_points_are_the_same_in_another_list(study, result):
     one = ("scatter.samples=1", "axes.mode=1", "scene.worn={depth=0.0, cycle=0}")
     first = compute(study, "out.nc", *one, "axes.modal_amplitude=[1e-4]", "outputs.variables=['slip_fraction']")
     assert "natural_frequency" not in first
-    assert summary(first).modes[0].n_found == 1
+    assert summary(first).values["mode 1"]["n_found"] == 1
     more = options(*one, "axes.modal_amplitude={start=1e-5, stop=1e-3, num=3, spacing='log'}")
     # the smallest amplitude has no mode
     assert main([study, "-o", "out.nc", *more]) == 3
@@ -124,7 +124,7 @@ def test_the_report_draws_frequency_and_damping(result, path, folder):
     shown = open_for_report(path)
     items = {item.name: item for item in draw_report(shown)}
     assert "natural_frequency" in items
-    assert " 0 left out" in write_page(shown, items.values(), folder / "index.html")
+    assert ", 0 left out, " in write_page(shown, items.values(), folder / "index.html")
     drawn = {line.get_label(): line.get_ydata() for line in items["damping_ratio"].figure.axes[0].get_lines()}
     for label, cycle in (("mode 1, cycle 10\N{NO-BREAK SPACE}000", 1e4), ("mode 1, cycle 0", 0)):
         expected = result.damping_ratio.sel(mode=1, cycle=cycle).isel(sweep=0, sample=0).values[[1, 2, 0]]

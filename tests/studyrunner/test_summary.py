@@ -11,7 +11,7 @@ from studyrunner.result.opening import as_history
 from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import MOST_LINES, SMALL, summary
-from studyrunner.summary.findings import MeshChange, ModeRange, MostWear, NothingWore, compare_meshes
+from studyrunner.summary.findings import Finding, compare_meshes
 from studyrunner.units import show_percent, show_rtol
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.results import made_result
@@ -48,12 +48,11 @@ def test_of_numerical_settings_the_best_known_is_shown():
             *GRID, volume=lambda p: 1e-9 * volumes.get(at(p), 0.0), error_estimate=lambda p: errors.get(at(p), 0.02)
         )
     )
-    wear = found.wear
-    assert isinstance(wear, MostWear)
-    assert (wear.point["frequency"], wear.point["scheme"]) == (1, 2)
-    assert (wear.n_compared, wear.n_left_out, wear.count) == (3, 0, 20_000.0)
-    assert wear.volume.value == pytest.approx(2.1e-9)
-    assert wear.volume.error == pytest.approx(2.1e-11)
+    wear = found.values["wear"]
+    assert (wear["point"]["frequency"], wear["point"]["scheme"]) == (1, 2)
+    assert (wear["n_compared"], wear["n_left_out"], wear["count"]) == (3, 0, 20_000.0)
+    assert wear["worn_volume"] == pytest.approx(2.1e-9)
+    assert wear["error"] == pytest.approx(2.1e-11)
 
 
 @pytest.mark.parametrize(
@@ -70,10 +69,10 @@ def test_what_is_not_known_is_no_result(name, value, known):
     given = {name: lambda p: value if p[0] == 2 else known}
     dataset = wearing(*GRID, volume=lambda p: 1e-9 * (1.0 + p[0]), **given)
     found = summary(dataset)
-    assert found.wear.volume.value == pytest.approx(2e-9)
-    assert found.wear.n_left_out == 1
+    assert found.values["wear"]["worn_volume"] == pytest.approx(2e-9)
+    assert found.values["wear"]["n_left_out"] == 1
     nothing = summary(dataset.assign(outcome=dataset["outcome"] * 0 + FAILED))
-    assert (nothing.wear, nothing.n_complete) == (None, 0)
+    assert ("wear" in nothing.values, nothing.n_complete) == (False, 0)
     assert not any("mm3" in line for line in nothing.lines)
 
 
@@ -94,12 +93,11 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
     for depths, pair, edge in ((DEPTHS, 4, 0.0), (DEPTHS[[4, 1, 2, 3, 0, 5]], 0, 7.0 / 9.0)):
         depth = np.outer(share, depths) if name == "wear_depth" else depths
         made = made_result(study, BY_SIX, worn_volume=lambda _: 1e-9 * share, **{name: lambda _, depth=depth: depth})
-        deepest = summary(made).wear.deepest
-        assert deepest.depth.value == 5e-6
-        assert (deepest.pair, deepest.surface) == (pair, "right" if pair else "left")
-        np.testing.assert_allclose(deepest.position, BY_SIX.position[pair])
-        assert deepest.edge_share == pytest.approx(edge)
-        assert deepest.edge_area == pytest.approx(0.5)
+        deepest = summary(made).values["deepest"]
+        assert deepest["wear_depth"] == 5e-6
+        assert (deepest["contact"], deepest["surface"]) == (pair, "right" if pair else "left")
+        np.testing.assert_allclose(deepest["position"], BY_SIX.position[pair])
+        assert deepest["edge_share"] == pytest.approx(edge)
         text = "\n".join(summary(made).lines)
         assert ("edge pairs" in text) is (edge > 0.5)
 
@@ -114,18 +112,18 @@ def test_a_joint_that_does_not_move_has_no_amplitude_of_round_off():
 
 def test_nothing_wore_says_why():
     still = summary(wearing("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive", volume=lambda _: 0.0))
-    assert still.wear == NothingWore(0.0, "at all 3 points")
+    assert still.values["wear"] == {"worn_volume": 0.0, "largest_slip": 0.0}
     slips = wearing("axes.frequency=[1, 2]", volume=lambda _: 0.0, slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
-    assert summary(slips).wear.largest_slip == 1e-6
+    assert summary(slips).values["wear"]["largest_slip"] == 1e-6
     some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)
-    assert summary(some).wear.where.startswith("at 3 of 9 points")
+    assert "at 3 of 9 points" in summary(some).lines[0]
     stuck = summary(
         made_result(read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))).assign(
             stuck_frequency=212.6
         )
     )
     assert "nothing wore: all pairs stick at all 3 points (first resonance 212.6 Hz" in stuck.lines[0]
-    assert stuck.certainty.of == "response"
+    assert stuck.values["certainty"]["of"] == "response"
 
 
 # --- the resonance and the life ---
@@ -138,10 +136,9 @@ def test_the_peak_of_the_new_joint_lies_between_others():
             return np.linspace([1.0], [2.0], 21) * 1e-3 / (1.0 + (point[0] - peak) ** 2)
 
         made = wearing(*GRID, volume=lambda p: 1e-9 * (p[0] == 2), response_amplitude=response)
-        found = summary(made).vibration
-        np.testing.assert_equal(found.frequency[0], expected)
-        assert found.amplitude[1].value == pytest.approx(2.0 * found.amplitude[0].value)
-        assert found.where.startswith("212.5 Hz")
+        found = summary(made).values["response"]
+        np.testing.assert_equal(found["peak"], expected)
+        assert found["amplitude"][1] == pytest.approx(2.0 * found["amplitude"][0])
 
 
 def test_where_a_followed_resonance_went():
@@ -153,9 +150,10 @@ def test_where_a_followed_resonance_went():
         excitation_frequency=lambda p: 200.0 - p[1] * np.arange(21.0),
         excitation_frequency_error=lambda _: np.full(21, 0.25),
     )
-    followed = summary(made).vibration
-    assert followed.followed == "resonance"
-    assert (followed.frequency[0], followed.frequency[1].value, followed.frequency[1].error) == (200.0, 180.0, 0.25)
+    followed = summary(made)
+    assert followed.values["response"]["frequency"] == [200.0, 180.0]
+    assert followed.values["response"]["frequency_error"] == 0.25
+    assert any(label == "resonance" for label, _ in followed.rows)
 
 
 def test_the_shortest_life():
@@ -167,13 +165,13 @@ def test_the_shortest_life():
         cycles_to_target=lambda p: lives[p[0]],
         cycles_to_target_error=lambda _: 3.0,
     )
-    life = summary(made).life
-    assert (life.quantity, life.target, life.n_beyond, life.where) == ("wear_depth", 1e-5, 1, "2 Hz")
-    assert (life.count.value, life.count.error) == (300.0, 3.0)
-    assert summary(wearing("axes.frequency=1")).life is None
-    never = summary(made.assign(cycles_to_target=made["cycles_to_target"] * math.nan)).life
-    assert math.isnan(never.count.value)
-    assert never.n_beyond == 3
+    life = summary(made).values["life"]
+    assert (life["target"], life["n_beyond"], life["point"]["frequency"]) == (1e-5, 1, 1)
+    assert (life["count"], life["error"]) == (300.0, 3.0)
+    assert "life" not in summary(wearing("axes.frequency=1")).values
+    never = summary(made.assign(cycles_to_target=made["cycles_to_target"] * math.nan)).values["life"]
+    assert math.isnan(never["count"])
+    assert never["n_beyond"] == 3
 
 
 def test_a_target_before_the_second_count_and_one_without_a_unit():
@@ -190,7 +188,7 @@ def test_a_target_before_the_second_count_and_one_without_a_unit():
     lines = summary(made).lines
     assert any("slow_time.outputs: give more" in line for line in lines)
     assert any("to frequency shift 0.01 " in line for line in lines)
-    assert not summary(made.assign(worn_volume=made["worn_volume"].fillna(0.0))).doubts
+    assert "doubt" not in summary(made.assign(worn_volume=made["worn_volume"].fillna(0.0))).values
 
 
 # --- certainty and failures ---
@@ -198,12 +196,12 @@ def test_a_target_before_the_second_count_and_one_without_a_unit():
 
 def test_every_point_is_compared_with_its_own_rtol():
     study = ("axes.frequency=1", "axes.rtol=[1e-2, 1e-3]", "axes.scheme=adaptive")
-    known = summary(wearing(*study, error_estimate=lambda _: 5e-3)).certainty
-    assert (known.n_known, known.n_less, known.worst) == (1, 1, 5e-3)
-    assert math.isnan(known.rtol)
-    assert known.where == "rtol 0.001"
-    assert "solver.rtol = 0.0002" in known.advice
-    assert summary(wearing(*study, error_estimate=lambda _: 5e-4)).certainty.n_known == 2
+    known = summary(wearing(*study, error_estimate=lambda _: 5e-3)).values["certainty"]
+    assert (known["n_known"], known["n_less"], known["worst"]) == (1, 1, 5e-3)
+    assert math.isnan(known["rtol"])
+    assert known["where"] == "rtol 0.001"
+    assert "solver.rtol = 0.0002" in known["advice"]
+    assert summary(wearing(*study, error_estimate=lambda _: 5e-4)).values["certainty"]["n_known"] == 2
 
 
 def test_points_that_failed_or_were_never_estimated_are_not_known():
@@ -215,22 +213,11 @@ def test_points_that_failed_or_were_never_estimated_are_not_known():
         last_cycle=lambda p: 5000.0 if at(p) == (0, 0) else 20_000.0,
     )
     found = summary(made)
-    known = found.certainty
-    assert (known.n_known, known.n_less, known.n_short, known.n_unknown, known.worst) == (5, 2, 1, 1, 1.2)
-    assert [(each.word, each.is_complete, each.n_points) for each in found.failures] == [
-        ("march_failed", False, 1),
-        ("inaccurate", True, 1),
-        ("sensitive", True, 1),
-    ]
-    assert "computed up to 5000 cycles" in found.failures[0].reason.replace("\N{NO-BREAK SPACE}", "")
-
-
-def test_a_mode_that_is_not_found_gets_no_advice_that_is_an_error():
-    study = read_study("modes", ("axes.modal_amplitude=1e-4", "axes.sweep=up"))
-    made = made_result(study, outcome=lambda _: int(Outcome.START_FAILED))
-    (failure,) = summary(made).failures
-    assert "down" in failure.advice
-    assert "ramp" not in failure.advice
+    known = found.values["certainty"]
+    assert [known[name] for name in ("n_known", "n_less", "n_unknown", "worst")] == [5, 2, 1, 1.2]
+    failures = [each for each in found.findings if each.label in ("failed", "uncertain")]
+    assert [each.name for each in failures] == ["march_failed", "inaccurate", "others"]
+    assert "computed up to 5000 cycles" in failures[0].values["reason"].replace("\N{NO-BREAK SPACE}", "")
 
 
 def test_the_summary_is_short_whatever_came_out():
@@ -244,12 +231,11 @@ def test_the_summary_is_short_whatever_came_out():
         facts=BY_SIX,
     )
     found = summary(made)
-    of_all = {"samples": "volumes", "ranking": "ranking", "mesh": MeshChange((1, 2), "", 0.1, 0.2)}
-    for each in (found, replace(found, **of_all, modes=(ModeRange(1, "", (1, 2), (0, 1), 1, 2),))):
-        lines = each.lines
-        assert len(lines) <= MOST_LINES
-        assert all(line.isprintable() and line.isascii() for line in lines)
-        assert lines[-1].startswith("certainty")
+    more = (*(Finding("mode", "mode", "more") for _ in range(9)), *found.findings)
+    for each in (found, replace(found, findings=more)):
+        assert len(each.lines) <= MOST_LINES
+        assert all(line.isprintable() and line.isascii() for line in each.lines)
+        assert each.lines[-1].startswith("certainty")
 
 
 def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
@@ -277,9 +263,9 @@ def meshed(volumes, *overrides):
 
 def test_meshes_are_compared_at_the_resonance_alone():
     found = meshed({2: [2.0, 1.0], 3: [1.0, 1.1]})
-    assert found.meshes == (2.0, 3.0)
-    assert found.median == pytest.approx((0.5 + 0.1 / 1.1) / 2.0)
-    assert found.largest == pytest.approx(0.5)
+    assert found.values["meshes"] == [2.0, 3.0]
+    assert found.values["median"] == pytest.approx((0.5 + 0.1 / 1.1) / 2.0)
+    assert found.values["largest"] == pytest.approx(0.5)
     assert meshed({2: [0.0, 0.0], 3: [0.0, 0.0]}) is None
     # at one frequency they would be at two distances to the resonance
     assert meshed({2: [2.0, 1.0], 3: [1.0, 1.1]}, "axes.frequency=211.5", "axes.scheme=adaptive") is None
@@ -293,7 +279,7 @@ def test_wear_that_is_not_small_is_pointed_out():
     """One pair on each surface: the side of the smaller one is 0.01 m."""
     for depth, is_small in ((SMALL * 0.01, True), (0.014, False)):
         made = wearing(*GRID, largest_wear_depth=lambda p, depth=depth: depth if p[0] == 1 else 1e-6)
-        doubts = summary(made).doubts
+        doubts = [each.text for each in summary(made).findings if each.name == "doubt"]
         assert bool(doubts) is not is_small
         assert all("211.25 Hz" in doubt for doubt in doubts)
 
@@ -301,7 +287,7 @@ def test_wear_that_is_not_small_is_pointed_out():
 @pytest.mark.parametrize(("frequencies", "asked"), [("[150, 160]", True), ("[20, 25]", False), ("[400, 500]", False)])
 def test_frequencies_in_radians_are_asked_about(frequencies, asked):
     made = wearing(f"axes.frequency={frequencies}").assign(stuck_frequency=25.0)
-    assert any("rad/s" in doubt for doubt in summary(made).doubts) is asked
+    assert any("rad/s" in line for line in summary(made).lines) is asked
 
 
 # --- errors in percent ---

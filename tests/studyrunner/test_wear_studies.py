@@ -68,8 +68,8 @@ def test_points_end_at_their_target_each_at_its_own_count():
     assert 0.0 < errors[0] < 0.05 * counts[0]
     assert np.isnan([counts[2], errors[2]]).all()
     assert result.outcome.values.tolist() == [0, 0, 0]
-    life = summary(whole).life
-    assert (life.count.value, life.count.error, life.n_beyond) == (counts[0], errors[0], 1)
+    life = summary(whole).values["life"]
+    assert (life["count"], life["error"], life["n_beyond"]) == (counts[0], errors[0], 1)
     for message, words_of in zip(result.message.values, ("at its target", "at its target", "stays below"), strict=True):
         assert words_of in message
     assert result.worn_volume.isel(cycle=-1).isnull().values.tolist() == [True, True, False]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -72,42 +72,33 @@ def find_flanks(result: Result) -> tuple[Flank, ...]:
     """The contact surfaces of a file, in order of first appearance; a single one where the file has no labels."""
     found = contact_pairs(result, result.shown)
     area = np.where(np.isfinite(found.area), found.area, 1.0)
-    words = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model")))
-    flanks = []
+    words, flanks = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model"))), []
     for surface in dict.fromkeys(found.surface.tolist()):
         pairs = np.flatnonzero(found.surface == surface)
-        flanks.append(_build_flank(surface or "contact", pairs, area[pairs], found.position[pairs], words))
+        flank, own = Flank(surface or "contact", pairs, area[pairs]), found.position[pairs]
+        if np.isfinite(own).all():
+            centred, cells = own - own.mean(axis=0), None
+            _, _, plane = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
+            largest = np.argmax(np.abs(np.round(plane, 6)), axis=1)[:, None]
+            plane = plane * np.sign(np.take_along_axis(plane, largest, axis=1))
+            seen = centred @ plane[:2].T
+            with contextlib.suppress(ValueError):
+                cells = _build_cells(find_grid(own), flank.area) if len(own) > 1 else None
+            if cells is not None:
+                first, across = own[cells.pair[0]], own[cells.pair[:, 0]]
+                plane = np.stack([first[-1] - first[0], across[-1] - across[0]])
+            named = words if words and (cells is None or len(cells.x) > 1) else (_name(plane[0]), _name(plane[1]))
+            flank = replace(flank, cells=cells, seen=seen, directions=named)
+        flanks.append(flank)
     return tuple(flanks)
-
-
-def _build_flank(
-    surface: str, pairs: NDArray[np.intp], area: FloatArray, own: FloatArray, words: tuple[str, str] | None
-) -> Flank:
-    """Own (n, 3): positions of its pairs, m. words: of its directions, where the scene has some."""
-    if not np.isfinite(own).all():
-        return Flank(surface, pairs, area)
-    centred = own - own.mean(axis=0)
-    _, _, plane = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
-    largest = np.argmax(np.abs(np.round(plane, 6)), axis=1)[:, None]
-    plane = plane * np.sign(np.take_along_axis(plane, largest, axis=1))
-    seen, cells = centred @ plane[:2].T, None
-    with contextlib.suppress(ValueError):
-        cells = _build_cells(find_grid(own), area) if len(own) > 1 else None
-    if cells is not None:
-        across = own[cells.pair[:, 0]]
-        plane = np.stack([own[cells.pair[0, -1]] - own[cells.pair[0, 0]], across[-1] - across[0]])
-        words = None if len(cells.x) == 1 else words
-    return Flank(surface, pairs, area, cells, seen, words or (_name(plane[0]), _name(plane[1])))
 
 
 def _name(direction: FloatArray) -> str:
     """An axis of the mesh, or the components of a direction."""
-    size = float(np.linalg.norm(direction))
-    if size == 0.0:
-        return "across"
-    unit = direction / size
+    unit = direction / (float(np.linalg.norm(direction)) or 1.0)
     axis = int(np.argmax(np.abs(unit)))
-    return "xyz"[axis] if unit[axis] > _STRAIGHT else f"along ({', '.join(f'{each + 0.0:.2g}' for each in unit)})"
+    along = f"along ({', '.join(f'{each + 0.0:.2g}' for each in unit)})" if unit.any() else "across"
+    return "xyz"[axis] if unit[axis] > _STRAIGHT else along
 
 
 def _build_cells(grid: Grid, area: FloatArray) -> Cells:

@@ -33,7 +33,6 @@ _LOWEST, _HIGHEST = 0, 1  # places along the dimension `bound`
 # quantiles between which a band lies, how dark it is, and what it is called
 _BANDS: tuple[tuple[int, int, float, str], ...] = ((0, 4, 0.18, "5 to 95 %"), (1, 3, 0.32, "25 to 75 %"))
 _MIDDLE = 2
-_NOT_NEGLIGIBLE = 1e-3
 _EXCEEDED = (
     ("worn_volume_exceedance", "exceeded_volume", "m3", "worn volume"),
     ("wear_depth_exceedance", "exceeded_depth", "m", "largest wear depth"),
@@ -161,8 +160,8 @@ def draw_bands(result: Result, over: str) -> Drawn:
     # errors and what is open count to twice what is known
     plot.set_from_zero(panels[0, 0], scale(min(max(known, _largest(*wrong, *volumes)), 2.0 * known)).item())
     n_without = max(int(point["n_without_value"].max()) for point in shown)
-    hatched = f"Hatched: what {count(n_without, 'sample')} without a value to be trusted leave open"
-    return figure, _n_samples(statistics), hatched if n_without else "", left_out
+    without = f"{count(n_without, 'sample')} without a value to be trusted leave open what they may be"
+    return figure, _n_samples(statistics), without if n_without else "", left_out
 
 
 def _n_samples(statistics: xr.Dataset) -> str:
@@ -171,22 +170,16 @@ def _n_samples(statistics: xr.Dataset) -> str:
 
 
 def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArray, scale: Scale) -> None:
-    """Bands and median along an axis; dashed the outer ends with the numerical error, hatched what is open."""
-    drawn = scale(np.minimum(volume, 10.0 * max(_largest(volume), 1e-30)))
+    """Bands and median along an axis: volume, and wrong with the numerical errors, (n, quantile, bound)."""
+    edges = np.where(np.isnan(wrong), volume, wrong)
+    edges = scale(np.minimum(edges, 10.0 * max(_largest(volume), 1e-30)))
     for low, high, alpha, label in _BANDS:
-        style: dict[str, Any] = {"color": COLOURS[0], "alpha": alpha, "lw": 0.0, "label": label}
-        panel.fill_between(at, drawn[:, low, _LOWEST], drawn[:, high, _HIGHEST], **style)
-        for place, bound in ((low, _LOWEST), (high, _HIGHEST)):
-            panel.plot(at, drawn[:, place, bound], color=COLOURS[0], lw=0.5, alpha=0.5, label=f"_{label}")
-    panel.plot(at, drawn[:, _MIDDLE, _LOWEST], color=COLOURS[0], marker="o" if at.size <= 12 else "", label="median")
-    for number in np.flatnonzero((volume[..., _HIGHEST] > volume[..., _LOWEST]).any(axis=0)).tolist():
-        style = {"facecolor": "none", "edgecolor": "0.45", "hatch": "////", "lw": 0.0, "label": "left open"}
-        panel.fill_between(at, drawn[:, number, _LOWEST], drawn[:, number, _HIGHEST], **style)
-    moved = np.abs(wrong - volume)[np.isfinite(wrong) & np.isfinite(volume)]
-    if (moved > _NOT_NEGLIGIBLE * _largest(volume)).any():
-        style = {"color": COLOURS[1], "linestyle": (0, (4, 2)), "linewidth": 1.0}
-        panel.plot(at, scale(wrong[:, 0, _LOWEST]), **style, label="with numerical error")
-        panel.plot(at, scale(np.where(np.isfinite(wrong), wrong, np.nan)[:, -1, _HIGHEST]), **style)
+        lowest, highest = edges[:, low, _LOWEST], edges[:, high, _HIGHEST]
+        panel.fill_between(at, lowest, highest, color=COLOURS[0], alpha=alpha, lw=0.0, label=label)
+        for edge in (lowest, highest):
+            panel.plot(at, edge, color=COLOURS[0], lw=0.5, alpha=0.5, label=f"_{label}")
+    median, marker = scale(volume[:, _MIDDLE, _LOWEST]), "o" if at.size <= 12 else ""
+    panel.plot(at, median, color=COLOURS[0], marker=marker, label="median")
 
 
 def draw_exceedance(result: Result) -> Drawn:

@@ -195,7 +195,8 @@ def draw_loops(result: Result, name: str) -> Drawn:
     there, source = find_loops(result, result.shown), result.recomputed.get("loops")
     how = "" if source is None else str(source.attrs["how"])
     if source is not None:
-        there = [int(pair) for pair in source["contact"].values]
+        force = source["loop_force"]
+        there = [int(pair) for pair in source["contact"].values if force.sel(contact=pair).notnull().any()]
     elif there:
         source = result.dataset[["loop_displacement", "loop_force"]].isel(result.shown)
     else:

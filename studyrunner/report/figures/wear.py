@@ -24,7 +24,6 @@ from studyrunner.report.selection import (
     labelled,
     slow_time,
 )
-from studyrunner.result.certainty import show_error
 from studyrunner.result.view import NO_VOLUME, Point, Result
 from studyrunner.units import Scale, scale_for, show_number, show_percent
 
@@ -119,7 +118,7 @@ def _with_error(result: Result, point: Point) -> str:
     if not result.computed[place] or not 0.0 < result.errors[place] < np.inf:
         return ""
     remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
-    return f" ± {show_error(result, point)}{remark}"
+    return f" ± {result.show_error(point)}{remark}"
 
 
 # --- over an axis of the study ---

@@ -1,30 +1,39 @@
 """One HTML page of a result, with everything inside: opens from a disk, without a network.
 
 A template puts it together and escapes all texts; only scripts, the style sheet, the numbers, and the SVG files that
-matplotlib has written, are taken as they are.
+matplotlib has written, are taken as they are. Numbers of the interactive part are variables of the file as 32-bit
+floats, within a limit of size.
 """
 
 from __future__ import annotations
 
+import base64
 import json
+import math
 import os
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.coordinates import COORDINATES
 from studyrunner.report.drawing import Drawing, Item, Missing
-from studyrunner.report.page.data import build_page_data, build_root_numbers
-from studyrunner.result.certainty import advise_ended, describe_ended
-from studyrunner.result.view import CONVERGED, Result
+from studyrunner.report.figures.response import find_loops
+from studyrunner.report.root import body_colours, find_views, read_root
+from studyrunner.report.selection import course_axis
+from studyrunner.result.pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
+from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.statistics.samples import DRAWN
 from studyrunner.summary.answer import summarise
 from studyrunner.system.progress import count
-from studyrunner.units import show_number, units_of
+from studyrunner.units import Scale, scale_for, show_number, units_of
 from studyrunner.user_error import show_text
+from studyrunner.variables import CERTIFICATE
 
 DATA_LIMIT = 5e6
 """Most characters of numbers of the interactive part, those of the root in three dimensions aside."""
@@ -82,7 +91,6 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
         file=show_text(result.path.name),
         css=own.joinpath("page.css").read_text("utf-8"),
         answer=summarise(result).rows,
-        endings=_endings(result),
         facts=_facts(result),
         study=result.dataset.attrs.get("study"),
         parts=[part for part in parts if not isinstance(part, Missing)],
@@ -92,16 +100,6 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
         data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c") if data else "",
         scripts=[get_plotlyjs(), "\n".join(own.joinpath(name).read_text("utf-8") for name in _SCRIPTS)] if data else [],
     )
-
-
-def _endings(result: Result) -> list[tuple[str, list[str]]]:
-    """How points ended but `converged`: how many, what that means and what may help; and lines on these points."""
-    numbers, found = Counter(result.dataset["outcome"].values.ravel().tolist()), []
-    for number, ending in sorted(result.endings.items()):
-        if numbers[number] and number != CONVERGED:
-            meaning = f"{ending.sentence} {advise_ended(result, number)}".rstrip()
-            found.append((f"{count(numbers[number], 'point')}: {meaning}", describe_ended(result, number)))
-    return found
 
 
 def _facts(result: Result) -> list[tuple[str, str]]:
@@ -125,3 +123,201 @@ def _facts(result: Result) -> list[tuple[str, str]]:
     named = {"source": "source", "versions": "versions", "scene_sha256": "hash of the scene"}
     attributes = result.dataset.attrs
     return facts + [(label, str(attributes[name])) for name, label in named.items() if name in attributes]
+
+
+# --- numbers of the interactive part ---
+
+_CHARACTERS_A_FLOAT = 16.0 / 3.0
+_MOST_POINTS = 20_000
+"""Points of a study with an interactive part: each takes time to draw."""
+
+_MOST_FACES, _MOST_PAIRS = 15_000, 10_000
+"""Faces, and contact pairs, that the page draws in three dimensions."""
+
+_MOST_MESSAGES, _MOST_PHASES = 500, 64
+_LOOPS = "pair_of_loop"
+"""Dimension of those pairs that have loops."""
+
+_ERRORS = dict.fromkeys(("response_amplitude", "response_amplitude_begin", "response_peak"), "response_error")
+"""Variables whose error has another name than `<name>_error`."""
+
+_PERCENT = ("worn_volume_error", "error_estimate", "block_worn_volume_error", *CERTIFICATE)
+_FIRST = ("worn_volume", "natural_frequency", "response_amplitude")
+_COLOURED = ("worn_cycle", "scheme", "sweep", "cycle", "mode")
+_LINES = 10
+
+
+def encode_floats(values: ArrayLike) -> str:
+    """Numbers as base64 of little-endian 32 bit floats, the last index fastest; NaN stays NaN."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+
+def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str, Any] | None:
+    """What the script of the page reads, in about `limit` characters; None where there is nothing to show.
+
+    `dims`: the dimensions, the axes first. `coords`: numbers along one that may stand for it. `variables`: see
+    `_encode`. `at`: index along each dimension, and `start`: what is shown at first. `messages`: of points by number,
+    the last axis fastest. `notes` gets sentences on what is left out.
+    """
+    if not result.has_values.any():
+        return None
+    if result.has_values.size > _MOST_POINTS:
+        notes.append(
+            f"The study has {result.has_values.size} points, more than the {_MOST_POINTS} that can be picked here."
+        )
+        return None
+    if result.has("cycle_count"):
+        notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
+    shown = dict(result.shown)
+    last = 0 if result.has_modes else result.last_reached(shown)
+    floats = math.inf if result.has_modes else limit / _CHARACTERS_A_FLOAT
+    arrays, kept = _fit(dict(_arrays(result)), floats, notes)
+    used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])
+    if not result.has_modes:
+        shown["cycle"] = int(np.abs(kept - last).argmin())
+    messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
+    return {
+        "dims": [_dimension(result, name, arrays) for name in used],
+        "axes": list(result.axes),
+        "coords": list(_coordinates(result, set(used))),
+        "variables": [_encode(array, arrays) for array in arrays.values()],
+        "at": {name: shown.get(name, 0) for name in used},
+        "start": _start(result, arrays),
+        "sentences": {str(number): ending.sentence for number, ending in result.endings.items()},
+        "messages": {str(place): text for place, text in enumerate(messages) if text and place < _MOST_MESSAGES},
+    }
+
+
+def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
+    """Numbers of the file that belong to points of the study, unread; loops of those pairs alone that have some."""
+    found = {**result.dataset.data_vars, **(result.blocks.data_vars if result.blocks is not None else {})}
+    for name, array in found.items():
+        if array.dtype.kind not in "iuf" or not set(result.axes) & set(array.dims) or not array.size:
+            continue
+        if "phase" in array.dims:
+            phases = slice(None, None, -(-array.sizes["phase"] // _MOST_PHASES))
+            array = array.sel(contact=find_loops(result, result.shown)).isel(phase=phases)
+            array = array.rename(contact=_LOOPS)
+        if array.size:
+            yield str(name), array
+
+
+def _fit(
+    arrays: dict[str, xr.DataArray], floats: float, notes: list[str]
+) -> tuple[dict[str, xr.DataArray], NDArray[np.intp]]:
+    """Variables that fit, at the counts that are kept, and places of these: the first, the last, and some between."""
+    cycles = {name: array.sizes.get("cycle", 1) for name, array in arrays.items()}
+    small = {name: array.size // cycles[name] * min(2, cycles[name]) for name, array in arrays.items()}
+    n_cycles = max(cycles.values(), default=1)
+    for name in sorted(arrays, key=lambda name: -small[name]):
+        if sum(small[each] for each in arrays) > floats:
+            del arrays[name]
+            notes.append(f"{name} does not fit into this page.")
+    # a variable along the cycles takes as much at each of them
+    each = sum(array.size / n_cycles for array in arrays.values() if "cycle" in array.dims)
+    others = sum(array.size for array in arrays.values() if "cycle" not in array.dims)
+    keep = n_cycles if each * n_cycles + others <= floats else max(min(2, n_cycles), int((floats - others) / each))
+    kept = np.unique(np.linspace(0, n_cycles - 1, keep).round().astype(np.intp))
+    if keep < n_cycles:
+        notes.append(f"On this page are {len(kept)} of {n_cycles} counts.")
+        arrays = {name: array.isel(cycle=kept, missing_dims="ignore") for name, array in arrays.items()}
+    return arrays, kept
+
+
+def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
+    """A variable: `data` in SI times `factor` in `unit`, `error` the variable of its error, `words` of its values."""
+    name, attributes = str(array.name), array.attrs
+    values = array.values.astype(float)
+    scale = scale_for(str(attributes.get("units", "")), values)
+    if name in _PERCENT and name.endswith(("_error", "_estimate")):
+        scale = Scale(100.0, "%")
+    error = _ERRORS.get(name, f"{name}_error")
+    flags = attributes.get("flag_values", ()), str(attributes.get("flag_meanings", "")).split()
+    return {
+        "name": name,
+        "label": str(attributes.get("long_name", name)),
+        "unit": scale.unit,
+        "factor": scale.factor,
+        "dims": [str(dim) for dim in array.dims],
+        "data": encode_floats(values),
+        "error": error if error in arrays else None,
+        "relative": error in arrays and str(arrays[error].attrs.get("units")) != str(attributes.get("units")),
+        "words": {str(int(value)): word.replace("_", " ") for value, word in zip(*flags, strict=False)},
+    }
+
+
+def _dimension(result: Result, name: str, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
+    """A dimension with its values: numbers, or words."""
+    axis = next(array for array in arrays.values() if name in array.dims)[name]
+    label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
+    words, values = axis.dtype.kind not in "fiu", axis.values.tolist()
+    numbers = [str(each) if words else each if math.isfinite(each) else None for each in values]
+    return {
+        "name": name,
+        "label": label,
+        "unit": "" if name == "cycle" else units_of(axis),
+        "values": numbers,
+        "words": words,
+    }
+
+
+def _coordinates(result: Result, dims: set[str]) -> Iterator[dict[str, Any]]:
+    """Numbers along one dimension: what samples draw, positions of the pairs."""
+    for name, axis in result.dataset.coords.items():
+        along = [str(dim) for dim in axis.dims]
+        if len(along) == 1 and along[0] in dims and name != along[0] and axis.dtype.kind in "iuf":
+            scale = scale_for(str(axis.attrs.get("units", "")), axis.values)
+            label = str(name).removeprefix(DRAWN).replace("_", " ")
+            data = encode_floats(scale(axis.values))
+            yield {"name": str(name), "dim": along[0], "label": label, "unit": scale.unit, "data": data}
+
+
+def _start(result: Result, arrays: Mapping[str, xr.DataArray]) -> dict[str, str]:
+    """What is shown first: a variable over the axis that figures are drawn over, or over slow time."""
+    wears = result.has("worn_volume") and bool(np.nanmax(result.worn) > NO_VOLUME)
+    usual = [name for name in _FIRST if name in arrays and (wears or name != "worn_volume")]
+    name = next(iter((*usual, *arrays)))
+    sizes = arrays[name].sizes
+    several = [str(dim) for dim in sizes if sizes[dim] > 1]
+    over = [dim for dim in (course_axis(result), "cycle") if dim in several]
+    across = str(next(iter((*over, *several, *sizes))))
+    colours = [dim for dim in _COLOURED if dim in several and dim != across and sizes[dim] <= _LINES]
+    return {"variable": name, "x": across, "colour": colours[0] if colours else ""}
+
+
+def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | None:
+    """Faces and views as the script on the page reads them; None where there are none to draw, or too many.
+
+    As `encode_floats` has them: `nodes`, m, `faces`, of each `body`, `flank` and bits `seen` of the views; of `contact`
+    nodes, pairs and normals. `well_seen`: m, a depth that is well seen. `scene`: index of the drawn scene along axes.
+    """
+    n_pairs = result.dataset.sizes["contact"]
+    if n_pairs > _MOST_PAIRS:
+        notes.append(f"The contact is not on this page in three dimensions: it has {n_pairs} pairs.")
+        return None
+    whole = read_root(of_shown_scene(result))
+    if whole is None:
+        return None
+    surface = whole.near_contact(_MOST_FACES)
+    if len(surface.faces) < len(whole.faces):
+        notes.append(
+            f"In three dimensions are {len(surface.faces)} of {len(whole.faces)} faces, those near the contact."
+        )
+    views, shown = find_views(surface), result.shown
+    seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
+    of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": surface.flank}
+    pairs = pairs_of_scene(result, shown)[surface.pairs]
+    of_contact = {"nodes": surface.own, "pairs": pairs, "normals": surface.normals}
+    directions = [{"eye": view.to_eye, "up": view.up} for view in views]
+    return {
+        **{name: encode_floats(values) for name, values in (of_faces | {"seen": np.asarray(seen)}).items()},
+        "bodies": list(surface.bodies),
+        "colours": list(body_colours(surface.bodies)),
+        "contact": {name: encode_floats(values) for name, values in of_contact.items()},
+        "well_seen": surface.well_seen,
+        "scene": {name: shown[name] for name in axes_of_scenes(result)},
+        "views": [
+            {"title": view.title, "body": view.body, **{name: np.round(each, 6).tolist() for name, each in way.items()}}
+            for view, way in zip(views, directions, strict=True)
+        ],
+    }

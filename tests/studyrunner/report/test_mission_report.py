@@ -12,7 +12,7 @@ from studyrunner.api import run_study
 from studyrunner.report.cli import main
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Drawing
-from studyrunner.report.page.data import build_page_data
+from studyrunner.report.page.page import build_page_data
 from studyrunner.result.view import open_for_report
 from tests.studyrunner.faked_blocks import STUDY, FakedBlocks
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from studyrunner.report.drawing import Drawing, Missing, Table
 from studyrunner.report.page import page
-from studyrunner.report.page.data import build_page_data
-from studyrunner.report.page.page import write_page
+from studyrunner.report.page.page import build_page_data, write_page
 from studyrunner.report.panels import new_panel
 from studyrunner.result.view import Result
 from tests.studyrunner.results import AXES, as_result, build_file

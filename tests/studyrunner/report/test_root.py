@@ -16,8 +16,7 @@ from tests.studyrunner.results import as_result, build_file
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
-    dataset = dovetail_file().assign_attrs(title="wear --> after -- a title")
-    return as_result(dataset, tmp_path_factory.mktemp("root") / "dovetail.nc")
+    return as_result(dovetail_file(), tmp_path_factory.mktemp("root") / "dovetail.nc")
 
 
 @pytest.fixture(scope="module")
