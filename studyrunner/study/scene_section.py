@@ -160,13 +160,6 @@ def parameters_of(model: object, source: str, folder: Path | None = None) -> typ
         raise UserError(source, "scene.model", model, error.remedy) from None
 
 
-def check_model_file(model: object, origin: Origin) -> None:
-    """Raises UserError where the file of a model is missing: this is said before keys that are missing."""
-    if isinstance(model, str) and _names_model(model) and origin.archived is None:
-        with scene_errors(origin.source, None):
-            check_there(origin.path.parent / model)
-
-
 def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
     """The scene with its files and what it offers: in the result that is read, in files, or to be built.
 
