@@ -1,7 +1,7 @@
 """The scenes of a run: built once, for all ranks.
 
-A single scene is built by rank 0. Several scenes are built by all ranks side by side, each scene once, and are kept in
-the file of the run. A task brings the model to a rank that does not have it: as a file that the ranks map
+A single scene is built by rank 0, several scenes by all ranks side by side, each scene once. They are kept in the file
+of the run. A task brings the model to a rank that does not have it: as a file that the ranks map
 (`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 

@@ -35,8 +35,7 @@ from studyrunner.kinds.task import (
     number_points,
     settings_at,
 )
-from studyrunner.scene.pairs import ContactChange
-from studyrunner.scene.scene_set import SceneSet
+from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
 from studyrunner.variables import OF_A_MISSION
 
