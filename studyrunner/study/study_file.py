@@ -262,7 +262,7 @@ def _set_key(table: Tables, key: str, value: object, source: str, shown: str) ->
         else:
             place = place.setdefault(name, {})
         if not isinstance(place, dict | list):
-            raise UserError(source, shown, value, f"give a key in a table: {name} is none")
+            raise UserError(source, shown, value, f"{name} is no table: give a key of a table")
     if not isinstance(place, dict):
         raise UserError(source, shown, value, f"give {'.'.join(names)}.NAME.KEY with the name of a table in this list")
     if value is None:
