@@ -153,13 +153,13 @@ def test_a_run_that_is_interrupted_goes_on(tmp_path, monkeypatch):
 SLIDER = "sdof_slider"
 MISTAKES = (
     (lambda: read_study(SLIDER, {"slow_time.cycle": 3}), "sdof_slider: slow_time.cycle = 3: unknown key, give cycles"),
-    (lambda: read_study(SLIDER, {"study.name.x": 3}), "overrides: study.name.x = 3: name holds a value and no keys"),
+    (lambda: read_study(SLIDER, {"study.name.x": 3}), "overrides: study.name.x = 3: name is no table"),
     (
         lambda: run_study(SLIDER, Path("none/out.nc"), progress=False),
         'run_study: output = "none/out.nc": give a file in',
     ),
     (lambda: run_study(read_study(SLIDER), overrides=SMALL), "run_study: overrides: give them to read_study"),
-    (lambda: run_study("nothing"), "nothing: the study: there is none of this name"),
+    (lambda: run_study("nothing"), "nothing: the study: there is no such file: give a TOML file or one of"),
     (lambda: build_scene("nothing"), 'model: no bundled scene is called "nothing"; give one of'),
     (lambda: build_scene(SLIDER, friction_coefficient=0.3), "friction_coefficient: 0.3; give it to the solver"),
     (lambda: build_scene(SLIDER, mas=1.0), "mas: unknown parameter; give one of contact_stiffness, mass"),

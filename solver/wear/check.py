@@ -87,7 +87,7 @@ def report_only(
     if wanted != state.resolution:
         case, _ = setup.case_and_joint(state)
         point = setup.run.move(case, case.at(wanted).joint(state.omega, setup.excitation_amplitude), state.point)
-        moved = point and setup.at_followed(replace(state, point=point, resolution=wanted))
+        moved = point and setup.at_followed(setup.with_rates(replace(state, point=point, resolution=wanted)))
         state = moved if isinstance(moved, WearState) else state
     return state, report_state(setup.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=with_resonance)
 
@@ -117,7 +117,8 @@ def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:
     refined = refine(*setup.case_and_joint(state), state.point, setup.run)
     resolution, point = refined.case.resolution, refined.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
-    return setup.at_followed(replace(state, estimate=refined.estimate, accurate=refined.accurate))
+    state = replace(state, estimate=refined.estimate, accurate=refined.accurate)
+    return setup.at_followed(setup.with_rates(state))
 
 
 def _vibrates_otherwise(state: WearState) -> bool:
