@@ -110,9 +110,7 @@ class FrequencySweep:
         return nodes.begin(replace(nodes.path, case=case), state)
 
     def advance(self, frequency: float) -> StartState | Failure:
-        """State at the next frequency, Hz, with the harmonics it needs, or why there is none. Raises OutOfTimeError
-        and LinAlgError.
-        """
+        """State at the next frequency, Hz, with the harmonics it needs, or why there is none. Raises LinAlgError."""
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
         run.budget.iterations, run.budget.limit = 0, NODE_ITERATIONS

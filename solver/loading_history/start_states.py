@@ -55,7 +55,7 @@ def follow_branch(
         to frequencies not yet passed. The states are equal to the last bit, except `run_time`.
     """
     asked = model, friction_coefficient, excitation_amplitude, sweep, settings
-    line = FrequencySweep(*asked) if keep is None else FrequencySweep(*asked, keep=keep)
+    line = FrequencySweep(*asked, keep=keep or (lambda _: None))
     if resume is not None:
         line.load(resume)
     return follow_line(line, frequencies)

@@ -65,8 +65,8 @@ def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) 
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    case, joint = setup.case_and_joint(state)
-    found = relax_to_periodic(case, joint, worn, state.point, joint, setup.run)
+    joint = setup.joint_of(state)
+    found = relax_to_periodic(joint, worn, state.point, joint, setup.run)
     if isinstance(found, Failure):
         return found if found.outcome is Outcome.ADRIFT else Failure(Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners
