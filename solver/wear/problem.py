@@ -199,7 +199,7 @@ class WearProblem:
         if still or not math.isnan(course.reached) or course.ends[-1] >= end * (1.0 - 1e-12):
             found = AS_ASKED
         elif isinstance(cycles, ToTheEnd):
-            found = end_of_wear(self.setup, state, course, cycles.final_share)
+            found = end_of_wear(state, course, cycles.final_share)
         most = HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
         if found is None and state.wears and self.budget.iterations > most:
             found = Failure(Outcome.MARCH_FAILED)
