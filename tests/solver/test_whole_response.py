@@ -39,14 +39,6 @@ def slipping(kind):
     return balance_of(model, OMEGA / (2.0 * np.pi), force, 0.4, settings=settings), model
 
 
-def test_the_jacobian_is_the_derivative_of_the_residual():
-    balance, _ = slipping("random")
-    exact = balance.jacobian(balance.state)
-    step = 1e-5 * np.abs(balance.state).mean() * np.random.default_rng(0).normal(size=balance.size)
-    ahead, back = (balance.residual(balance.state + sign * step) for sign in (1.0, -1.0))
-    assert np.linalg.norm(0.5 * (ahead - back) - exact @ step) < 1e-4 * np.linalg.norm(exact @ step)
-
-
 @pytest.mark.parametrize("kind", ["random", "travelling wave"])
 def test_all_coefficients_obey_the_equation_of_motion(kind):
     balance, model = slipping(kind)

@@ -13,9 +13,7 @@ import pytest
 
 from studyrunner import task_runs
 from studyrunner.cli import main
-from studyrunner.mpi import dispatch
-from studyrunner.mpi.dispatch import CostModel, Dispatcher
-from studyrunner.mpi.mapped_file import UnseenFileError, open_mapped, write_mapped
+from studyrunner.mpi.mapped_file import open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
 from studyrunner.study.study_file import read_study
@@ -93,27 +91,6 @@ def test_several_processes_without_mpi_are_refused(monkeypatch):
         start_ranks()
 
 
-def test_what_waits_is_bounded(monkeypatch):
-    """A sweep does not go first where more waits than all ranks have use for."""
-    monkeypatch.setattr(dispatch, "_WAITING", 10)
-    monkeypatch.setattr(dispatch, "_WAITING_A_RANK", 0)
-    dispatcher = Dispatcher(1, CostModel(), time.monotonic)
-    dispatcher.add([Job("sweep", 1.0, 4, True)] * 50)
-    most, n_done, waiting = 0, 0, 0
-    while not dispatcher.done:
-        ((rank, number, task),) = dispatcher.assign()
-        for _ in range(task.n_results):
-            dispatcher.deliver(rank, number, 1.0)
-            if task.gives_starts:
-                dispatcher.add([Job("history", 1.0)])
-                waiting += 1
-        if not task.gives_starts:
-            n_done, waiting = n_done + 1, waiting - 1
-        most = max(most, waiting)
-    assert (n_done, waiting) == (200, 0)
-    assert most < 10 + 4
-
-
 # --- arrays in a file that several processes map, and which ranks see it ---
 
 
@@ -130,20 +107,6 @@ def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path
     assert other["c"].flags.aligned
     assert other["f"].flags.f_contiguous
     assert other["n"] is None
-
-
-def test_a_task_is_sent_again_with_what_its_rank_does_not_see():
-    sent, office = [], Office()
-    office.begin, office.take = lambda: [Job("a", 1.0)], lambda *_: []
-    office.prepare = lambda _, job, **given: sent.append(given) or job
-
-    def run(*_):
-        if len(sent) == 1:
-            raise UnseenFileError("file")
-        yield 1
-
-    serve_tasks(Ranks(), office, run)
-    assert sent == [{}, {"unseen": True}]
 
 
 # --- what a user sees ---
