@@ -252,15 +252,17 @@ def shortest_life(result: Result) -> Finding | None:
     reaches = (
         f"{quantity.replace('_', ' ')} {_show(target, {'wear_depth': 'm', 'worn_volume': 'm3'}.get(quantity, '1'))}"
     )
-    unsure = f"; the life of {count(n_unsure, 'point')} is not known" if n_unsure else ""
+    unsure = f"the life of {count(n_unsure, 'point')} is not known" if n_unsure else ""
     values = {"target": target, "count": math.nan, "n_beyond": n_beyond, "n_unsure": n_unsure}
     if np.isnan(lives).all():
-        text = f"no {'other ' if unsure else ''}point computed to the end reaches {reaches}{unsure}"
+        none = f"no {'other ' if unsure else ''}point computed to the end reaches {reaches}"
+        text = "; ".join(filter(None, ("" if unsure and not n_beyond else none, unsure)))
         return Finding("life", "life", text, values)
     point = result.largest(-np.nan_to_num(lives, nan=np.inf))
     life, error = (float(each[result.place(point)]) for each in (lives, errors))
     known = f"± {show_percent(error / life)}" if math.isfinite(error) and life > 0.0 else "(error not known)"
-    text = f"{show_cycles(round(life), result.counted)} {known} to {reaches} at {where_is(result, point)}{unsure}"
+    text = f"{show_cycles(round(life), result.counted)} {known} to {reaches} at {where_is(result, point)}"
+    text += f"; {unsure}" if unsure else ""
     text += f"; not reached by {count(n_beyond, 'point')}" if n_beyond else ""
     return Finding("life", "life", text, values | {"count": life, "error": error, "point": point})
 

@@ -175,6 +175,8 @@ def test_the_shortest_life():
     never = summary(made.assign(cycles_to_target=made["cycles_to_target"] * math.nan)).values["life"]
     assert math.isnan(never["count"])
     assert never["n_beyond"] == 3
+    unsure = made.assign(cycles_to_target_error=1e9 + made["cycles_to_target"]).isel(frequency=[0])
+    assert dict(summary(unsure).rows)["life"] == "the life of 1 point is not known"
     at_once = summary(
         made.assign(
             cycles_to_target=made["cycles_to_target"] * 0.0, cycles_to_target_error=0.0 * made["cycles_to_target"]
