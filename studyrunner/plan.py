@@ -86,7 +86,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
 def _of_study(study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan) -> Iterator[tuple[str, str]]:
     facts, tasks = merge_facts(of_scenes), (*plan.sweeps, *plan.results)
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
-    contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
+    contact = f"{count(len(facts.area), 'contact pair')} with {count(facts.n_displacements, 'relative displacement')}"
     yield "study", f"{study.study.name}: {study.study.title}".rstrip(": ")
     yield "scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"
     if len(of_scenes) > 1:
