@@ -243,7 +243,13 @@ class WearProblem:
         end, follow = replace(taken[0], length=taken[1]), self.asked.follow
         if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
             return self.setup.lost(end)
-        return too_long(self.setup, state, end.depth, end.cycle - state.cycle) or end
+        return self._too_long(state, end.depth, end.cycle - state.cycle) or end
+
+    def _too_long(self, state: WearState, depth: FloatArray, length: float) -> Failure | None:
+        """As `too_long`; never of a reference solution, whose difference is the warning: in a last long step nearly all
+        of the force of a joint that comes to its end is moved.
+        """
+        return None if self.guide is not None else too_long(self.setup, state, depth, length)
 
     def _shortest(self, state: WearState, length: float) -> float:
         """Shortest step, cycles, of one that is `length` long: the accuracy to which a branch end is located."""
@@ -276,7 +282,7 @@ class WearProblem:
             if found is not None:
                 return found
         worn = state.depth + length * state.rate
-        if (failure := too_long(setup, state, worn, length)) is not None:
+        if (failure := self._too_long(state, worn, length)) is not None:
             return failure
         beyond = jump(setup, state, worn, state.cycle + length)
         if isinstance(beyond, Failure):
