@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from solver.packing import Packed, pack_model, unpack_model
-from studyrunner.checkpoint.store import Store
+from studyrunner.checkpoint.store import COMPUTED, Store
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.mapped_file import MappedFile, write_mapped
@@ -167,11 +167,11 @@ class _Building(TaskHandler):
 
     def begin(self) -> Iterator[SceneTask]:
         for number, (study, key) in enumerate(zip(self._studies, self._keys, strict=True)):
-            yield SceneTask(number, study, self._store.read_computed(key))
+            yield SceneTask(number, study, self._store.read(COMPUTED, key))
 
     def take(self, task: SceneTask, result: SceneBuilt) -> Sequence[SceneTask]:
         if result.model is not None:
-            self._store.keep_computed(self._keys[task.number], result.model)
+            self._store.put(COMPUTED, self._keys[task.number], result.model)
         # a single model may be too large for the file
         several = len(self._studies) > 1
         self.found[task.number] = replace(result, model=None) if several else result
@@ -184,7 +184,7 @@ class _Building(TaskHandler):
 
     def read(self, number: int) -> ReducedModel:
         """The model of a scene. Raises RuntimeError where it is no longer there."""
-        packed = self.found[number].model or self._store.read_computed(self._keys[number])
+        packed = self.found[number].model or self._store.read(COMPUTED, self._keys[number])
         if packed is None:
             raise RuntimeError(f"the model of scene {number} has gone")
         return unpack_model(packed)
