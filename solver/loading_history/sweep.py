@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Generic
 
-from solver.accuracy.resolved_state import fewer
+from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure, carried_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, Path, S, Step
@@ -61,7 +61,7 @@ class Nodes:
         return replace(self, states=(*self.states, state)[-KEPT_NODES:])
 
 
-_SAVED = ("nodes", "failure", "length", "rate", "checked", "branch", "fold", "reference", "skipped")
+_SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
 """Attributes of a `Sweep` with which it goes on from a node, and the Newton iterations so far."""
 
 
@@ -72,7 +72,7 @@ class Sweep(Generic[S]):
     nodes, ahead: last nodes, and the next one, where it is known. passed: parameters of the nodes so far.
     failure: why there is no state, at the start or behind the last node; None where there is one.
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
-    checked: the node at which the harmonics were chosen.
+    checked, error: the node at which the harmonics were chosen, and its largest estimated error.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
     reference: last nodes of the reference sweep, None for none; skipped: parameters of the nodes since then.
     """
@@ -95,6 +95,7 @@ class Sweep(Generic[S]):
         self.failure: Failure | None = Failure(Outcome.START_FAILED)
         self.length, self.rate = path.longest, 0.0
         self.checked: S | None = None
+        self.error = 0.0
         self.branch, self.fold = 0, math.nan
         self.reference: Nodes | None = None
         self.skipped: tuple[float, ...] = ()
@@ -203,7 +204,7 @@ class Sweep(Generic[S]):
         self.branch, self.fold = self.branch + len(step.folds), (self.fold, *step.folds)[-1]
         if self.with_reference:
             self._lead_reference(before, step)
-        if self.checked is None or not self.path.suits(self.checked, step.state):
+        if self.checked is None or not self.path.suits(self.checked, self.error, step.state):
             self._choose_resolution()
         if self.budget.iterations >= self.saved["iterations"] + ITERATIONS_PER_SAVE:
             self._save()
@@ -240,7 +241,7 @@ class Sweep(Generic[S]):
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
-        self.checked, error = self.nodes.states[-1], 0.0
+        self.checked, error = self.nodes.states[-1], NOTHING
         if self.path.case.settings.automatic:
             path, self.checked, error = self.path.choose(self.checked, self.run)
             if path.case.resolution == self.nodes.resolution:
@@ -248,7 +249,8 @@ class Sweep(Generic[S]):
             else:
                 self.nodes, self.path = Nodes(path.case.resolution, (self.checked,)), path
                 self.run = self.run.fresh()
-        return error
+        self.error = error.largest
+        return error.response
 
     def _save(self) -> None:
         """Save the current node, and go on as a sweep that is resumed there."""
