@@ -66,7 +66,7 @@ _SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "f
 
 
 class Sweep(Generic[S]):
-    """A sweep, node by node, up (direction 1) or down (-1) along the parameter of its path; the line of `take_step`.
+    """A sweep, node by node, up (sign 1) or down (-1) along the parameter of its path; stepped by `take_step`.
 
     budget: of the nodes, those of the reference sweep included. save: called where the sweep was saved, as `saved`.
     nodes, ahead: last nodes, and the next one, where it is known. passed: parameters of the nodes so far.
@@ -80,13 +80,13 @@ class Sweep(Generic[S]):
     def __init__(
         self,
         path: Path[S],
-        direction: float,
+        sign: float,
         budget: Budget,
         *,
         with_reference: bool = True,
         save: Callable[[], None] = lambda: None,
     ) -> None:
-        self.path, self.direction, self.budget, self.save = path, direction, budget, save
+        self.path, self.sign, self.budget, self.save = path, sign, budget, save
         self.with_reference = with_reference
         self.run = self._reference_run = Run(path.case.settings.tolerance, budget)
         self.nodes = Nodes(path.case.resolution)
@@ -147,7 +147,7 @@ class Sweep(Generic[S]):
         while (here := self.here) is not None:
             if self.ahead is None:
                 self._look_ahead(here)
-            elif (self.ahead.state.parameter - parameter) * self.direction >= 0.0:
+            elif (self.ahead.state.parameter - parameter) * self.sign >= 0.0:
                 return
             else:
                 self._advance(here, self.ahead)
@@ -165,20 +165,20 @@ class Sweep(Generic[S]):
         return path.rescue(self.here, parameter, run) if found is None else Step(found)
 
     def attempt(self, here: S, length: float) -> Step[S] | None:
-        """As in Line."""
+        """As in SteppedProblem."""
         run = self.run.with_tolerance(self.path.case.settings.rough_tolerance)
-        found = self.path.solve(self.nodes.states, self.path.ahead(here.parameter, self.direction * length), run)
+        found = self.path.solve(self.nodes.states, self.path.ahead(here.parameter, self.sign * length), run)
         return None if found is None else Step(found)
 
     def ratio(self, here: S, end: Step[S], length: float) -> float:
-        """As in Line: the shortest step is accepted, whatever the change of the vibration is."""
+        """As in SteppedProblem: the shortest step is accepted, whatever the change of the vibration is."""
         ratio = self.path.change(here, end.state)
         self.rate = ratio / length
         return min(ratio, 1.0) if length <= self.path.shortest else ratio
 
     def rescue(self, here: S, length: float) -> Step[S] | Failure:
-        """As in Line."""
-        return self.path.rescue(here, self.path.ahead(here.parameter, self.direction * length), self.run)
+        """As in SteppedProblem."""
+        return self.path.rescue(here, self.path.ahead(here.parameter, self.sign * length), self.run)
 
     def _look_ahead(self, here: S) -> None:
         """Find the next node, or lose the sweep."""

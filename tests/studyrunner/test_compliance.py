@@ -11,7 +11,7 @@ import pytest
 
 from studyrunner.cli import main
 from studyrunner.coordinates import COORDINATES
-from studyrunner.variables import ASKED, KEPT, LOOPS, USUAL
+from studyrunner.variables import ASKED, LOOPS, OF_A_HISTORY, USUAL
 from tests.mpi.launching import options
 
 CHECK = """
@@ -98,7 +98,7 @@ def test_compliance_checker_passes(result):
 
 
 def test_the_header_reads_like_documentation(result):
-    known = {**ASKED, **KEPT, **LOOPS, **COORDINATES}
+    known = {**ASKED, **OF_A_HISTORY, **LOOPS, **COORDINATES}
     with netCDF4.Dataset(result) as file:
         assert {"loop_force", "mesh_quad", "natural_frequency", "message", "mode", "phase"} <= set(file.variables)
         assert all(variable.units and variable.coverage_content_type for variable in file.variables.values())

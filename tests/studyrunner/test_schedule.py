@@ -18,7 +18,7 @@ from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.mapped_file import UnseenFileError, open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
-from studyrunner.mpi.schedule import Office, serve_tasks
+from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, Standing
@@ -40,9 +40,9 @@ class Job:
 
 
 def serve(tasks, run, take=lambda *_: []):
-    office = Office()
-    office.begin, office.take = lambda: tasks, take
-    serve_tasks(Ranks(), office, lambda job, _: run(job))
+    handler = TaskHandler()
+    handler.begin, handler.take = lambda: tasks, take
+    serve_tasks(Ranks(), handler, lambda job, _: run(job))
 
 
 def test_long_tasks_go_first_and_results_make_new_ones():
@@ -147,16 +147,16 @@ def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path
 
 
 def test_a_task_is_sent_again_with_what_its_rank_does_not_see():
-    sent, office = [], Office()
-    office.begin, office.take = lambda: [Job("a", 1.0)], lambda *_: []
-    office.prepare = lambda _, job, **given: sent.append(given) or job
+    sent, handler = [], TaskHandler()
+    handler.begin, handler.take = lambda: [Job("a", 1.0)], lambda *_: []
+    handler.prepare = lambda _, job, **given: sent.append(given) or job
 
     def run(*_):
         if len(sent) == 1:
             raise UnseenFileError("file")
         yield 1
 
-    serve_tasks(Ranks(), office, run)
+    serve_tasks(Ranks(), handler, run)
     assert sent == [{}, {"unseen": True}]
 
 
