@@ -15,7 +15,7 @@ from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.mpi.mapped_file import open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
-from studyrunner.mpi.schedule import Office, serve_tasks
+from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, Standing
 from studyrunner.task_runs import TaskProgress
@@ -36,9 +36,9 @@ class Job:
 
 
 def serve(tasks, run, take=lambda *_: []):
-    office = Office()
-    office.begin, office.take = lambda: tasks, take
-    serve_tasks(Ranks(), office, lambda job, _: run(job))
+    handler = TaskHandler()
+    handler.begin, handler.take = lambda: tasks, take
+    serve_tasks(Ranks(), handler, lambda job, _: run(job))
 
 
 def test_long_tasks_go_first_and_results_make_new_ones():

@@ -95,6 +95,8 @@ def test_plan_is_printed(capsys):
     missions = printed_plan(["axes.wear_coefficient=[1e-14, 2e-14]"], capsys, "mission")
     assert missions["tasks"] == "2: 2 mission histories, each computed by one rank"
     assert printed_plan([], capsys, "modes")["tasks"].endswith("points")
+    # more steps than there are numbers
+    assert "years" in printed_plan(["axes.step=1e-320", "axes.scheme=explicit"], capsys)["time"]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from studyrunner.report.figures.wear import draw_excitation
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
-from studyrunner.variables import CERTIFICATE, KEPT, LOOPS, USUAL
+from studyrunner.variables import CERTIFICATE, LOOPS, OF_A_HISTORY, USUAL
 from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import UNWORN, compute
@@ -180,7 +180,7 @@ STUDY = (
     "slow_time.outputs=[0, 130, 1000, 4000]",
 )
 FEWER = ("axes.frequency=160", "axes.scheme=['explicit', 'adaptive']")
-COMPARED = [name for name in (*USUAL, *LOOPS, *KEPT) if name not in ("newton_iterations", "run_time")]
+COMPARED = [name for name in (*USUAL, *LOOPS, *OF_A_HISTORY) if name not in ("newton_iterations", "run_time")]
 
 
 def check_same(name, short, long):

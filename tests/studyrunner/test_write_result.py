@@ -25,7 +25,7 @@ from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
-from studyrunner.variables import ASKED, KEPT, LOOPS, USUAL
+from studyrunner.variables import ASKED, LOOPS, OF_A_HISTORY, USUAL
 from tests.mpi.launching import options
 from tests.studyrunner.fakes import FACTS, fake_completion, fake_history, plan_of, started, without_values
 from tests.studyrunner.results import build_dataset, write_dataset
@@ -248,7 +248,7 @@ def test_compliance_checker_passes(result):
 
 
 def test_the_header_reads_like_documentation(result):
-    known = {**ASKED, **KEPT, **LOOPS, **COORDINATES}
+    known = {**ASKED, **OF_A_HISTORY, **LOOPS, **COORDINATES}
     with netCDF4.Dataset(result) as file:
         assert {"loop_force", "mesh_quad", "natural_frequency", "message", "mode", "phase"} <= set(file.variables)
         assert all(variable.units and variable.coverage_content_type for variable in file.variables.values())
