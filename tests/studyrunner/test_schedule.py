@@ -180,12 +180,3 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
             assert progress.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
     assert progress.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
     assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
-
-
-def test_a_sweep_says_where_it_is():
-    """What a sweep sends on its way, by `Keep`, stands behind its name."""
-    progress = TaskProgress(MemoryIndex(tasks_of()))
-    (sweep, *_) = progress.begin()
-    progress.keep(sweep, "at 211.5 Hz, 3 of 48 pairs slip or open")
-    (running,) = progress.look([(sweep, sweep.n_results, 1.0)]).running
-    assert running.endswith("(at 211.5 Hz, 3 of 48 pairs slip or open)")
