@@ -21,7 +21,7 @@ from studies.scenes.half_space import composite_modulus
 from studies.scenes.sphere_on_flat import point_radius
 from tests.solver.models import OMEGA, branch_states, dovetail, first_point, march_wear, random_model, scene
 from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
-from tests.studyrunner.histories import history
+from tests.studyrunner.faked_runs import history
 
 # --- states ---
 

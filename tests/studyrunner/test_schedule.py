@@ -11,7 +11,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from studies import build_scene
 from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.mpi import dispatch
@@ -19,7 +18,6 @@ from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.mapped_file import UnseenFileError, open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import TaskHandler, serve_tasks
-from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, Standing
 from studyrunner.task_runs import TaskProgress
@@ -73,12 +71,6 @@ def test_results_arrive_while_their_task_goes_on():
     assert results == [1, 2]
 
 
-@pytest.mark.parametrize(("given", "said"), [(0, 1), (1, 2), (2, 1)])
-def test_another_number_of_results_than_said_is_a_bug(given, said):
-    with pytest.raises(ValueError, match=f"not {said} results"):
-        serve([Job("a", 1.0, n_results=said)], lambda _: range(given))
-
-
 @pytest.mark.parametrize(
     ("environment", "size", "rank"),
     [
@@ -123,12 +115,6 @@ def test_what_waits_is_bounded(monkeypatch):
 
 
 # --- arrays in a file that several processes map, and which ranks see it ---
-
-
-def test_a_scene_is_the_same_with_its_arrays_in_a_file(tmp_path):
-    model = build_scene("sdof_slider")
-    other = open_mapped(write_mapped(model, tmp_path / "model"))
-    assert describe_scene(other).digest == describe_scene(model).digest
 
 
 def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path):
