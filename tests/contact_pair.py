@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from tests.event_driven import (
+    ON_SWITCH,
     FloatArray,
     NoPeriodicMotionError,
     Orbit,
@@ -26,7 +27,6 @@ from tests.event_driven import (
 SLIDING = {"forward": 1.0, "backward": -1.0}
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _CELLS = 32  # of the grid for events, of which a piece of an integral takes at most so many
-_ON_SWITCH = 1e-11  # relative size of a guard that counts as zero where a phase starts
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ class ContactPair:
         for order in range(1, 5):
             derivatives.append(phase.flow @ derivatives[-1] * width / order)
         for guard in (np.array(derivatives) @ phase.guards.T).T:
-            nonzero = guard[np.abs(guard) > _ON_SWITCH * np.abs(guard).max()]
+            nonzero = guard[np.abs(guard) > ON_SWITCH * np.abs(guard).max()]
             if nonzero.size == 0 or nonzero[0] <= 0.0:
                 return False
         return True
@@ -241,7 +241,7 @@ class ContactPair:
             closed = None
         if closed is not None:
             return closed
-        return self._settle(name, y, transient=2, attempts=15)
+        return self._settle(name, y, transient=2, attempts=100)
 
     def orbit_from_rest(self, transient: int) -> Orbit:
         """Periodic motion from rest, after at least so many periods. Raises NoPeriodicMotionError."""

@@ -22,7 +22,7 @@ _TERMS = 24  # of the power series inside a cell, whose length is at most a quar
 _RESOLUTION = 0.25
 _MINIMUM_CELLS = 256  # in a period
 _CLOSED = 1e-12  # relative distance of the states one period apart in a periodic motion
-_ON_SWITCH = 1e-11  # relative size of a guard that counts as zero where a phase starts
+ON_SWITCH = 1e-9  # relative size of a guard that counts as zero where a phase starts; round-off: 1e-10
 
 
 class NoPeriodicMotionError(RuntimeError):
@@ -148,7 +148,7 @@ def _first_root(series: FloatArray, width: float, starts_on_switch: bool) -> flo
     velocity and the acceleration both start at zero.
     """
     sizes = np.abs(series) * width ** np.arange(len(series))
-    while starts_on_switch and sizes[0] <= _ON_SWITCH * sizes.max() and len(series) > _TERMS - 2:
+    while starts_on_switch and sizes[0] <= ON_SWITCH * sizes.max() and len(series) > _TERMS - 2:
         series, sizes = series[1:], sizes[1:]
     if starts_on_switch and series[0] <= 0:
         raise NoPeriodicMotionError("a phase ended as it began")
