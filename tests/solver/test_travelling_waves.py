@@ -11,7 +11,7 @@ from solver.harmonic_balance.state import State
 from solver.newton.run import Run
 from solver.structure.joint import build_case
 from tests.benchmarks.ring import FRICTION, WEAR, ring_in_time
-from tests.ring_of_masses import one_sector
+from tests.rings import one_sector
 from tests.solver.models import dovetail
 
 
