@@ -14,15 +14,14 @@ from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import HarmonicBalance, balance_at_start, functions_of
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import BalanceAt, State, largest_responses
+from solver.harmonic_balance.state import State, largest_responses
+from solver.loading_history.path import LoadingPath
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.presentation import NOT_IN_DATASETS, Presented, new_axes, unit_of
 from solver.settings import Direction, SolverSettings
 from solver.stability.floquet import Multipliers, Stability, find_multipliers
-from solver.structure.joint import Case
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +48,6 @@ class ResponseCurve(Presented):
     - multipliers: Floquet multipliers of each point, largest modulus first; the largest ones only of a large joint;
       none where unknown. Those of a small joint with impacts belong to a state with at least 19 harmonics.
     - multiplier_error (n_points,): estimated error of the first multiplier by time steps; inf where unknown.
-    - exponents: Hill's (Floquet) exponents of each point, 1/s.
     - outcome, message: CONVERGED where the curve comes to the last value; BRANCH_LOST where not, and how far.
     """
 
@@ -74,13 +72,6 @@ class ResponseCurve(Presented):
     def point(self) -> IntArray:
         """Numbers of the points (n_points,)."""
         return np.arange(self.frequency.size)
-
-    @property
-    def exponents(self) -> tuple[ComplexArray, ...]:
-        """Exponents of each point, 1/s: ln(multiplier) over the period; imaginary parts within half the frequency."""
-        pairs = zip(self.multipliers, self.frequency.tolist(), strict=True)
-        with np.errstate(divide="ignore"):
-            return tuple(np.log(values) * frequency for values, frequency in pairs)
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """As for other results, over the parameter that changes along the curve; solid where it is stable."""
@@ -136,20 +127,16 @@ def response_curve(
     load, friction = check_case(model, loads[0], friction_coefficient, sweep, settings)
     worn, omega = worn_model(model, wear_depth), float(omegas[0])
     start, case, balance, at = balance_at_start(worn, friction, load, omega / (2.0 * np.pi), sweep, settings)
-
-    def balance_at(value: float, history: FloatArray) -> Balance:
-        joint = case.joint(value, load) if over_frequency else case.joint(omega, value)
-        return Balance(joint, history, balance.wear_depth)
-
+    path = LoadingPath(case, load) if over_frequency else LoadingPath(case, 1.0, omega)
     if at is None or not start.outcome.complete:
         branch: _Branch = [], [], start.outcome, start.message
     else:
         # a branch may turn back behind its start before it comes to the last value
         back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
         span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
-        arc = Arc(balance_at, State(at, balance.history, float(first)), span, Run(settings.tolerance))
+        arc = Arc(path.balance_at, State(at, balance.history, float(first)), span, Run(settings.tolerance))
         branch = _follow_branch(arc, last, back, most, over_frequency)
-    return _reported(case, branch, balance_at, over_frequency, errors)
+    return _reported(path, branch, errors)
 
 
 def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency: bool) -> _Branch:
@@ -182,9 +169,9 @@ def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency
     return points, folds, Outcome.BRANCH_LOST, said.format(end_at)
 
 
-def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool) -> ResponseCurve:
+def _reported(path: LoadingPath, branch: _Branch, errors: bool) -> ResponseCurve:
     """The curve of a branch, each point with its error and multipliers."""
-    points, folds, outcome, message = branch
+    (points, folds, outcome, message), case = branch, path.case
     n_points = len(points)
     response = np.empty((n_points, len(case.model.response_names)), np.complex128)
     peak, error = np.empty(response.shape), np.full(n_points, np.nan)
@@ -192,7 +179,7 @@ def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency
     stability: list[Stability] = []
     balances: list[HarmonicBalance] = []
     for index, point in enumerate(points):
-        balance, at = balance_at(point.parameter, point.history), point.evaluation
+        balance, at = path.balance_at(point.parameter, point.history), point.evaluation
         joint, run = balance.joint, Run(case.settings.tolerance)
         response[index], peak[index] = first_response(joint, at), largest_responses(joint, at)
         if errors:
@@ -203,7 +190,7 @@ def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency
         stability.append(found[-1].stability(odd=not run.fresh().is_stable(balance, at)))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
     return ResponseCurve(
-        parameter="frequency" if over_frequency else "excitation_amplitude",
+        parameter="frequency" if path.omega is None else "excitation_amplitude",
         frequency=np.array([each.frequency for each in balances]),
         excitation_amplitude=np.array([each.excitation_amplitude for each in balances]),
         response=response,

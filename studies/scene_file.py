@@ -29,15 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
-from studies.hdf5 import (
-    Datasets,
-    as_whole,
-    find_datasets,
-    open_hdf5,
-    read_attribute,
-    read_dataset,
-    read_text_attribute,
-)
+from studies.hdf5 import Datasets, as_whole, find_datasets, open_hdf5, read_attribute, read_dataset, read_text_attribute
 from studies.model_check import PAIRS_ARE_ROWS, check_model, check_order, check_sector, is_grouped
 from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError

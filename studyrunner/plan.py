@@ -14,9 +14,8 @@ from studyrunner.kinds.modes import Mode
 from studyrunner.kinds.task import Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.answers import remarks_of_study
-from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import SceneFacts, values_of_point
-from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
+from studyrunner.scene.scene_set import SceneSet, contact_changes, merge_facts, plan_scenes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import MISSIONS, MODES, Study
 from studyrunner.system.progress import count, format_seconds

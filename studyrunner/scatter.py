@@ -146,7 +146,7 @@ class ScatterSection(Section):
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Scattered]
-    EXTRA: ClassVar = Scattered
+    EXTRA: ClassVar = (Scattered, "{normal = {std = 0.03}}")
 
     samples: Annotated[Whole, Field(ge=1, le=1_000_000)] = Field(
         description="number; with saltelli base samples, each of 2 + number of inputs"

@@ -1,7 +1,7 @@
 """The scenes of a run: built once, for all ranks.
 
-A single scene is built by rank 0. Several scenes are built by all ranks side by side, each scene once, and are kept in
-the file of the run. A task brings the model to a rank that does not have it: as a file that the ranks map
+A single scene is built by rank 0, several scenes by all ranks side by side, each scene once. They are kept in the file
+of the run. A task brings the model to a rank that does not have it: as a file that the ranks map
 (`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -18,7 +18,7 @@ from solver.packing import Packed, pack_model, unpack_model
 from studyrunner.checkpoint.store import Store
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.mpi.mapped_file import MappedFile, ranks_that_see, write_mapped
+from studyrunner.mpi.mapped_file import MappedFile, write_mapped
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
 from studyrunner.scene import answers
@@ -54,18 +54,19 @@ def hold_models(cache: ModelCache[Models], scenes: tuple[int, ...], models: Mode
 class SceneModels:
     """Rank 0: which rank has which models (`ModelCache`), and the files of models in use."""
 
-    def __init__(self, read: Callable[[int], ReducedModel], seeing: Collection[int], beside: Path) -> None:
-        """read: the model of a scene. seeing: ranks that see the files. beside: the file that they stand beside."""
+    def __init__(self, read: Callable[[int], ReducedModel], beside: Path) -> None:
+        """read: the model of a scene. beside: the file that the files of models stand beside."""
         self._read = read
-        self._seeing = seeing
         self._beside = beside
+        self._blind: set[int] = set()  # ranks that do not see the files
         self._of_ranks: dict[int, ModelCache[None]] = {}
         self._files: dict[int, MappedFile] = {}
 
-    def with_model(self, rank: int, task: Task) -> Task:
-        """The task as a rank gets it: with the models that the rank does not have."""
+    def with_model(self, rank: int, task: Task, *, unseen: bool = False) -> Task:
+        """The task as a rank gets it: with the models that it does not have. unseen: whether it does not see files."""
+        self._blind |= {rank} if unseen else set()
         own = self._of_ranks.setdefault(rank, OrderedDict())
-        is_there = task.scenes in own
+        is_there = task.scenes in own and not unseen
         hold_models(own, task.scenes, None)
         if is_there:
             return task
@@ -75,7 +76,7 @@ class SceneModels:
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
     def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
-        if rank not in self._seeing:
+        if rank in self._blind:
             return self._read(number)
         if number not in self._files:
             # a full disk costs memory: each rank gets the model itself
@@ -134,7 +135,6 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
     may take long. Raises UserError where a scene is wrong, or lacks what the study asks for.
     """
     scenes = find_scenes(study)
-    seeing = ranks_that_see(ranks, new_partial(store.path))
     building = _Building(scenes, store, say)
     with keys_as_given(keys_below_axes(study.scene_axes)):
         if len(scenes.studies) > 1:
@@ -150,7 +150,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
         facts = tuple(each.facts for each in built if each.facts is not None)
         variables, notes = answers.join_scene_variables(study, scenes, [each.variables for each in built])
         kept = answers.scene_to_keep(scenes.studies[0], building.read(0)) if len(built) == 1 else None
-    models = SceneModels(building.read, seeing, store.path)
+    models = SceneModels(building.read, store.path)
     return Scenes(at_ratios(scenes, facts), facts, (*variables, *answers.exact_answers(study)), kept, notes, models)
 
 

@@ -57,7 +57,7 @@ def evaluator() -> Run:
         if isinstance(task, SceneTask):
             yield from build_scene_task(task, keep)
             return
-        left, last, is_limited = dict.fromkeys(task.places), task.resume, False
+        own, left, last, is_limited = own_models(task), dict.fromkeys(task.places), task.resume, False
 
         def keep_last(progress: Packed | str) -> None:
             nonlocal last
@@ -65,7 +65,7 @@ def evaluator() -> Run:
             keep(progress)
 
         try:
-            for result in compute_task(replace(task, models=()), own_models(task), keep_last):
+            for result in compute_task(replace(task, models=()), own, keep_last):
                 if isinstance(result, PointResult):
                     outcome, message = result.values["outcome"], result.values["message"]
                     if outcome == Outcome.EXCEPTION and tells_of_machine(message):
@@ -189,10 +189,10 @@ class StudyRun(TaskProgress):
         self._store, self._models, self._display = completion.store, models, display
         self._n_compiled: int | None = n_compiled()
 
-    def prepare(self, rank: int, task: Task) -> Task:
+    def prepare(self, rank: int, task: Task, *, unseen: bool = False) -> Task:
         """The task with the models that the rank does not have."""
         self._store.note_begin(task.key)
-        return self._models.with_model(rank, task)
+        return self._models.with_model(rank, task, unseen=unseen)
 
     def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
         """Writes and shows what is due."""

@@ -9,6 +9,7 @@ import errno
 import json
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import date, time
 from pathlib import Path
 
@@ -23,6 +24,7 @@ _REMEDIES = {
 }
 
 
+@dataclass(eq=False, repr=False)
 class UserError(Exception):
     """Bad input: ends a run with exit status 2 and one line for each mistake, before anything is computed.
 
@@ -30,13 +32,11 @@ class UserError(Exception):
     stands there, None where nothing does. remedy: one clause that says what would be right. others: further mistakes.
     """
 
-    def __init__(self, place: str, key: str, value: object, remedy: str, others: tuple[UserError, ...] = ()) -> None:
-        super().__init__(place, key, value, remedy, others)
-        self.place = place
-        self.key = key
-        self.value = value
-        self.remedy = remedy
-        self.others = others
+    place: str
+    key: str
+    value: object
+    remedy: str
+    others: tuple[UserError, ...] = ()
 
     @property
     def mistakes(self) -> tuple[UserError, ...]:

@@ -33,13 +33,14 @@ class Wrong(NamedTuple):
 class Section(BaseModel):
     """A table of the study file: frozen, unknown keys are errors, numbers are finite.
 
-    AXES: keys that may also stand under [axes]. EXTRA: class of the values of keys that are names of something.
+    AXES: keys that may also stand under [axes]. EXTRA: class of the values of keys that are names of something, and how
+    one looks.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     AXES: ClassVar[tuple[str, ...]] = ()
-    EXTRA: ClassVar[type[BaseModel] | None] = None
+    EXTRA: ClassVar[tuple[type[BaseModel], str] | None] = None
 
     def rules(self) -> Iterator[Wrong]:
         """What breaks a rule between the keys of the table, whose values are all right by themselves."""

@@ -18,10 +18,10 @@ from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import Joint, build_case
-from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, mean_motion
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene
 from studies.finite_element.solid_mesh import Material
+from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, mean_motion
 from studies.finite_element.surfaces import surface_of_faces
 from tests.random_scenes import log_uniform
 from tests.studies.fe_models.sectors import faces_where

@@ -167,9 +167,8 @@ class _Search:
     def _samples_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing samples, and the state with more samples that gave it.
 
-        The error depends on the position of an event (slip, stick, lift) between two of the N samples. With 2 N samples
-        an event may stay next to the same one, and both states have one error. So the other state has 3 N + 2 samples,
-        which share only the phases 0 and pi with the N. Many unknowns mean many events: then 2 N samples suffice.
+        With 2 N samples an event (slip, stick, lift) may stay next to the same one, and both states have one error. So
+        the other state has 3 N + 2 samples. Many unknowns mean many events: then 2 N samples suffice.
         """
         orders, samples = here.case.resolution.orders, here.case.resolution.samples
         few = here.unknowns(here.case.resolution) <= EXPENSIVE_UNKNOWNS

@@ -52,10 +52,8 @@ def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
 @packable
 @dataclass(frozen=True)
 class Estimate:
-    """Estimated relative errors of a state.
+    """Estimated relative errors of a state: of the first harmonic of the response, and of the total wear rate.
 
-    response: of the first harmonic of the response.
-    wear_rate: of the total wear rate.
     weight: factor on `wear_rate` in `largest`; less than 1 where almost nothing wears.
     """
 

@@ -23,8 +23,8 @@ FIRST_ARC = SMOOTH_CHANGE / 10.0
 `SMOOTH_CHANGE`."""
 
 CORNER_ARC = 1e-3
-"""Length of the step behind a corner, and least length after a step. Without such a least length seven branches with
-folds take 46 % more iterations."""
+"""Length of the step behind a corner, and least length after a step: without it seven branches with folds take 46 %
+more iterations."""
 
 SHORTEST_ARC = CORNER_ARC / 10.0
 """Shortest step: where none of this length converges, the branch has a corner."""
@@ -107,10 +107,8 @@ class Arc:
         return None if found is None else State(found.at, self.start.history, float(found.values[0] * self.span))
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
-        """State behind a corner of the branch, where a contact sample changes its status; None where none is found.
-
-        The plane across the old tangent may not meet the branch behind. So the tangent is taken a little ahead of the
-        state, and both of its signs are tried.
+        """State behind a corner, where a contact sample changes its status; None where none is found. The plane across
+        the old tangent may not meet the branch behind: the tangent a little ahead is taken, with both signs.
         """
         base = self.place(state)
         ahead = base + CORNER_ARC * tangent

@@ -49,8 +49,8 @@ def solve_first_state(
     """First periodic state. These ways are tried in turn until one leads to a stable state:
 
     1. The excitation is raised from zero.
-    2. The excitation is raised from a state with smaller static friction forces. Pairs that the static load leaves at
-       their friction limit slip under the smallest vibration, in states far from the static one, and shake down.
+    2. The excitation is raised from smaller static friction forces: pairs that the static load leaves at their friction
+       limit slip under the smallest vibration, in states far from the static one, and shake down.
     3. The vibration builds up in time under the whole excitation (`transient`).
 
     omega, excitation_amplitude: rad/s, N. wear_depth (n_contact,): m.
@@ -73,7 +73,7 @@ def solve_first_state(
         if arrived and run.is_stable(balance_at(1.0, raised.evaluation.history), raised.evaluation):
             return raised
         unstable |= arrived
-    settled = relax_to_periodic(case, case.joint(omega, excitation_amplitude), wear_depth, rest, quiet, run)
+    settled = relax_to_periodic(case.joint(omega, excitation_amplitude), wear_depth, rest, quiet, run)
     return Failure(Outcome.UNSTABLE) if unstable and isinstance(settled, Failure) else settled
 
 

@@ -2,14 +2,9 @@
 
 With the first harmonics x of all displacements and F of the excitation, `F^H x = |F^H x| exp(-i lag)`. The lag rises
 from 0 below a resonance to pi above; the excitation does most work in phase resonance, at the lag pi/2. The frequency
-is the further unknown of a bordered balance (`solver.newton.run`), in an implicit step with the wear depth that
-grows with the motion, and the further equation is
-
-    sin(arg(F^H x) + lag) = 0.
-
-At the largest amplitude of the first response, in its first harmonic, the rise of the amplitude with the lag is zero; a
-secant finds this lag. For a linear oscillator of one degree of freedom with the damping ratio zeta the frequency is
-then omega_0 sqrt(1 - 2 zeta^2), in phase resonance omega_0.
+is the further unknown of a bordered balance, and `sin(arg(F^H x) + lag) = 0` the further equation. At the largest
+amplitude of the first response, in its first harmonic, the rise of the amplitude with the lag is zero; a secant finds
+this lag.
 """
 
 from __future__ import annotations
@@ -35,8 +30,8 @@ LARGEST_FREQUENCY_CHANGE = 0.02
 
 PEAK_RISE = 2.0
 """Largest rise of the logarithm of the response with the phase lag, 1/rad, over rtol, at which an amplitude counts as
-the largest one: its frequency is then within 2 rtol of half the width of the resonance. The states of single samples
-change with the frequency, so that the rise is rough: by 0.005 for the dovetail with rtol 0.01."""
+the largest one: its frequency is then within 2 rtol of half the width of the resonance. The rise is rough, as single
+samples change their state with the frequency: by 0.005 for the dovetail with rtol 0.01."""
 
 LARGEST_LAG_STEP = 0.2
 """Largest change of the phase lag between two solves, rad."""

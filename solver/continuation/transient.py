@@ -30,7 +30,7 @@ from solver.settings import ROUND_OFF
 from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
-from solver.structure.joint import Case, Joint
+from solver.structure.joint import Joint
 
 TRANSIENT_CUT = 0.35
 """Factor of the length of a refused step. Half the value takes 2.5 times the iterations of a jump at a fold."""
@@ -64,16 +64,16 @@ class _LoadedStructure(CondensedStructure):
 
 
 class Transient:
-    """Matrices and loads of a case at the frequency and excitation of a joint, for steps in time."""
+    """Matrices and loads of a joint for steps in time."""
 
-    def __init__(self, case: Case, joint: Joint) -> None:
+    def __init__(self, joint: Joint) -> None:
         self.joint = joint
-        self.relative, _ = relative_indices(case.model.contact)
+        self.relative, _ = relative_indices(joint.contact)
         orders = (0, *joint.basis.orders)
         self.rates = 1j * joint.omega * np.array(orders)
         self.parts: list[tuple[LinearModel, Matrix]] = []
         for order in orders:
-            linear = case.model.harmonic_structure(order)
+            linear = joint.model.harmonic_structure(order)
             loads: dict[int, Matrix] = {0: linear.load_static, 1: joint.excitation_amplitude * linear.load_harmonic}
             self.parts.append((linear, loads.get(order, np.zeros(linear.load_static.size))))
 
@@ -120,19 +120,19 @@ class Transient:
 
 
 def relax_to_periodic(
-    case: Case, joint: Joint, wear_depth: FloatArray, start: State, start_joint: Joint, run: Run
+    joint: Joint, wear_depth: FloatArray, start: State, start_joint: Joint, run: Run
 ) -> State | Failure:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
-    case: model and settings of both joints, which have equal pairs and harmonics; frequency and load may differ.
+    start_joint: differs from the joint in frequency and load alone.
     wear_depth (n_contact,): m, constant. A start without excitation leads to the state that builds up from rest.
     Returns the state, or ADRIFT (the mean positions run away: only friction holds the parts), UNSTABLE (the motion does
     not leave an unstable periodic state) or UNSETTLED (it does not settle within `SEARCH_ITERATIONS`).
     """
     budget = run.budget
     budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
-    transient = Transient(case, joint)
-    begun, history = Transient(case, start_joint).periodic(start.evaluation).displacement, start.history
+    transient = Transient(joint)
+    begun, history = Transient(start_joint).periodic(start.evaluation).displacement, start.history
     # amplitudes of a periodic motion that are constant at the frequency of this joint
     motion = Motion(begun, transient.rates[:, None] * begun)
     predicted, period = start.evaluation.predicted_h, 2.0 * np.pi / joint.omega

@@ -214,7 +214,7 @@ class LoadingPath(Path[State]):
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
             joints = self.joint_at(beyond), self.joint_of(end)
-            settled = relax_to_periodic(self.case, joints[0], balance.wear_depth, end, joints[1], run)
+            settled = relax_to_periodic(joints[0], balance.wear_depth, end, joints[1], run)
             if isinstance(settled, Failure):
                 return settled
             # a fold with a smaller change is a corner of the branch

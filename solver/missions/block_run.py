@@ -235,11 +235,11 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
     way = case.block.way
     line = case.line(case.mission.first if way == "continue" else way)
     _, start = next(follow_line(line, np.array([case.block.ends[0]])))
-    nodes = line.nodes
-    if start.state is None or nodes is None or way == "continue":
+    present = line.present
+    if start.state is None or present is None or way == "continue":
         return start, None
-    passed = tuple(nodes.passed) if nodes.here is not None and start.branch == 0 else ()
-    return start, Begun(passed, start, nodes.path.case.resolution)
+    passed = tuple(present.passed) if present.here is not None and start.branch == 0 else ()
+    return start, Begun(passed, start, present.path.case.resolution)
 
 
 def _by_earlier_sweep(case: BlockCase, begun: Begun) -> StartState | None:

@@ -32,7 +32,6 @@ from solver.wear.slow_time import (
     Integrator,
     Node,
     Solution,
-    Solutions,
 )
 
 STEP_ERROR_FRACTION = 0.5
@@ -174,20 +173,19 @@ def integrate_missions(
     """
     integrator = Integrator(mission.settings.time_limit, keep, resume)
     fine = integrator.integrate(MissionProblem(mission))
-    solutions = Solutions(fine, fine)
     if fine.state is not None and fine.failure.outcome not in ENDS_ALL:
-        solutions = Solutions(fine, fine, integrator.integrate(MissionProblem(mission, fine), fine.seconds))
-    other = unworn_course(mission) if solutions.reference is None else solutions.reference.course
-    history = _assembled(mission, solutions, other)
+        fine = replace(fine, compared=integrator.integrate(MissionProblem(mission, fine), fine.seconds))
+    history = _assembled(mission, fine)
     if history.outcome is not Outcome.CONVERGED:
         return history
-    failure = _judged(mission, solutions, history)
+    failure = _judged(mission, fine.state, history)
     return replace(history, outcome=failure.outcome, message=failure.message)
 
 
-def _assembled(mission: MissionRequest, solutions: Solutions, reference: Course) -> MissionHistory:
+def _assembled(mission: MissionRequest, fine: Solution) -> MissionHistory:
     """The result, from both solutions."""
-    course, state, failure = solutions.own.course, solutions.own.state, solutions.failure
+    course, state = fine.course, fine.state
+    reference = unworn_course(mission) if fine.compared is None else fine.compared.course
     counts, area, n_block = np.array(mission.missions, np.float64), mission.area, len(mission.blocks)
     values, target = course.read(counts), course.reached
     growth = values["wear_depth"].reshape(counts.size, n_block, -1)
@@ -202,8 +200,8 @@ def _assembled(mission: MissionRequest, solutions: Solutions, reference: Course)
         response_peak_end=values["response_peak"][:, :, 1],
         response_error=np.array([each.response for each in blocks]).T,
         excitation_frequency=np.array([block.ends for block in mission.blocks]),
-        outcome=failure.outcome,
-        message=failure.message,
+        outcome=fine.ended.outcome,
+        message=fine.ended.message,
         missions=counts,
         worn_volume=depth @ area,
         worn_volume_error=whole.worn_volume,
@@ -218,8 +216,8 @@ def _assembled(mission: MissionRequest, solutions: Solutions, reference: Course)
         steps=np.diff(course.ends),
         missions_to_target=target,
         missions_to_target_error=_target_error(mission, target, course, reference),
-        newton_iterations=sum(each.iterations for each in solutions.all),
-        run_time=sum(each.seconds for each in solutions.all),
+        newton_iterations=sum(each.iterations for each in fine.all),
+        run_time=sum(each.seconds for each in fine.all),
     )
 
 
@@ -271,19 +269,19 @@ def _target_error(mission: MissionRequest, at: float, fine: Course, reference: C
     return error_of_target(mission.until, at, of_other, values, last_rate, whole, mission.area)
 
 
-def _judged(mission: MissionRequest, solutions: Solutions, history: MissionHistory) -> Failure:
+def _judged(mission: MissionRequest, state: MissionState, history: MissionHistory) -> Failure:
     """The outcome of a complete history, and its sentence."""
-    rtol, state = mission.settings.rtol, solutions.own.state
+    rtol = mission.settings.rtol
     if state.cut_off_from < math.inf:
         return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(state.cut_off_from, "mission"))
-    outcome, said, worst = Outcome.CONVERGED, [], int(np.argmax(state.inaccurate))
+    outcome, said, inaccurate = Outcome.CONVERGED, [], np.asarray(state.inaccurate)
     if history.error_estimate > SENSITIVE_ERROR:
         outcome, last = Outcome.SENSITIVE, np.flatnonzero(np.isfinite(history.worn_volume))[-1]
         volumes = history.worn_volume[last], history.reference_volume[last]
         said.append(describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps"))
-    elif state.inaccurate[worst] > 0.0:
-        outcome = Outcome.INACCURATE
-        said.append(f"in {mission.called(worst)} the vibration {known_to(float(state.inaccurate[worst]), rtol)}")
+    elif inaccurate.any():
+        outcome, name = Outcome.INACCURATE, mission.called(int(inaccurate.argmax()))
+        said.append(f"in {name} the vibration {known_to(float(inaccurate.max()), rtol)}")
     if state.held_from < math.inf:
         said.append(
             f"from mission {state.held_from:.0f} on only friction holds the joint in one direction: it is held there"

@@ -234,7 +234,7 @@ def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Fa
             return Failure(Outcome.TIME_LIMIT)
         setup, begun = case.begin(start)
         joint, frequency = setup.joint_of(begun), float(frequencies[index])
-        density = setup.rate(begun.at) * frequency / case.passage.rate
+        density = begun.rate * frequency / case.passage.rate
         response = to_complex(joint.structure.response_h(joint.to_relative(begun.at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, begun.at)))
     return found

@@ -123,8 +123,7 @@ class NonlinearMode(Path[ModeState]):
     def solve(self, states: tuple[ModeState, ...], target: float, run: Run) -> ModeState | None:
         """As in Path: Newton's method starts on the line through both states, or from the last one in proportion.
 
-        Nodes, too, are solved to the tolerance of results. Otherwise the dovetail, raised to 1.47e-3 m sqrt(kg),
-        comes to another branch, on which no state is found at smaller amplitudes.
+        Nodes, too, are solved to the tolerance of results: otherwise the dovetail comes to another branch.
         """
         here, run = states[-1], run.with_tolerance(self.case.settings.tolerance)
         history, last = history_at_rest(self.joint_of(here), here), here.evaluation.predicted_h
@@ -235,10 +234,8 @@ class Rest:
         return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
 
     def raised(self, amplitude: float, run: Run) -> ModeState | None:
-        """The mode at a small amplitude, m sqrt(kg), from rest; None where it is not found.
-
-        Pairs that the static load leaves at their friction limit slip under the smallest vibration: further attempts
-        begin with smaller static friction forces.
+        """The mode at a small amplitude, m sqrt(kg), from rest, or from smaller static friction forces, as in
+        `solve_first_state`; None where it is not found.
         """
         linear = self.mode.linear
         joint = self.mode.case.joint(linear.omega, amplitude)

@@ -101,8 +101,7 @@ class _Way:
     """The sweeps to the points: one with rising amplitude, and one with falling amplitude from the present `top`.
 
     - asked: model, friction coefficient, number of the mode, settings.
-    - to_rest, spent: Newton iterations to the rest, and of the way to the last point. Each part of the way goes on with
-      the count of the part before; ways to other points are left out.
+    - to_rest, spent: Newton iterations to the rest, and of the way to the last point without those to other points.
     """
 
     asked: tuple[ReducedModel, float | FloatArray | None, int, SolverSettings]
@@ -197,13 +196,9 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     settings = mode.case.settings
     # half of rtol is left for the error by the steps of the sweep
     case = replace(mode.case_of(found.values), settings=replace(settings, rtol=0.5 * settings.rtol))
-    refined = refine(case, mode.joint_of(found), found, run)
-    accurate = refined.accurate
-    if refined.case.resolution != mode.case.resolution:
-        other = mode.at(refined.case.resolution)
-        moved = mode.move(found, other, run)
-        accurate &= moved is not None
-        mode, found = (mode, found) if moved is None else (other, moved)
+    other = mode.at(refine(case, mode.joint_of(found), found, run).case.resolution)
+    moved = None if other.case is mode.case else mode.move(found, other, run)
+    mode, found = (mode, found) if moved is None else (other, moved)
     joint, at, resolution = mode.joint_of(found), found.evaluation, mode.case.resolution
     certificate = certify(joint, at)
     if not certificate.holds(settings.tolerance):
@@ -217,7 +212,7 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     known = {"natural frequency": float(errors[0]) / found.omega, "damping ratio": float(errors[1]) / damping}
     said = [f"the {name} {known_to(error, settings.rtol)}" for name, error in known.items() if error > settings.rtol]
     return ModePoint(
-        outcome=Outcome.INACCURATE if said or not accurate else Outcome.CONVERGED,
+        outcome=Outcome.INACCURATE if said else Outcome.CONVERGED,
         message="; ".join(said),
         frequency=found.omega / (2.0 * np.pi),
         damping_ratio=found.damping_ratio,

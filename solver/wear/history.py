@@ -20,7 +20,7 @@ from solver.results.state_report import LOOP_PHASES
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
 from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest, reference_of
-from solver.wear.slow_time import ENDS_ALL, Course, Guide, Integrator, Node, Solution, Solutions
+from solver.wear.slow_time import ENDS_ALL, Course, Guide, Integrator, Node, Solution
 from solver.wear.wearing_joint import WearState
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
@@ -48,11 +48,10 @@ def integrate_together(
         case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     for each in asked:
         if case is None:
-            nothing = Solution(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)))
-            solutions = Solutions(nothing, nothing)
+            own = Solution(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)))
         else:
-            solutions = _solve(integrator, case, start, each)
-        history = _assembled(model, start, each, solutions)
+            own = _solve(integrator, case, start, each)
+        history = _assembled(model, start, each, own)
         # the counts that were reached
         rows = np.flatnonzero(np.isfinite(history.worn_volume))
         history = replace(history, error_estimate=last_error(history, rows, history.last_cycle))
@@ -74,33 +73,25 @@ def unknown_course(model: ReducedModel, n_loops: int) -> Course:
     return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
 
 
-def _solve(integrator: Integrator, case: Case, start: StartState, asked: WearRequest) -> Solutions:
-    """A history and what it is compared with; without a step the errors of the start state suffice."""
-
-    def is_compared(ended: Solution) -> bool:
-        steps = len(ended.course.ends) > 1 or asked.follow is not None
-        return ended.state is not None and steps and ended.failure.outcome not in ENDS_ALL
-
-    own = integrator.integrate(WearProblem(case, start, asked, stable_end=True))
+def _solve(integrator: Integrator, case: Case, start: StartState, asked: WearRequest, spent: float = 0.0) -> Solution:
+    """A history with what it is compared with; without a step the errors of the start state suffice."""
+    own = integrator.integrate(WearProblem(case, start, asked, stable_end=True), spent)
     if own.state is None:
-        own = replace(own, course=unknown_course(case.model, len(asked.loops)))
-    if not is_compared(own):
-        return Solutions(own, own)
-    adaptive, spent = own, own.seconds
+        return replace(own, course=unknown_course(case.model, len(asked.loops)))
+    if (len(own.course.ends) == 1 and asked.follow is None) or own.failure.outcome in ENDS_ALL:
+        return own
+    spent += own.seconds
     if isinstance(asked.steps, Given):
         # one for all given steps to one last count; to another end no longer than needed
         known = not isinstance(asked.cycles, ToTheEnd) and asked.until is None
         cycles = _counts(asked, own) if known else np.array([0.0, min(own.course.ends[-1], asked.end)])
-        asked = asked.compared(Adaptive(case.settings.rtol), cycles)
-        adaptive = integrator.integrate(WearProblem(case, start, asked, stable_end=True), spent)
-        spent += adaptive.seconds
-    if not is_compared(adaptive):
-        return Solutions(own, adaptive)
-    guide = Guide(adaptive.state.resolutions, adaptive.state.first_length)
+        adaptive = asked.compared(Adaptive(case.settings.rtol), cycles)
+        return replace(own, compared=_solve(integrator, case, start, adaptive, spent))
+    guide = Guide(own.state.resolutions, own.state.first_length)
     # NaN where no target was reached
-    compared = np.concatenate([[0.0, adaptive.course.reached], _counts(asked, adaptive), adaptive.course.counts])
-    compared = np.unique(compared[compared <= min(adaptive.course.ends[-1], asked.end)])
-    return Solutions(own, adaptive, integrator.integrate(reference_of(case, start, asked, guide, compared), spent))
+    counts = np.concatenate([[0.0, own.course.reached], _counts(asked, own), own.course.counts])
+    counts = np.unique(counts[counts <= min(own.course.ends[-1], asked.end)])
+    return replace(own, compared=integrator.integrate(reference_of(case, start, asked, guide, counts), spent))
 
 
 def _counts(asked: WearRequest, own: Solution) -> FloatArray:
@@ -131,41 +122,39 @@ def compare(
     return both, history_error(both, steps, area)
 
 
-def _compare_own(solutions: Solutions, counts: FloatArray, *, follows: bool) -> tuple[Compared, HistoryError]:
-    """A history of any steps beside what it is compared with at ascending counts, and its errors there."""
-    own, reference = solutions.own.course, solutions.reference
-    adaptive = own if solutions.adaptive.state is None else solutions.adaptive.course
-    both, error = compare(counts, adaptive, None if reference is None else reference.course, own.area, follows=follows)
-    if adaptive is own:
-        return both, error
-    both = Compared(counts, own.read(counts), adaptive.read(counts), follows)
-    return both, error_of_given_steps(both, error, own.area)
+def _compare_own(own: Solution, counts: FloatArray, *, given: bool, follows: bool) -> tuple[Compared, HistoryError]:
+    """A history, of given steps or adaptive, beside what it is compared with at ascending counts, and its errors."""
+    area, other = own.course.area, own.compared
+    if given and other is not None and other.state is not None:
+        _, error = _compare_own(other, counts, given=False, follows=follows)
+        both = Compared(counts, own.course.read(counts), other.course.read(counts), follows)
+        return both, error_of_given_steps(both, error, area)
+    return compare(counts, own.course, None if given or other is None else other.course, area, follows=follows)
 
 
-def _assembled(model: ReducedModel, start: StartState, asked: WearRequest, solutions: Solutions) -> WearHistory:
+def _assembled(model: ReducedModel, start: StartState, asked: WearRequest, own: Solution) -> WearHistory:
     """The result, not judged yet."""
-    own, area, counts = solutions.own, model.contact.area, _counts(asked, solutions.own)
-    failure = solutions.failure
-    both, error = _compare_own(solutions, counts, follows=asked.follow is not None)
+    area, counts = model.contact.area, _counts(asked, own)
+    both, error = _compare_own(own, counts, given=isinstance(asked.steps, Given), follows=asked.follow is not None)
     found, target = both.fine, own.course.reached
     ends_at_target = target <= asked.end
     return WearHistory(
         **{name: value for name, value in found.items() if name in _REPORTED}
         | {f"{name}_error": values for name, values in vars(error).items()}
         | ({} if own.state is None else _of_state(own.state, asked.end)),
-        outcome=failure.outcome,
-        message=failure.message,
+        outcome=own.ended.outcome,
+        message=own.ended.message,
         cycles=counts,
         worn_volume=found["wear_depth"] @ area,
         reference_volume=both.other("wear_depth") @ area,
         error_estimate=math.nan,
-        newton_iterations=start.newton_iterations + sum(each.iterations for each in solutions.all),
-        run_time=start.run_time + sum(each.seconds for each in solutions.all),
+        newton_iterations=start.newton_iterations + sum(each.iterations for each in own.all),
+        run_time=start.run_time + sum(each.seconds for each in own.all),
         last_cycle=math.nan if own.state is None else min(own.course.ends[-1], float(counts[-1])),
         branch=start.branch,
         fold_frequency=start.fold_frequency,
         cycles_to_target=target if ends_at_target else math.nan,
-        cycles_to_target_error=_target_error(solutions, asked) if ends_at_target else math.nan,
+        cycles_to_target_error=_target_error(own, asked) if ends_at_target else math.nan,
         cut_off_cycle=first_cut_off(model.contact, counts, found["mean_pressure"], found["wear_depth"]),
     )
 
@@ -183,13 +172,13 @@ def _of_state(state: WearState, end: float) -> dict[str, Any]:
     }
 
 
-def _target_error(solutions: Solutions, asked: WearRequest) -> float:
+def _target_error(own: Solution, asked: WearRequest) -> float:
     """Estimated error, cycles, of the count at which a history has reached its target."""
-    course, until = solutions.own.course, asked.until
-    other = solutions.reference if solutions.adaptive is solutions.own else solutions.adaptive
-    if other is None or until is None:
+    course, until = own.course, asked.until
+    if own.compared is None or until is None:
         return math.inf
     at, by_interpolation = course.reach(until)
-    both, error = _compare_own(solutions, np.array([0.0, at]), follows=asked.follow is not None)
-    of_other = other.course.reach(until)[0]
+    given, follows = isinstance(asked.steps, Given), asked.follow is not None
+    both, error = _compare_own(own, np.array([0.0, at]), given=given, follows=follows)
+    of_other = own.compared.course.reach(until)[0]
     return error_of_target(until, at, of_other, both.fine, course.nodes[-1].rate, error, course.area) + by_interpolation

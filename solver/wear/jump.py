@@ -16,10 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from solver.contact.coulomb import STICK
-from solver.continuation.natural import follow_naturally
 from solver.continuation.transient import SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import Failure, State, vibration_change
+from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.history import HELD_FORCE
@@ -49,17 +48,15 @@ def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bo
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    joint = replace(case, hold=hold).joint(state.omega, setup.excitation_amplitude)
-
-    def balance_at(fraction: float, _: FloatArray) -> Balance:
-        return Balance(joint, state.point.history, state.depth + fraction * (worn - state.depth))
-
-    found, arrived = follow_naturally(balance_at, replace(state.point, parameter=0.0), 1.0, setup.run)
-    there = found.evaluation
-    stable = arrived and setup.run.is_stable(Balance(joint, there.history, there.wear_depth), there)
-    if not stable or creeps(joint, hold, there) or vibration_change(state.at, there) > OTHER_BRANCH:
+    balance = Balance(
+        replace(case, hold=hold).joint(state.omega, setup.excitation_amplitude), state.point.history, worn
+    )
+    found = setup.run.state(balance, state.at.predicted_h)
+    if found is None or not setup.run.is_stable(balance, found.evaluation):
         return None
-    return replace(state, point=State(there, found.history), hold=hold, held_from=state.cycle)
+    if creeps(joint, hold, found.evaluation) or vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
+        return None
+    return replace(state, point=found, hold=hold, held_from=state.cycle)
 
 
 def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
@@ -68,8 +65,8 @@ def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) 
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    case, joint = setup.case_and_joint(state)
-    found = relax_to_periodic(case, joint, worn, state.point, joint, setup.run)
+    joint = setup.joint_of(state)
+    found = relax_to_periodic(joint, worn, state.point, joint, setup.run)
     if isinstance(found, Failure):
         return found if found.outcome is Outcome.ADRIFT else Failure(Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners

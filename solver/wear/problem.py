@@ -190,7 +190,7 @@ class WearProblem:
             after = replace(after, resolutions=(*after.resolutions, (after.cycle, after.resolution)))
         # local: sum of the local errors of the steps so far, m3
         values = report | {"local": after.error + local}
-        return after, course.after(Node(after.cycle, after.depth, setup.rate(after.at), values))
+        return after, course.after(Node(after.cycle, after.depth, after.rate, values))
 
     def _ended(self, state: WearState, course: Course) -> Failure | None:
         """Why the history ends at a state; None to go on."""
@@ -199,7 +199,7 @@ class WearProblem:
         if still or not math.isnan(course.reached) or course.ends[-1] >= end * (1.0 - 1e-12):
             found = AS_ASKED
         elif isinstance(cycles, ToTheEnd):
-            found = end_of_wear(self.setup, state, course, cycles.final_share)
+            found = end_of_wear(state, course, cycles.final_share)
         most = HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
         if found is None and state.wears and self.budget.iterations > most:
             found = Failure(Outcome.MARCH_FAILED)
@@ -214,7 +214,7 @@ class WearProblem:
             length = steps.first
         elif state.wears:
             state = replace(state, step_limit=explicit_step_limit(self.setup, state))
-            moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), self.setup.rate(state.at).max()
+            moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), state.rate.max()
             # the step limit is no bound where almost nothing slips
             length = min(FIRST_STEP * state.step_limit, float(FIRST_DEPTH * moved / fastest), 0.5 * self.limit)
         return replace(state, length=length, first_length=length)
@@ -225,7 +225,7 @@ class WearProblem:
         if isinstance(steps, Given):
             length = steps.length
             if steps.depth is not None:
-                length = steps.depth / float(self.setup.rate(state.at).max())
+                length = steps.depth / float(state.rate.max())
             elif self.limit == math.inf:
                 length *= float(state.largest_rates[-1] / state.rates[-1])
             else:
@@ -275,7 +275,7 @@ class WearProblem:
             found = self._euler_step(state, length, "implicit") or self._step_across(state, length)
             if found is not None:
                 return found
-        worn = state.depth + length * setup.rate(state.at)
+        worn = state.depth + length * state.rate
         if (failure := too_long(setup, state, worn, length)) is not None:
             return failure
         beyond = jump(setup, state, worn, state.cycle + length)

@@ -213,7 +213,7 @@ class Course:
 
 
 class SlowProblem(Protocol):
-    """What is integrated. The next step depends on the state alone; a state is frozen and packable.
+    """What is integrated. The next step depends on state and course alone; both are frozen and packable.
 
     name: tells apart histories that belong together. course: before the first step. budget: Newton iterations so far,
     and the deadline. iterations_per_save: iterations after which the progress is saved.
@@ -249,7 +249,9 @@ class Guide:
 class Solution:
     """What an integration has found at its end, or when it is saved, with Newton iterations and CPU seconds.
 
-    state: the last one; None where there is no first state. failure: reason of the end.
+    state: the last one; None where there is no first state. failure: reason of its end.
+    compared: the solution whose difference is the error: of a history with given steps the adaptive one, of an adaptive
+        one its reference solution; None where there is none.
     """
 
     state: Any
@@ -257,29 +259,17 @@ class Solution:
     course: Course
     iterations: int = 0
     seconds: float = 0.0
-
-
-@dataclass(frozen=True)
-class Solutions:
-    """A history, the adaptive history with which one with given steps is compared, and its reference solution.
-
-    adaptive: the history itself where its steps are adaptive. reference: None where there is none.
-    """
-
-    own: Solution
-    adaptive: Solution
-    reference: Solution | None = None
+    compared: Solution | None = None
 
     @property
     def all(self) -> tuple[Solution, ...]:
-        """Each of them once."""
-        adaptive = () if self.adaptive is self.own else (self.adaptive,)
-        return (self.own, *adaptive, *(() if self.reference is None else (self.reference,)))
+        """The solution, and those with which it is compared."""
+        return (self, *(() if self.compared is None else self.compared.all))
 
     @property
-    def failure(self) -> Failure:
-        """The end of the history."""
-        return next((each.failure for each in self.all if each.failure.outcome in ENDS_ALL), self.own.failure)
+    def ended(self) -> Failure:
+        """The end of the whole history."""
+        return next((each.failure for each in self.all if each.failure.outcome in ENDS_ALL), self.failure)
 
 
 class Integrator:

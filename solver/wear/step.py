@@ -55,7 +55,7 @@ worn volume is a sufficient warning (27 % with 0.6)."""
 
 def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: Scheme) -> WearState | None:
     """The state after a step of `length` cycles by one balance; None where it is not found."""
-    depth, rate = state.depth, setup.rate(state.at)
+    depth, rate = state.depth, state.rate
     worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
     w, grown = 0.0, np.zeros_like(depth)
     if scheme == "adaptive" and state.previous is not None:
@@ -67,14 +67,13 @@ def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: S
     end = setup.solve(*first_guess(setup, state, balance, length), state)
     if end is None:
         return None
-    error = 0.5 * length * (setup.rate(end.at) - rate)
+    error = 0.5 * length * (end.rate - rate)
     if w > 0.0:
         explicit_depth = depth + (1.0 + w) * length * rate - w**2 * grown
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
         error = own / (own + other) * (end.depth - explicit_depth)
     last = LastStep(length, depth, state.at.predicted_h, state.omega, state.resolution)
-    volume = float(np.abs(error) @ setup.area)
-    return setup.with_rates(replace(end, cycle=state.cycle + length, previous=last, error=volume))
+    return replace(end, cycle=state.cycle + length, previous=last, error=float(np.abs(error) @ setup.area))
 
 
 def first_guess(setup: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[Balance, FloatArray]:
@@ -146,7 +145,7 @@ def explicit_step_limit(setup: WearingJoint, state: WearState) -> float:
     A step multiplies a disturbance of W by 1 + h dg/dW: 2 over the largest positive eigenvalue of -dg/dW, by Arnoldi's
     method. A complex one counts where its real part is larger than its imaginary part.
     """
-    wears = setup.rate(state.at) > 0.0
+    wears = state.rate > 0.0
 
     def product(depths: FloatArray) -> FloatArray:
         return np.asarray(-_rate_changes(setup, state, depths[None], fixed_factors=True)[0])

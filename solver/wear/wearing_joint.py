@@ -54,8 +54,8 @@ class WearState:
     resolution: harmonics and samples; resolutions: those from a cycle count on.
     left_out, estimate, accurate: of the state for which they were chosen: fraction of the contact force in harmonics
         that are left out, errors, and whether these are below rtol (True for given harmonics).
-    rates, largest_rates (n_contact + 1,): wear rates of the pairs and, last, of all together, and their largest values
-        so far, m3 per cycle. most_rate: if every pair slipped as far as it moves.
+    rate (n_contact,): wear rate, m per cycle. rates, largest_rates (n_contact + 1,): of the pairs and, last, of all
+        together, and their largest values so far, m3 per cycle. most_rate: if every pair slipped as far as it moves.
     step_limit: largest stable explicit step at the first state, cycles; NaN where nothing wears.
     previous: the last step; None at the first state and after a jump. error: local error of the last step, m3.
     length, first_length: largest length of the next step, and length of the first adaptive step, cycles.
@@ -73,6 +73,7 @@ class WearState:
     left_out: float
     estimate: Estimate
     accurate: bool
+    rate: FloatArray
     rates: FloatArray
     largest_rates: FloatArray
     judged_h: FloatArray
@@ -162,10 +163,6 @@ class WearingJoint:
         """Whether a state is stable at constant wear depth."""
         return self.run.is_stable(self.balance_of(state), state.at)
 
-    def rate(self, at: Evaluation) -> FloatArray:
-        """Wear rate (n_contact,), m per cycle, Eqs. (7), (21), (25)."""
-        return self.gain(1.0) * self.wearing.work(*worn_by(at))
-
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
         return cycles * self.wear_coefficient / self.area
@@ -183,6 +180,7 @@ class WearingJoint:
             left_out(start.resolution.orders, at),
             Estimate(start.response_error, start.wear_rate_error),
             accurate=start.outcome is Outcome.CONVERGED,
+            rate=nothing,
             rates=nothing,
             largest_rates=nothing,
             # the stability of a start state has been checked
@@ -208,14 +206,16 @@ class WearingJoint:
         return begun if point is None else self.with_rates(replace(begun, point=point))
 
     def with_rates(self, state: WearState) -> WearState:
-        """The state with its wear rates."""
-        volumes = self.rate(state.at) * self.area
+        """The state with its wear rates, Eqs. (7), (21), (25)."""
+        rate = self.gain(1.0) * self.wearing.work(*worn_by(state.at))
+        volumes = rate * self.area
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
         most = max(state.most_rate, self.wear_coefficient * (self.wearing.largest_factor * moved))
         rates = np.append(volumes, volumes.sum())
-        return replace(state, rates=rates, largest_rates=np.maximum(state.largest_rates, np.abs(rates)), most_rate=most)
+        largest = np.maximum(state.largest_rates, np.abs(rates))
+        return replace(state, rate=rate, rates=rates, largest_rates=largest, most_rate=most)
 
     def solve(
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS
@@ -223,7 +223,7 @@ class WearingJoint:
         """The state before with the solution of a balance from a first predicted force (n_rel, 2H+1), N, or None."""
         if self.follow is None:
             point = self.run.state(balance, start, most=most)
-            return None if point is None else replace(state, point=point)
+            return None if point is None else self.with_rates(replace(state, point=point))
         case, lag = self.case_and_joint(state)[0], state.lag
         if self.follow.of == "peak":
             peak = solve_at_peak(case, balance, start, lag, self.run, most)
@@ -237,7 +237,8 @@ class WearingJoint:
             turn = abs(rise_of_response(found, self.run, accepted_rise(case.settings.rtol))[1])
         half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
         point = State(found.at, final_history(found.balance, found.at))
-        return replace(state, point=point, omega=float(found.values[0]), lag=lag, half_width=half_width)
+        omega = float(found.values[0])
+        return self.with_rates(replace(state, point=point, omega=omega, lag=lag, half_width=half_width))
 
     def at_followed(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depths and its tangential history."""

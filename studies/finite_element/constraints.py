@@ -97,14 +97,16 @@ def eliminate(
     if total is None:
         found = f"{places[0]}: displacements depend on each other in a circle"
         raise SceneError("model", found, "let each depend on others that do not depend on it")
-    axes, across = sparse.eye(size, format="lil"), sparse.lil_matrix((size, size))
+    turns, projections = [], []
     idle, fixed = np.zeros(size, dtype=np.bool_), held.ravel().copy()
     fixed[dependent] = True
     for node, projection in oblique.items():
-        own = slice(3 * node, 3 * node + 3)
-        sizes, axes[own, own] = np.linalg.eigh(projection)
-        across[own, own], idle[own] = projection, sizes > 0.5
-    axes = axes.tocsr()
+        own = 3 * node + np.arange(3)
+        sizes, directions = np.linalg.eigh(projection)
+        idle[own] = sizes > 0.5
+        turns.append((own, directions - np.eye(3)))
+        projections.append((own, projection))
+    axes = sparse.eye(size, format="csr") + _blocks(size, turns)
     axes = axes @ _sorted_out(total @ axes, fixed, 3 * n_with_elements, idle)
     moved = total @ axes @ sparse.diags((~(fixed | idle)).astype(float), format="csr")
     moved.eliminate_zeros()
@@ -112,7 +114,9 @@ def eliminate(
     moves[dependent] = np.diff(moved.indptr)[dependent] > 0
     origin = np.full(len(held), -1)
     origin[dependent // 3] = origin_of
-    constraints = Constraints(steps, axes, idle, across.tocsr(), slanted, moves.reshape(-1, 3), origin, places)
+    constraints = Constraints(
+        steps, axes, idle, _blocks(size, projections), slanted, moves.reshape(-1, 3), origin, places
+    )
     return constraints, fixed.reshape(-1, 3)
 
 
@@ -140,8 +144,7 @@ def _sorted_out(total: sparse.csr_matrix, fixed: BoolArray, first: int, idle: Bo
     A turn about a line on which all nodes are moves nothing. total: all displacements from those that depend on none;
     those from `first` on have no elements. The matrix has the new motions in terms of the given ones.
     """
-    change = sparse.eye(len(fixed), format="lil")
-    extra = first + np.flatnonzero(~(fixed | idle)[first:])
+    changes, extra = [], first + np.flatnonzero(~(fixed | idle)[first:])
     columns = total[:first][:, extra]
     gram = (columns.T @ columns).tocsr()
     scale = np.sqrt(gram.diagonal())
@@ -155,6 +158,15 @@ def _sorted_out(total: sparse.csr_matrix, fixed: BoolArray, first: int, idle: Bo
         values, vectors = np.linalg.eigh(gram[rows][:, rows].toarray() / np.outer(scale[rows], scale[rows]))
         nothing = values < _NOTHING * values[-1]
         if nothing.any():
-            change[np.ix_(extra[rows], extra[rows])] = vectors / scale[rows][:, None]
+            changes.append((extra[rows], vectors / scale[rows][:, None] - np.eye(len(rows))))
             idle[extra[rows[nothing]]] = True
-    return change.tocsr()
+    return sparse.eye(len(fixed), format="csr") + _blocks(len(fixed), changes)
+
+
+def _blocks(size: int, blocks: Sequence[tuple[IntArray, FloatArray]]) -> sparse.csr_matrix:
+    """Matrix (size, size) of square blocks at some rows and the same columns."""
+    none = np.empty(0, dtype=np.int64)
+    rows = np.concatenate([none, *(np.repeat(places, len(places)) for places, _ in blocks)])
+    columns = np.concatenate([none, *(np.tile(places, len(places)) for places, _ in blocks)])
+    values = np.concatenate([np.empty(0), *(values.ravel() for _, values in blocks)])
+    return sparse.csr_matrix((values, (rows, columns)), shape=(size, size))

@@ -11,7 +11,6 @@ from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
 from studies.finite_element.elimination import NotPositiveDefiniteError
-from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, Retainer
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduction import Reduction
 from studies.finite_element.solid_mesh import (
@@ -23,7 +22,14 @@ from studies.finite_element.solid_mesh import (
     check_elements,
     spin_softening,
 )
-from studies.finite_element.structure import Structure, build_structure
+from studies.finite_element.structure import (
+    FeModel,
+    JointDefinition,
+    ReductionOptions,
+    Retainer,
+    Structure,
+    build_structure,
+)
 from studies.scene_error import SceneError
 
 Progress = Callable[[str], None]

@@ -1,4 +1,4 @@
-"""Which displacements of a structure are free, which follow others, and which are held.
+"""A finite-element model of a joint and what is done with it, SI; which displacements are free, held, or follow others.
 
 Nodes of the right cut face follow those of the left one, the moving node of a contact pair or of a tie follows the
 opposite point, plus the relative displacement of the pair; constraints are the same of other displacements.
@@ -6,6 +6,7 @@ opposite point, plus the relative displacement of the pair; constraints are the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,12 +15,83 @@ from scipy import sparse
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.joint_model import FeModel, JointDefinition
-from studies.finite_element.pairing import ContactPairs, build_contact_pairs
+from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
+from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.scene_error import SceneError
 
 _SLANTED = 0.1  # sine of the angle between the normal of a pair and a plane of symmetry that round-off or facets make
 _ROUND_OFF = 1e-6  # of a direction, which decks give with few digits
+
+
+@dataclass(frozen=True)
+class FeModel:
+    """A model, whose nodes are those of a mesh.
+
+    forms: "stiffness", N/m, "mass", kg, and where there is one "damping", N s/m, of another program, with their
+    prestress and spin softening, (3 n_nodes, 3 n_nodes), symmetric and unconstrained; None where they are assembled
+    here. prestress: whether the stiffness that is assembled contains the stress and the displacements of the glued
+    structure under the centrifugal load, and spin softening. preload (3 n_nodes,): constant forces, N, and gravity
+    (3,): acceleration of all mass, m/s2; no part of the prestress, as forces on gaps and flanks act otherwise on a
+    glued structure.
+    """
+
+    mesh: SolidMesh
+    rotation: Rotation | None = None
+    prestress: bool = True
+    preload: FloatArray | None = None
+    gravity: FloatArray | None = None
+    forms: Mapping[str, sparse.csr_matrix] | None = None
+
+
+def mean_motion(nodes: IntArray, direction: FloatArray, n_nodes: int) -> FloatArray:
+    """Row (3 n_nodes,) that gives the mean displacement of nodes (n,) along a direction (3,) of any length.
+
+    As a load: a force of 1 N along the direction, shared evenly.
+    """
+    row = np.zeros((n_nodes, 3))
+    np.add.at(row, nodes, direction / (np.linalg.norm(direction) * len(nodes)))
+    return row.ravel()
+
+
+@dataclass(frozen=True)
+class Retainer:
+    """A spring, N/m, on the mean relative displacement of all pairs, weighted by area, along a direction (3,).
+
+    It keeps a joint from walking that friction alone holds; without it there may be no periodic state.
+    """
+
+    stiffness: float
+    direction: FloatArray
+
+
+@dataclass(frozen=True)
+class JointDefinition:
+    """What is done with a model.
+
+    held (n_nodes, 3): displacements that are 0, or follow others by the constraints. load (3 n_nodes,): harmonic load,
+    N per unit of excitation amplitude. responses: rows (3 n_nodes,) by name. cut: None where the structure is no cyclic
+    sector. ties: surfaces that are always glued. pairs: those of the contacts in another order or with other frames
+    than `build_contact_pairs` gives them.
+    """
+
+    contacts: tuple[ContactSurfaces, ...]
+    held: BoolArray
+    load: FloatArray
+    responses: Mapping[str, FloatArray]
+    cut: CutFaces | None = None
+    retainer: Retainer | None = None
+    ties: tuple[ContactSurfaces, ...] = ()
+    constraints: Constraints | None = None
+    pairs: ContactPairs | None = None
+
+
+@dataclass(frozen=True)
+class ReductionOptions:
+    """nodal_diameter: of the travelling wave that excites. n_modes: stuck modes. loss_factor: see `build_fe_scene`."""
+
+    nodal_diameter: int = 0
+    n_modes: int = 20
+    loss_factor: float = 1e-3
 
 
 @dataclass(frozen=True)

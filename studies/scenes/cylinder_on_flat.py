@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from solver.model import FloatArray, ReducedModel
 from studies.scene_error import SceneError
-from studies.scenes.half_space import PressedBody, press_body, strip_compliance
+from studies.scenes.half_space import PressedBody, press_body, strip_compliance, worn_edge
 
 _WIDER = 1.0 / 6.0
 """Of its width: by this much strips of uniform traction are wider, at each end, than the flat punch that they bear as.
@@ -25,8 +25,6 @@ to 0.9 % off, of first order."""
 
 _WIDEST = 0.45
 """Of the depth that displacements refer to: half of the width of all strips has to be below a half of it."""
-
-_FARTHEST = 20.0  # of the contact: beyond what slip up to 0.9999 of sliding wears
 
 
 def line_half_width(load: float, radius: float, modulus: float) -> float:
@@ -64,12 +62,6 @@ def line_worn_depth(x: FloatArray, radius: float, half_width: float, stick_width
     return np.asarray(np.maximum(overlap, 0.0) / (2.0 * radius))
 
 
-def line_worn_edge(half_width: float, stick_width: float) -> float:
-    """Half-width b, m, over which the bodies lie on each other where all has worn that can: the last depth above 0."""
-    x = np.linspace(half_width, _FARTHEST * half_width, 10001)
-    return float(x[line_worn_depth(x, 1.0, half_width, stick_width) > 0.0][-1])
-
-
 class Parameters(PressedBody):
     """The defaults are steel under 120 N/mm, with half of the force at which the cylinder slides.
 
@@ -77,6 +69,7 @@ class Parameters(PressedBody):
     """
 
     SCAR: ClassVar = (3, 1.5)
+    worn_depth: ClassVar = staticmethod(line_worn_depth)
 
     R: float = Field(6e-3, gt=0, description="radius of the cylinder, m")
     P: float = Field(1.2e5, gt=0, description="normal force per length, N/m")
@@ -127,17 +120,16 @@ class Parameters(PressedBody):
         if self.share >= 1.0:
             return 1.5 * self.contact
         stick = line_stick_width(self.contact, self.share)
-        worn = line_worn_edge(self.contact, stick)
+        worn = worn_edge(line_worn_depth, self.contact, stick)
         # not so many that the scar reaches the last strip, as it would where there are few
         most = int(0.5 * (self.strips - 1) * stick / (1.02 * worn) + _WIDER)
         within = max(min(round(0.5 * self.strips * stick / (1.2 * worn)), most), 1)
         return 0.5 * self.strips * stick / (within - _WIDER)
 
-    def worn_edge(self, stroke: float) -> float:
-        """Half-width, m, that a stroke, m, wears at most; inf where all slides."""
+    def stick_under(self, stroke: float) -> float:
+        """Half-width of the stick zone under a stroke, m; 0 where all slides."""
         mu, depth = self.friction_coefficient, self._reference_depth
-        stick = line_stick_under_stroke(stroke, mu, self.P, self.contact, self.modulus, depth)
-        return line_worn_edge(self.contact, stick) if stick > 0.0 else np.inf
+        return line_stick_under_stroke(stroke, mu, self.P, self.contact, self.modulus, depth)
 
     def room(self, worn: float) -> float:
         """The middle of the last strip is half a strip before its end."""

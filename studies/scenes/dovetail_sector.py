@@ -13,24 +13,117 @@ turns about +z), then extrados; from the leading to the trailing edge; from the 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan
+from typing import ClassVar
 
 import numpy as np
+from pydantic import Field
 
 from solver.model import FloatArray, IntArray
-from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
+from studies.finite_element.structure import FeModel, JointDefinition, Retainer
 from studies.finite_element.surfaces import surface_of_nodes
-from studies.scenes.dovetail_parameters import DovetailParameters
-from studies.scenes.sector import AXIS, block_of, graded, mesh_of_bodies
+from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
+
+_TRAVELLING_RETAINER = 1e7  # N/m: stiff against the slip of the flanks, soft against the flanks themselves
 
 
-class Parameters(DovetailParameters):
+class Parameters(SectorParameters):
     """x is the centre line of the sector, y the tangential direction, z the axis of rotation, to the trailing edge.
 
     Radii of the dovetail and of the blade are measured along the centre line.
     """
+
+    ASCENDING: ClassVar = (
+        "bore_radius",
+        "hub_radius",
+        "web_inner_radius",
+        "web_outer_radius",
+        "rim_inner_radius",
+        "slot_bottom_radius",
+        "flank_top_radius",
+        "rim_radius",
+        "platform_radius",
+    )
+
+    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks, -")
+    rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together, rpm")
+    n_sectors: int = Field(47, ge=12, le=200, description="number of blades, -")
+    retention_stiffness: float | None = Field(
+        None,
+        ge=0,
+        description="retainer along the slot; default 1e7 under a travelling wave and else 0, N/m",
+    )
+    mesh: int = Field(2, ge=1, le=8, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
+    bore_radius: float = Field(0.120, gt=0, description="radius of the clamped bore, m")
+    hub_radius: float = Field(0.125, gt=0, description="outer radius of the hub, m")
+    web_inner_radius: float = Field(0.146, gt=0, description="radius where the web has become thin, m")
+    web_outer_radius: float = Field(0.202, gt=0, description="radius where the web begins to widen to the rim, m")
+    rim_inner_radius: float = Field(0.212, gt=0, description="inner radius of the rim, m")
+    slot_bottom_radius: float = Field(0.234, gt=0, description="radius of the slot bottom, m")
+    rim_radius: float = Field(0.250, gt=0, description="outer radius of the disk, m")
+    hub_width: float = Field(0.036, gt=0, description="axial width of the hub, m")
+    web_width: float = Field(0.014, gt=0, description="axial width of the web, m")
+    rim_width: float = Field(0.040, gt=0, description="axial width of rim, root and platform, m")
+
+    flank_top_radius: float = Field(0.245, gt=0, description="radius of the outer end of the flanks, m")
+    flank_top_half_width: float = Field(0.0055, gt=0, description="half width of the root at that end, m")
+    flank_length: float = Field(0.007, gt=0, description="length of a flank in the cross-section, m")
+    flank_angle: float = Field(45.0, ge=15, le=75, description="angle between flank and radius, degrees")
+    root_clearance: float = Field(0.0012, gt=0, description="clearance of the root at bottom and sides, m")
+    mouth_clearance: float = Field(0.0006, gt=0, description="clearance of the neck at the rim radius, m")
+
+    platform_radius: float = Field(0.2525, gt=0, description="radius of the underside of the platform, m")
+    platform_thickness: float = Field(0.0025, gt=0, description="thickness of the platform, m")
+    platform_gap: float = Field(0.0006, gt=0, description="gap between neighbouring platforms, m")
+
+    blade_length: float = Field(0.160, gt=0, description="length of the blade above the platform, m")
+    root_chord: float = Field(0.042, gt=0, description="chord at the foot of the blade, m")
+    tip_chord: float = Field(0.040, gt=0, description="chord at the tip, m")
+    root_thickness: float = Field(0.0055, gt=0, description="thickness in mid-chord at the foot of the blade, m")
+    tip_thickness: float = Field(0.0026, gt=0, description="thickness in mid-chord at the tip, m")
+    root_edge_thickness: float = Field(
+        0.90, gt=0, le=1, description="thickness of the edges at the foot over that in mid-chord, -"
+    )
+    tip_edge_thickness: float = Field(0.78, gt=0, le=1, description="the same ratio at the tip, -")
+    root_stagger: float = Field(12.0, ge=-80, le=80, description="angle of chord to axis at the foot, degrees")
+    tip_stagger: float = Field(48.0, ge=-80, le=80, description="angle of chord to axis at the tip, degrees")
+    fillet_height: float = Field(0.008, gt=0, description="height over which the neck blends into the blade, m")
+
+    @property
+    def retainer(self) -> float:
+        """Stiffness of the retainer, N/m, with its default filled in."""
+        if self.retention_stiffness is None:
+            return _TRAVELLING_RETAINER if self.nodal_diameter > 0 else 0.0
+        return self.retention_stiffness
+
+    @property
+    def flank_bottom(self) -> tuple[float, float]:
+        """Radius along the centre line and half width, m, at the inner end of the flanks."""
+        angle = radians(self.flank_angle)
+        return (
+            self.flank_top_radius - self.flank_length * cos(angle),
+            self.flank_top_half_width + self.flank_length * sin(angle),
+        )
+
+    def impossible(self) -> Iterator[tuple[bool, str, str]]:
+        """As `SectorParameters.impossible`."""
+        yield from super().impossible()
+        (bottom_radius, bottom_half_width), neck = self.flank_bottom, self.flank_top_half_width
+        low = bottom_radius <= self.slot_bottom_radius + self.root_clearance
+        remedy = "shorten the flanks or lower slot_bottom_radius, so that they end above the slot bottom"
+        yield low, "flank_length", remedy
+        yield bottom_half_width <= self.root_clearance, "root_clearance", "make it smaller than the root"
+        wide = bottom_half_width >= 0.9 * self.slot_bottom_radius * sin(self.half_pitch)
+        remedy = "shorten the flanks or use fewer sectors, so that a post is left between two slots"
+        yield wide, "flank_length", remedy
+        none = neck + self.platform_gap >= self.platform_radius * tan(self.half_pitch)
+        yield none, "platform_gap", "make it smaller, the platform vanishes"
+        none = neck + self.mouth_clearance >= self.rim_radius * sin(self.half_pitch)
+        yield none, "mouth_clearance", "make it smaller, the post vanishes"
+        yield self.fillet_height >= self.blade_length, "fillet_height", "make it smaller than blade_length"
 
     def define_sector(self) -> tuple[FeModel, JointDefinition]:
         """The sector as a finite-element model, and what is done with it.
@@ -87,12 +180,12 @@ def _across(density: int) -> int:
     return 2 * (density // 2 + 1)
 
 
-def _axial_stations(p: DovetailParameters) -> FloatArray:
+def _axial_stations(p: Parameters) -> FloatArray:
     """Axial stations, -1/2 to 1/2 of the width."""
     return np.linspace(-0.5, 0.5, 4 * p.mesh)
 
 
-def _disk_width(p: DovetailParameters, radius: FloatArray) -> FloatArray:
+def _disk_width(p: Parameters, radius: FloatArray) -> FloatArray:
     """Axial width of the disk at each radius, m: hub, web and rim with half-cosine transitions."""
     stations = [p.hub_radius, p.web_inner_radius, p.web_outer_radius, p.rim_inner_radius]
     phase = np.interp(radius, stations, [0.0, pi, pi, 2.0 * pi])
@@ -100,7 +193,7 @@ def _disk_width(p: DovetailParameters, radius: FloatArray) -> FloatArray:
     return np.asarray(p.web_width + (outer - p.web_width) * 0.5 * (1.0 + np.cos(phase)))
 
 
-def _disk_blocks(p: DovetailParameters) -> list[FloatArray]:
+def _disk_blocks(p: Parameters) -> list[FloatArray]:
     """Web below the slot, post at y > 0, post at y < 0; grids (radial, tangential, axial)."""
     m = p.mesh
     bottom_x, bottom_y = p.flank_bottom
@@ -128,7 +221,7 @@ def _disk_blocks(p: DovetailParameters) -> list[FloatArray]:
     ]
 
 
-def _blade_blocks(p: DovetailParameters) -> list[FloatArray]:
+def _blade_blocks(p: Parameters) -> list[FloatArray]:
     """Root, neck and blade in one; platform at y > 0; platform at y < 0; grids (radial, tangential, axial)."""
     m, neck = p.mesh, p.flank_top_half_width
     bottom_x, bottom_y = p.flank_bottom
@@ -151,7 +244,7 @@ def _blade_blocks(p: DovetailParameters) -> list[FloatArray]:
     ]
 
 
-def _flat_grid(p: DovetailParameters, x: FloatArray, y: FloatArray) -> FloatArray:
+def _flat_grid(p: Parameters, x: FloatArray, y: FloatArray) -> FloatArray:
     """Prismatic grid of points (n_rows, n_columns, n_axial, 3) from x (n_rows,) and y (n_rows, n_columns)."""
     stations = _axial_stations(p)
     grid = np.empty((*y.shape, len(stations), 3))
@@ -167,7 +260,7 @@ def _chord_directions(stagger_degrees: float) -> tuple[FloatArray, FloatArray]:
     return np.array([0.0, -sin(angle), cos(angle)]), np.array([0.0, cos(angle), sin(angle)])
 
 
-def _airfoil_section(p: DovetailParameters, height: float, across: FloatArray) -> FloatArray:
+def _airfoil_section(p: Parameters, height: float, across: FloatArray) -> FloatArray:
     """Points (n_thickness, n_axial, 3) of the section at a height above the platform, fillet included.
 
     Chord, thicknesses and stagger vary linearly from foot to tip. Over the fillet the section blends quadratically from

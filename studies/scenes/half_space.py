@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import ClassVar, Self
 
 import numpy as np
@@ -22,6 +23,7 @@ from solver.model import BoolArray, ContactInterface, FloatArray, LinearModel, R
 from studies.scene import ExpectedWear, Scene
 from studies.scene_error import SceneError
 
+_FARTHEST = 20.0  # of the contact: beyond what slip up to 0.9999 of sliding wears
 _HOLDER = 1e-9  # stiffness that holds the body over that of the contact: no result changes by more
 _MARGIN = 1.1
 """Over b from volume and unworn contact, `b^3 = a^3 + 3 R A / 2` or `b^4 = a^4 + 4 R V / pi`. Measured with uniform
@@ -79,14 +81,25 @@ def patch_compliance(position: FloatArray, width: float, young: float, poisson: 
     return 0.5 * (normal + normal.T), 0.5 * (tangential + tangential.T)
 
 
+def worn_edge(worn_depth: Callable[..., FloatArray], contact: float, stick: float) -> float:
+    """Half-width b, m, over which the bodies touch where all has worn that can: the last depth above 0.
+
+    worn_depth: of distances from the middle, radius, half-widths of the unworn contact and of the stick zone, m.
+    """
+    x = np.linspace(contact, _FARTHEST * contact, 10001)
+    return float(x[worn_depth(x, 1.0, contact, stick) > 0.0][-1])
+
+
 class PressedBody(Scene):
     """A body of radius R that a force P presses on a flat, and a force Q or a stroke moves.
 
     SCAR: n and c of `b^n = a^n + c R V`, half-width of a scar of the worn volume V, per length of a cylinder.
+    worn_depth: depth that partial slip wears, as `worn_edge` takes it.
     """
 
     FRICTION_IN_MODEL: ClassVar = True  # the default load and the width of what wears
     SCAR: ClassVar[tuple[int, float]]
+    worn_depth: ClassVar[Callable[..., FloatArray]]
 
     friction_coefficient: float = Field(0.6, ge=0, description="Coulomb friction coefficient mu, 1")
     R: float
@@ -136,8 +149,8 @@ class PressedBody(Scene):
         """Half-width that pairs cover, m."""
 
     @abstractmethod
-    def worn_edge(self, stroke: float) -> float:
-        """Half-width, m, over which the bodies touch once a stroke, m, has worn all that it can; inf without end."""
+    def stick_under(self, stroke: float) -> float:
+        """Half-width of the stick zone under a stroke, m; 0 where all slides."""
 
     @abstractmethod
     def room(self, worn: float) -> float:
@@ -161,7 +174,9 @@ class PressedBody(Scene):
             return self
         stroke = self.stroke * expected.amplitude
         volume = min(4.0 * expected.per_slip_work * self.P * stroke, expected.volume / self.thickness)
-        worn = min(self.scar(volume, expected.depth), 1.1 * self.worn_edge(stroke))
+        worn, stick = self.scar(volume, expected.depth), self.stick_under(stroke)
+        if stick > 0.0:
+            worn = min(worn, 1.1 * worn_edge(self.worn_depth, self.contact, stick))
         needed = self.room(worn)
         if not np.isfinite(worn) or needed <= self.patched:
             return self

@@ -15,10 +15,10 @@ from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis
-from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
+from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh
 from studies.scene import N_MODES, Scene, SurfaceMesh, lowest
 from studies.scene_error import SceneError
@@ -66,19 +66,13 @@ class SectorParameters(Scene):
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """Whether parameters that are fine one by one do not go together, which one, and what would be right."""
-        raise NotImplementedError
+        for inner, outer in pairwise(self.ASCENDING):
+            below = getattr(self, inner)
+            yield below >= getattr(self, outer), outer, f"make it larger than {inner} = {below}"
 
     def check(self) -> None:
         """Raises SceneError where parameters do not go together."""
-        radii = (
-            (
-                getattr(self, inner) >= getattr(self, outer),
-                outer,
-                f"make it larger than {inner} = {getattr(self, inner)}",
-            )
-            for inner, outer in pairwise(self.ASCENDING)
-        )
-        for wrong, key, remedy in (*radii, *self.impossible()):
+        for wrong, key, remedy in self.impossible():
             if wrong:
                 raise SceneError(key, str(getattr(self, key)), remedy)
 

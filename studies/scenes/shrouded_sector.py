@@ -21,8 +21,8 @@ from pydantic import Field
 
 from solver.model import FloatArray
 from studies.finite_element import surfaces
-from studies.finite_element.joint_model import FeModel, JointDefinition
 from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.structure import FeModel, JointDefinition
 from studies.scenes.sector import SectorParameters, block_of, graded, mesh_of_bodies
 
 
@@ -62,6 +62,7 @@ class Parameters(SectorParameters):
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """As `SectorParameters.impossible`."""
+        yield from super().impossible()
         wide = self._blade_half_angle(self.rim_radius, self.root_angle) > 0.9 * self.half_pitch
         remedy = "make it thinner, or use fewer blades, so that there is room between the blades"
         yield wide, "blade_thickness", remedy

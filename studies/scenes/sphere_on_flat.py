@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from solver.model import FloatArray, ReducedModel
-from studies.scenes.half_space import PressedBody, patch_compliance, press_body
+from studies.scenes.half_space import PressedBody, patch_compliance, press_body, worn_edge
 
 _WIDER = 0.11
 """Of the width of a patch: by so much the circle of equal area is wider than the punch that stuck patches bear as.
@@ -23,8 +23,6 @@ _NEAR = 0.08
 
 _WIDEST = 0.5
 """Of the radius of the sphere: beyond it is no paraboloid."""
-
-_FARTHEST = 20.0  # of the contact: beyond what slip up to 0.9999 of sliding wears
 
 
 def point_radius(load: float, radius: float, modulus: float) -> float:
@@ -63,12 +61,6 @@ def point_worn_depth(r: FloatArray, radius: float, contact_radius: float, stick_
     return np.asarray(np.where(np.abs(r) > c, np.maximum(overlap, 0.0), 0.0))
 
 
-def point_worn_edge(contact_radius: float, stick_radius: float) -> float:
-    """Radius b, m, over which the bodies lie on each other where all has worn that can: the last depth above 0."""
-    r = np.linspace(contact_radius, _FARTHEST * contact_radius, 10001)
-    return float(r[point_worn_depth(r, 1.0, contact_radius, stick_radius) > 0.0][-1])
-
-
 class Parameters(PressedBody):
     """The defaults are steel under 100 N, with half of the force at which the sphere slides.
 
@@ -76,6 +68,7 @@ class Parameters(PressedBody):
     """
 
     SCAR: ClassVar = (4, 4.0 / np.pi)
+    worn_depth: ClassVar = staticmethod(point_worn_depth)
 
     R: float = Field(10e-3, gt=0, description="radius of the sphere, m")
     P: float = Field(100.0, gt=0, description="normal force, N")
@@ -103,7 +96,7 @@ class Parameters(PressedBody):
         if self.share >= 1.0:
             return 1.4 * self.contact
         stick = point_stick_radius(self.contact, self.share)
-        worn = point_worn_edge(self.contact, stick)
+        worn = worn_edge(point_worn_depth, self.contact, stick)
         # in widths of a patch: distances of the middles, and how many lie nearer than the next one
         along = np.arange(2 * self.patches) + 0.5
         distance, count = np.unique(np.round(np.hypot(along[:, None], along[None, :]), 9), return_counts=True)
@@ -118,10 +111,9 @@ class Parameters(PressedBody):
         chosen = near[np.argmax(distance[near + 1] / distance[near])] if near.size else holds[np.argmin(change)]
         return float(stick / within[chosen] * self.patches)
 
-    def worn_edge(self, stroke: float) -> float:
-        """Radius, m, that a stroke, m, wears at most; inf where all slides."""
-        stick = point_stick_under_stroke(stroke, self.friction_coefficient, self.P, self.contact, self.E, self.nu)
-        return point_worn_edge(self.contact, stick) if stick > 0.0 else np.inf
+    def stick_under(self, stroke: float) -> float:
+        """Radius of the stick zone under a stroke, m; 0 where all slides."""
+        return point_stick_under_stroke(stroke, self.friction_coefficient, self.P, self.contact, self.E, self.nu)
 
     def room(self, worn: float) -> float:
         """Middles of the patches at the edge are half a patch from it, or less."""

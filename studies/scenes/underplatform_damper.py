@@ -22,9 +22,9 @@ from pydantic import Field
 
 from solver.model import FloatArray
 from studies.finite_element import surfaces
-from studies.finite_element.joint_model import FeModel, JointDefinition, Retainer
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Material
+from studies.finite_element.structure import FeModel, JointDefinition, Retainer
 from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
 
 
@@ -84,6 +84,7 @@ class Parameters(SectorParameters):
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """As `SectorParameters.impossible`."""
+        yield from super().impossible()
         half, room = self.damper_half_width, 0.95 * self.half_pitch * self.platform_radius
         yield 0.5 * self.platform_gap >= half, "platform_gap", "make it smaller than the wedge is wide"
         remedy = "make it smaller, or use fewer blades, so that the wedge has room beside the shank"

@@ -35,8 +35,7 @@ from studyrunner.kinds.task import (
     number_points,
     settings_at,
 )
-from studyrunner.scene.pairs import ContactChange
-from studyrunner.scene.scene_set import SceneSet
+from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
 from studyrunner.variables import OF_A_MISSION
 
@@ -61,6 +60,13 @@ class PlannedBlock:
     excitation_amplitude: float
     cycles: float
     begin: Begin
+
+    def as_block(self, model: ReducedModel) -> of_solver.Block:
+        """The block as the solver takes it. model: of the joint."""
+        cycles, friction = None if isinstance(self.frequency, Passage) else self.cycles, self.joint.friction_coefficient
+        return of_solver.Block(
+            model, self.frequency, self.excitation_amplitude, friction, cycles, self.begin, self.name
+        )
 
     @property
     def octaves(self) -> float:
@@ -101,18 +107,7 @@ class Mission(Task):
         from solver.missions.history import integrate_missions
 
         of_joints = {block.joint: block.joint.model(models) for block in self.blocks}
-        blocks = tuple(
-            of_solver.Block(
-                model=of_joints[block.joint],
-                frequency=block.frequency,
-                excitation_amplitude=block.excitation_amplitude,
-                friction_coefficient=block.joint.friction_coefficient,
-                cycles=None if isinstance(block.frequency, Passage) else block.cycles,
-                begin=block.begin,
-                name=block.name,
-            )
-            for block in self.blocks
-        )
+        blocks = tuple(block.as_block(of_joints[block.joint]) for block in self.blocks)
         n_computed = itertools.count(1)
         # as many again for the reference solution
         n_planned = 2 * max(1, missions_computed(self.missions[-1]))

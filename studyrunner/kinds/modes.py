@@ -25,8 +25,7 @@ from studyrunner.kinds.task import (
     settings_at,
     up_or_down,
 )
-from studyrunner.scene.pairs import ContactChange
-from studyrunner.scene.scene_set import SceneSet
+from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
 from studyrunner.variables import OF_A_MODE_POINT
 

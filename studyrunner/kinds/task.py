@@ -23,7 +23,7 @@ from solver.packing import Packed
 from solver.settings import Automatic, SolverSettings, WearTarget
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.scene.pairs import ContactChange
+from studyrunner.scene.scene_set import ContactChange
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest

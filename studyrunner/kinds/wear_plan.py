@@ -18,8 +18,7 @@ from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, Index, Joint, TaskPlan, grid, joint_of, n_unknowns_of, settings_at
 from studyrunner.kinds.wear import OWN_STEPS, History, Integrated, Sweep
-from studyrunner.scene.pairs import ContactChange
-from studyrunner.scene.scene_set import SceneSet
+from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
 
 _OF_HISTORY = ("wear_coefficient", "step", "scheme")

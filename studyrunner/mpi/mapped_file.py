@@ -9,14 +9,15 @@ from __future__ import annotations
 import contextlib
 import mmap
 import pickle
-import secrets
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from studyrunner.mpi.ranks import RankInterrupted, Ranks, wait_for_message
-
 _ALIGNED = 64  # bytes: no array shares a line of the cache with another one
+
+
+class UnseenFileError(Exception):
+    """A rank does not see a file of rank 0, as on another machine without a common folder."""
 
 
 @dataclass(frozen=True)
@@ -58,45 +59,11 @@ def write_mapped(thing: object, path: Path) -> MappedFile:
 def open_mapped(given: MappedFile) -> Any:  # a type that rank 0 knows
     """The object. Its arrays are as any others: what one process changes in them, no other process sees.
 
-    Raises OSError where the file is not there.
+    Raises UnseenFileError where the file is not there.
     """
-    with given.path.open("rb") as file:
-        memory = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY))
-    return pickle.loads(given.head, buffers=[memory[begin:end] for begin, end in given.places])
-
-
-@dataclass(frozen=True)
-class WhetherSeen:
-    """Question of rank 0: whether a rank sees a file with these contents."""
-
-    path: Path
-    mark: bytes
-
-    def answer(self) -> bool:
-        """Whether this process does."""
-        with contextlib.suppress(OSError):
-            return self.path.read_bytes() == self.mark
-        return False
-
-
-def ranks_that_see(ranks: Ranks, path: Path) -> frozenset[int]:
-    """Rank 0: the other ranks that see a file which it writes; none where the disk is full.
-
-    Raises KeyboardInterrupt where a rank was interrupted.
-    """
-    if ranks.size == 1:
-        return frozenset()
-    question = WhetherSeen(path, secrets.token_bytes())
     try:
-        with path.open("xb") as file:
-            file.write(question.mark)
-        for rank in range(1, ranks.size):
-            ranks.send(question, rank)
-        answers = [wait_for_message(ranks) for _ in range(1, ranks.size)]
-    except OSError:
-        return frozenset()
-    finally:
-        path.unlink(missing_ok=True)
-    if any(isinstance(is_seen, RankInterrupted) for _, is_seen in answers):
-        raise KeyboardInterrupt
-    return frozenset(rank for rank, is_seen in answers if is_seen)
+        with given.path.open("rb") as file:
+            memory = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY))
+    except OSError as error:
+        raise UnseenFileError(str(given.path)) from error
+    return pickle.loads(given.head, buffers=[memory[begin:end] for begin, end in given.places])

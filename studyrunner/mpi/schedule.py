@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from studyrunner.mpi.dispatch import CostModel, Dispatcher, Task
-from studyrunner.mpi.mapped_file import WhetherSeen
+from studyrunner.mpi.mapped_file import UnseenFileError
 from studyrunner.mpi.ranks import POLL_SECONDS, RankInterrupted, Ranks, wait_for_message
 from studyrunner.system.machine import MachineFaultError
 from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
@@ -64,6 +64,13 @@ class _Progress:
     progress: object
 
 
+@dataclass(frozen=True)
+class _Unseen:
+    """A rank does not see a file that a task brings."""
+
+    number: int
+
+
 class Office:
     """What rank 0 does with tasks, results and messages. All of it is called in the main thread.
 
@@ -81,8 +88,11 @@ class Office:
         """Takes a result, in the order in which results arrive; returns the tasks that the result makes possible."""
         raise NotImplementedError
 
-    def prepare(self, rank: int, task: Task) -> Task:  # noqa: ARG002
-        """The task as a rank gets it; called once for each task that is sent, in the order of sending."""
+    def prepare(self, rank: int, task: Task, *, unseen: bool = False) -> Task:  # noqa: ARG002
+        """The task as a rank gets it; called once for each task that is sent, in the order of sending.
+
+        unseen: whether the task is sent again, to a rank that does not see the files that the task brings.
+        """
         return task
 
     def keep(self, task: Task, progress: object) -> None:
@@ -112,19 +122,16 @@ def serve_tasks(ranks: Ranks, office: Office, run: Run) -> None:
 
 
 def follow_rank_0(ranks: Ranks, run: Run) -> None:
-    """Any other rank: answers questions and does the tasks that rank 0 sends, until rank 0 sends None."""
+    """Any other rank: does the tasks that rank 0 sends, until rank 0 sends None."""
 
     def send(reply: object) -> None:
         ranks.send(reply, 0)
         ranks.flush()
 
     while (message := wait_for_message(ranks)[1]) is not None:
-        if isinstance(message, WhetherSeen):
-            send(message.answer())
-        elif isinstance(message, _Assignment):
-            _work(message, run, send, ranks.size, raise_ending)
-        else:
+        if not isinstance(message, _Assignment):
             raise TypeError(f"rank 0 sent {message!r} instead of a task")
+        _work(message, run, send, ranks.size, raise_ending)
 
 
 def _work(
@@ -142,12 +149,16 @@ def _work(
             send(_Progress(assignment.number, progress))
             sent[type(progress)] = time.perf_counter()
 
-    for result in run(task, keep):
-        n_given += 1
-        if n_given > task.n_results:
-            break
-        send(_Delivery(assignment.number, result, time.perf_counter() - began))
-        began = time.perf_counter()
+    try:
+        for result in run(task, keep):
+            n_given += 1
+            if n_given > task.n_results:
+                break
+            send(_Delivery(assignment.number, result, time.perf_counter() - began))
+            began = time.perf_counter()
+    except UnseenFileError:
+        send(_Unseen(assignment.number))
+        return
     if n_given != task.n_results:
         raise ValueError(f"not {task.n_results} results from {task}")
 
@@ -222,11 +233,13 @@ class _Server:
         while self.dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
             self.dispatcher.add(more)
         for rank, number, task in self.dispatcher.assign():
-            assignment = _Assignment(number, self._office.prepare(rank, task))
-            if rank == 0:
-                self.local.assign(assignment)
-            else:
-                self._ranks.send(assignment, rank)
+            self._send(rank, _Assignment(number, self._office.prepare(rank, task)))
+
+    def _send(self, rank: int, assignment: _Assignment) -> None:
+        if rank == 0:
+            self.local.assign(assignment)
+        else:
+            self._ranks.send(assignment, rank)
 
     def _accept(self, rank: int, message: object) -> None:
         if isinstance(message, _Progress):
@@ -235,6 +248,9 @@ class _Server:
             task = self.dispatcher.deliver(rank, message.number, message.seconds)
             self.dispatcher.add(self._office.take(task, message.result))
             self.hand_out()
+        elif isinstance(message, _Unseen):
+            task = self._office.prepare(rank, self.dispatcher.task(message.number), unseen=True)
+            self._send(rank, _Assignment(message.number, task))
         elif isinstance(message, RankInterrupted):
             begin_ending()
             raise KeyboardInterrupt

@@ -38,7 +38,7 @@ CAPTIONS = {
     "response_after_own_wear": "Each mark is another joint, which wore at its own frequency: the marks are no response"
     " curve. That they are low where the new joint resonates does not mean that wear protects",
     "excitation_frequency": _BANDS,
-    "trends": "Bars: estimated error of the worn volume",
+    "trends": "Bars: estimated errors",
     "wear_depth": "Of both surfaces together",
     "worn_profile": "Of both surfaces together",
     "fretting_loops": "Tangential force over relative displacement through a period, each about its mean: the area"

@@ -10,9 +10,17 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.scene.answers import SmallArray
-from studyrunner.scene.pairs import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import PairArrays, SceneSet, along_axes, merge_facts, pair_arrays
+from studyrunner.scene.scene_set import (
+    PairArrays,
+    SceneSet,
+    along_axes,
+    drawn_pairs,
+    merge_facts,
+    pair_arrays,
+    scatters_pairs,
+    worn_depth,
+)
 from studyrunner.study.parts import block_of_input, draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study

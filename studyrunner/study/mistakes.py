@@ -101,9 +101,13 @@ def _place_of(kind: type[BaseModel], table: object, details: Details) -> _Place:
             names, around, inner = [*names, str(part)], tables, inner.get(part)
             fields = [each.model_fields[part] for each in tables if part in each.model_fields]
             extra = [each.EXTRA for each in tables if issubclass(each, Section) and each.EXTRA and not fields]
-            tables = [*(table for field in fields for table in tables_in(field.annotation)), *extra]
+            tables = [
+                *(table for field in fields for table in tables_in(field.annotation)),
+                *(each for each, _ in extra),
+            ]
             # a key without a description of its own is part of one with a description
-            meaning = next((field.description for field in fields if field.description), meaning)
+            meanings = (*(field.description for field in fields), *(f"as {looks}" for _, looks in extra))
+            meaning = next(filter(None, meanings), meaning)
         elif isinstance(inner, list | tuple) and isinstance(part, int) and part < len(inner):
             inner = inner[part]
     return _Place(tuple(names), around, f" ({re.sub(', [-1]$', '', meaning)})" if meaning else "")

@@ -137,12 +137,18 @@ class Origin:
     scene: SceneSection | None = None
 
 
-def parameters_of(model: object, source: str) -> type[BaseModel]:
-    """What [scene] consists of beside `model` and `worn`. Raises UserError where there is no such scene."""
+def parameters_of(model: object, source: str, folder: Path | None = None) -> type[BaseModel]:
+    """What [scene] consists of beside `model` and `worn`. Raises UserError where there is no such scene.
+
+    folder: relative paths start here; None where a result holds the scene.
+    """
     if not isinstance(model, str):
         remedy = "give a bundled scene or the path of a scene file, in quotes"
         raise UserError(source, "scene.model", model, remedy if model is not None else f"missing: {remedy}")
     if _names_model(model):
+        if folder is not None:  # a file that is missing is named before keys that are
+            with scene_errors(source, None):
+                check_there(folder / model)
         from studies.fe_models.from_files.parameters import Parameters  # where it is used: it takes a while to load
 
         return Parameters
@@ -152,13 +158,6 @@ def parameters_of(model: object, source: str) -> type[BaseModel]:
         return scene_parameters(model)
     except SceneError as error:
         raise UserError(source, "scene.model", model, error.remedy) from None
-
-
-def check_model_file(model: object, origin: Origin) -> None:
-    """Raises UserError where the file of a model is missing: this is said before keys that are missing."""
-    if isinstance(model, str) and _names_model(model) and origin.archived is None:
-        with scene_errors(origin.source, None):
-            check_there(origin.path.parent / model)
 
 
 def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:

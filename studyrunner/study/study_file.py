@@ -29,16 +29,7 @@ from studyrunner.study.scene_axes import (
     take_axes,
     variants_of,
 )
-from studyrunner.study.scene_section import (
-    WORN_AXIS,
-    Origin,
-    SceneSection,
-    Worn,
-    check_model_file,
-    find_scene,
-    parameters_of,
-    read_worn,
-)
+from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, Worn, find_scene, parameters_of, read_worn
 from studyrunner.study.sections import DEFAULT, SECTIONS, SOLVER_AXES, VARIABLES, SlowTimeSection, WearSection
 from studyrunner.study.study import MODES, Study
 from studyrunner.study.text import format_toml, read_archived, read_toml
@@ -125,8 +116,7 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     """
     source, tables = origin.source, _tables_of(table, origin.source)
     model, worn = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
-    kind = parameters_of(model, source)
-    check_model_file(model, origin)
+    kind = parameters_of(model, source, origin.path.parent if origin.archived is None else None)
     worn = None if worn is None else read_worn(worn, source, origin.path.parent)
     solver_axes = tuple(key for key in SOLVER_AXES if key in tables["axes"])
     axes = take_axes(tables, kind, source)
@@ -272,7 +262,7 @@ def _set_key(table: Tables, key: str, value: object, source: str, shown: str) ->
         else:
             place = place.setdefault(name, {})
         if not isinstance(place, dict | list):
-            raise UserError(source, shown, value, f"give a key in a table: {name} is none")
+            raise UserError(source, shown, value, f"{name} is no table: give a key of a table")
     if not isinstance(place, dict):
         raise UserError(source, shown, value, f"give {'.'.join(names)}.NAME.KEY with the name of a table in this list")
     if value is None:

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from tests.mpi.launching import FAKED, ROOT, launcher, mounted, options, results, run_command, run_here, run_to_end
+from tests.mpi.launching import FAKED, ROOT, launcher, options, results, run_command, run_here, run_to_end
 
 FREQUENCIES = options("axes.frequency={start = 100, stop = 160, num = 5}")
 STUDY = ["sdof_slider", *FREQUENCIES, "-o", "out.nc"]
@@ -77,11 +77,3 @@ def test_only_rank_0_sees_study_scene_and_output(tmp_path):
     assert list(elsewhere.iterdir()) == []
     assert run_here([*study[:-1], str(folder / "alone.nc")], tmp_path) == 0
     assert results(folder / "out.nc").identical(results(folder / "alone.nc"))
-
-
-def test_an_output_that_cannot_be_written(tmp_path):
-    with mounted(tmp_path / "read-only", "ro") as folder:
-        ended = run_to_end(2, [FAKED, *STUDY[:-1], str(folder / "out.nc")], tmp_path)
-    assert ended.status == 2
-    (line,) = ended.said.splitlines()
-    assert "Read-only file system" in line

@@ -82,7 +82,7 @@ def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     case, idle = build_case(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros(1)
     rest = first_point(case, omega, 0.0, idle)
     quiet, joint = case.joint(omega, 0.0), case.joint(omega, 20.0)
-    found = relax_to_periodic(case, joint, idle, rest, quiet, Run(1e-8))
+    found = relax_to_periodic(joint, idle, rest, quiet, Run(1e-8))
     moved = np.abs(full_motion(case.model, periodic_state(joint, found)).displacement[1])
     assert moved == pytest.approx([abs(orbit.harmonic(dof)) for dof in (0, 1)], rel=0.02, abs=0.0)
 
@@ -96,7 +96,7 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts():
     state = branch_states(case.model, 0.0, FORCE, [1.55], settings)[0].state
     assert np.abs(state.contact_force_h).max() > 1e-2
     start = State(evaluated(before, state)[1], state.start_history, 1.55)
-    found = relax_to_periodic(case, joint, idle, start, before, Run(settings.tolerance, budget))
+    found = relax_to_periodic(joint, idle, start, before, Run(settings.tolerance, budget))
     moved = full_motion(case.model, periodic_state(joint, found)).displacement[1][1]
     assert abs(moved) == pytest.approx(FORCE / abs(1 - omega**2 + 0.05j * omega), rel=1e-6, abs=0.0)
     assert budget.iterations < 500
@@ -115,7 +115,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     middle = next(filter(grows, (arc.state_at(a, b, 0.03) for a, b in passed)))
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
-    found = relax_to_periodic(case, joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
+    found = relax_to_periodic(joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
     assert isinstance(found, State)
     settled = replace(found, parameter=0.03 * (1.0 + change))
     assert not grows(settled)
@@ -135,7 +135,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
     idle, history = np.zeros(1), np.zeros((1, 2))
     errors = []
     for steps in (250, 500):
-        transient = Transient(case, joint)
+        transient = Transient(joint)
         displacement = np.zeros((3, 2), complex)
         displacement[0, 1] = 0.01
         motion = Motion(displacement, np.zeros_like(displacement))
@@ -163,7 +163,7 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_unsettled(monkeypatc
     for most in (transient.SEARCH_ITERATIONS, 10):
         monkeypatch.setattr(transient, "SEARCH_ITERATIONS", most)
         budget = Budget()
-        outcome = relax_to_periodic(case, joint, idle, rest, quiet, Run(case.settings.tolerance, budget))
+        outcome = relax_to_periodic(joint, idle, rest, quiet, Run(case.settings.tolerance, budget))
         outcomes.append(Outcome.CONVERGED if isinstance(outcome, State) else outcome.outcome)
         # one step and one search for the periodic state may be under way
         assert budget.iterations <= most + 2 * NEAR_ITERATIONS

@@ -17,7 +17,7 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear import problem as control
-from solver.wear.check import needs_new_choice
+from solver.wear.check import choose_anew, needs_new_choice
 from solver.wear.problem import Adaptive, Given
 from solver.wear.step import moved_fraction, rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearState
@@ -161,6 +161,17 @@ def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(harmonics, sha
     assert 1e-4 < now < 0.5
     state = replace(state, left_out=share * now, estimate=Estimate(error, error), accurate=True)
     assert needs_new_choice(work, state) is anew
+
+
+def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
+    work = problem(Adaptive(1e-2)).setup
+    work.case = replace(work.case, settings=SolverSettings("auto", 64, rtol=1e-2))
+    state = work.begin()
+    chosen = choose_anew(work, state)
+    assert chosen.resolution != state.resolution
+    assert chosen.rate == pytest.approx(work.gain(1.0) * chosen.at.slip_work, rel=1e-12, abs=0.0)
+    assert chosen.rates[-1] == pytest.approx(float(chosen.rate @ work.area))
+    assert abs(chosen.rate / state.rate - 1.0).max() > 1e-4
 
 
 # --- limits ---

@@ -77,7 +77,7 @@ def test_the_dovetail_sector_settles_to_the_state_that_the_balance_has():
     assert point.evaluation.slip_work.sum() > 1e-9
     assert isinstance(rest, State)
     joint, quiet = case.joint(omega, 0.5), case.joint(omega, 0.0)
-    settled = relax_to_periodic(case, joint, unworn, rest, quiet, Run(settings.tolerance))
+    settled = relax_to_periodic(joint, unworn, rest, quiet, Run(settings.tolerance))
     assert isinstance(settled, State)
     one, other = (
         joint.structure.response_h(joint.to_relative(at.evaluation.displacement_h))[0, 1:3] for at in (point, settled)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from studies.finite_element import surfaces
-from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene
 from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
+from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions
 from studies.scenes import shrouded_sector
 
 

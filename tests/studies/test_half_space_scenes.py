@@ -12,19 +12,8 @@ from solver.settings import SolverSettings
 from studies import build_scene
 from studies.scene import ExpectedWear
 from studies.scenes import scene_parameters
-from studies.scenes.cylinder_on_flat import (
-    line_half_width,
-    line_stick_under_stroke,
-    line_stick_width,
-    line_worn_depth,
-    line_worn_edge,
-)
-from studies.scenes.half_space import (
-    composite_modulus,
-    patch_compliance,
-    round_up,
-    strip_compliance,
-)
+from studies.scenes.cylinder_on_flat import line_half_width, line_stick_under_stroke, line_stick_width, line_worn_depth
+from studies.scenes.half_space import composite_modulus, patch_compliance, round_up, strip_compliance, worn_edge
 from studies.scenes.sphere_on_flat import point_radius, point_stick_radius, point_stick_under_stroke, point_worn_depth
 from tests.studies.half_space_twin import compliances, limit_depth, pressed, solve_pressed
 
@@ -256,7 +245,7 @@ def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears():
     stick = line_stick_under_stroke(stroke, MU, 1.2e5, A_LINE, MODULUS, 6e-3)
     assert 0.0 < stick < 0.3 * A_LINE
     found = room("cylinder_on_flat", ExpectedWear(1.0, 1e-3), stroke=stroke)
-    assert found == round_up(1.1 * line_worn_edge(A_LINE, stick) * 100 / 99)
+    assert found == round_up(1.1 * worn_edge(line_worn_depth, A_LINE, stick) * 100 / 99)
     # a wrong unit is no reason not to build
     assert room("cylinder_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 2.7e-3
     assert room("sphere_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 5e-3

@@ -12,6 +12,7 @@ from solver.model import LinearModel
 from studies.scene import stuck_frequencies
 from studies.scenes import build_scene, scene_parameters
 from studies.scenes.sdof_slider import DenHartogSlider
+from studyrunner.scene.scene import describe_scene
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit
 
 WEAR = np.array([1.1e-11, 0.0, 1.1e-12])
@@ -125,6 +126,12 @@ def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector(
     assert list(own) == list(model.linear) == [0, 4]
     for k, found in own.items():
         assert found == pytest.approx(whole[k], rel=1e-9, abs=0.0)
+
+
+def test_a_wave_that_travels_backwards_has_the_frequency_of_its_image():
+    model = build_scene("dovetail_sector", dovetail(nodal_diameter=4, n_sectors=12), 1)
+    found = [describe_scene(replace(model, nodal_diameter=k)).stuck_frequency for k in (4, 8)]
+    assert found[0] == found[1] > 0.0
 
 
 def test_a_displacement_without_mass_has_no_frequency():

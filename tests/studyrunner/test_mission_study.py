@@ -9,7 +9,6 @@ import xarray as xr
 from solver import Block, Outcome, Passage, integrate_mission
 from studies import build_scene
 from studyrunner.cli import main
-from studyrunner.kinds.estimate import iterations_of_missions
 from studyrunner.mpi import schedule
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
@@ -194,11 +193,3 @@ def test_samples_draw_what_all_blocks_have(blocks):
         assert loads["cruise"] == load
         assert loads["heavy"] == pytest.approx(12.0 + load - 10.0)
     assert len(set(result.worn_volume.isel(mission=-1).values.ravel())) == 3
-
-
-def test_the_estimated_time_follows_the_number_of_missions():
-    times = [iterations_of_missions([("ramp", 0.0)], number) for number in (1, 3, 20, 1e6)]
-    assert times[2] < 4 * times[1]
-    assert times[3] < 5 * times[2]
-    narrow, wide = (iterations_of_missions([("up", octaves)], 20) for octaves in (0.1, 13.3))
-    assert wide == pytest.approx(6 * narrow, rel=0.2)

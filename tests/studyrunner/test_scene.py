@@ -12,7 +12,7 @@ from studies import build_scene, read_scene
 from studies.fe_models.from_files import model as from_files
 from studies.scene_file import write_scene
 from studyrunner.cli import main
-from studyrunner.mpi.mapped_file import MappedFile, open_mapped
+from studyrunner.mpi.mapped_file import MappedFile, UnseenFileError, open_mapped
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.answers import write_study_scene
 from studyrunner.scene.edge_pairs import edge_pairs
@@ -153,21 +153,21 @@ STIFFNESSES = (1.6e5, 1.7e5, 1.8e5)
 
 
 class Sent:
-    """What ranks 0 and 1, which see the files, and rank 2 get with tasks of three scenes."""
+    """What ranks get with tasks of three scenes."""
 
     def __init__(self, folder):
         study = read_study("sdof_slider", [f"axes.stiffness={list(STIFFNESSES)}"])
         self.sweeps = {sweep.joint.scene: sweep for sweep in plan_of(study, 2).sweeps}
         self.models = [build_scene("sdof_slider", stiffness=stiffness) for stiffness in STIFFNESSES]
         self.read: list[int] = []
-        self._handed = SceneModels(self._read, {0, 1}, folder / "out.nc.progress")
+        self._handed = SceneModels(self._read, folder / "out.nc.progress")
 
     def _read(self, scene):
         self.read.append(scene)
         return self.models[scene]
 
-    def __call__(self, rank, scene):
-        task = self._handed.with_model(rank, self.sweeps[scene])
+    def __call__(self, rank, scene, **given):
+        task = self._handed.with_model(rank, self.sweeps[scene], **given)
         return task.models[0] if task.models else None
 
 
@@ -178,7 +178,9 @@ def test_ranks_that_see_the_files_get_one_copy_and_others_their_own(folder):
     assert first == second
     assert sent.read == [1]
     assert describe_scene(open_mapped(first)).digest == describe_scene(sent.models[1]).digest
-    assert sent(2, 1) is sent.models[1]
+    assert sent(2, 1) == first
+    assert sent(2, 1, unseen=True) is sent.models[1]
+    assert sent(2, 0) is sent.models[0]
     # each has it by now
     assert [sent(rank, 1) for rank in (1, 2)] == [None, None]
 
@@ -192,7 +194,7 @@ def test_a_file_goes_once_no_rank_holds_its_model(folder):
     assert open_mapped(given) is not None, "rank 1 may not have opened it yet"
     for scene in (1, 2):
         assert isinstance(sent(1, scene), MappedFile)
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(UnseenFileError):
         open_mapped(given)
     assert sent.read == [0, 1, 2]
     assert isinstance(sent(0, 0), MappedFile)

@@ -14,9 +14,9 @@ import pytest
 from studies import build_scene
 from studyrunner import task_runs
 from studyrunner.cli import main
-from studyrunner.mpi import dispatch, mapped_file
+from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
-from studyrunner.mpi.mapped_file import open_mapped, ranks_that_see, write_mapped
+from studyrunner.mpi.mapped_file import UnseenFileError, open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
 from studyrunner.scene.scene import describe_scene
@@ -146,34 +146,18 @@ def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path
     assert other["n"] is None
 
 
-class Blind:
-    """Ranks of which some do not see a file."""
+def test_a_task_is_sent_again_with_what_its_rank_does_not_see():
+    sent, office = [], Office()
+    office.begin, office.take = lambda: [Job("a", 1.0)], lambda *_: []
+    office.prepare = lambda _, job, **given: sent.append(given) or job
 
-    rank = 0
+    def run(*_):
+        if len(sent) == 1:
+            raise UnseenFileError("file")
+        yield 1
 
-    def __init__(self, size, blind):
-        self.size, self._blind = size, blind
-        self._answers = []
-
-    def send(self, message, rank):
-        self._answers.append((rank, message.answer() and rank not in self._blind))
-
-    def receive(self):
-        return self._answers.pop(0)
-
-
-@pytest.mark.parametrize(("size", "blind", "expected"), [(1, (), ()), (3, (), (1, 2)), (4, (1, 3), (2,))])
-def test_ranks_that_see_a_file_are_found_and_the_file_goes(size, blind, expected, tmp_path, monkeypatch):
-    assert ranks_that_see(Blind(size, blind), tmp_path / "file") == frozenset(expected)
-    assert list(tmp_path.iterdir()) == []
-
-    def create(path, _):
-        path.touch()
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(mapped_file.Path, "open", create)
-    assert ranks_that_see(Blind(size, ()), tmp_path / "file") == frozenset()
-    assert list(tmp_path.iterdir()) == []
+    serve_tasks(Ranks(), office, run)
+    assert sent == [{}, {"unseen": True}]
 
 
 # --- what a user sees ---

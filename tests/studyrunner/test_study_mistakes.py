@@ -13,6 +13,7 @@ import pytest
 
 from studies.scene_file import write_scene
 from studyrunner.cli import main
+from studyrunner.system import progress
 from tests.mpi.launching import options
 from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import write_matrix_input
@@ -260,8 +261,10 @@ def files(tmp_path_factory):
 
 
 @pytest.fixture
-def refuses(files, capsys):
+def refuses(files, capsys, monkeypatch):
     """Runs a command that does nothing but to say lines, which begin with these words."""
+    # on a busy machine it says what it does as well
+    monkeypatch.setattr(progress, "_SECONDS_WITHOUT_A_WORD", np.inf)
 
     def run(arguments, *begins):
         with contextlib.chdir(files):

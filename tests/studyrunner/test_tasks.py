@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
-from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study_file import read_study
@@ -156,23 +155,6 @@ def test_points_above_rtol_are_computed_points(outcome, folder, solver, capsys):
     there = results().sel(frequency=110.0).squeeze()
     assert there.worn_volume.notnull().all()
     assert (there.outcome, there.message) == (int(outcome), message)
-
-
-@pytest.mark.slow
-def test_unexpected_failure_keeps_the_old_file(folder, solver, monkeypatch, capsys):
-    def fail(*_):
-        raise ZeroDivisionError("a bug")
-
-    assert main(RUN) == 0
-    earlier = (folder / "out.nc").read_bytes()
-    (folder / "out.nc.progress").unlink()
-    with monkeypatch.context() as broken:
-        broken.setattr(task_runs.StudyRun, "take", fail)
-        assert main(RUN) == 1
-    assert "ZeroDivisionError: a bug" in capsys.readouterr().err
-    assert (folder / "out.nc").read_bytes() == earlier
-    assert sorted(path.name for path in folder.iterdir()) == ["out.nc", "out.nc.progress"]
-    assert main(RUN) == 0
 
 
 def history_task(*overrides):

@@ -17,16 +17,16 @@ from studies.fe_models.from_files.export_mistakes import check_nodes_have_dofs
 from studies.fe_models.from_files.imported import import_matrices, read_recovery
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import Selections, find_clamped, find_cut, find_surfaces
-from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_cyclic_axis, find_rotation
+from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
 from studies.fe_models.model_files import UNITS, ModelFiles, Units, file_digest
 from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.joint_model import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
 from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
 from studies.scene import SurfaceMesh, build_compliant
 from studies.scene_error import SceneError
@@ -114,7 +114,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     selections = Selections(deck, mesh, parameters, units)
     if not files.matrices:
         _check_assembled(deck, units)
-    rotation, axis = find_rotation(deck, parameters, units), find_cyclic_axis(deck, parameters, units)
+    rotation, axis = find_axes(deck, parameters, units)
     contacts, ties = find_surfaces(selections, axis)
     cut, clamped = find_cut(selections, axis, contacts), find_clamped(selections)
     on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])

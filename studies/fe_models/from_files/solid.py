@@ -91,19 +91,40 @@ def _own(table: MaterialTable) -> Material:
     return Material(table.young_modulus, table.poisson_ratio, table.density)
 
 
-def find_rotation(deck: Deck, parameters: Parameters, units: Units) -> Rotation | None:
-    """Rotation that the study gives, else that of the deck, SI; None where it stands still. Raises SceneError."""
-    speed = parameters.rotation_speed
-    own = None if speed is not None and parameters.axis is not None else rotation_of_deck(deck, units)
-    if speed == 0.0 or (speed is None and own is None):
-        return None
-    axis = _axis(deck, parameters, units)
-    if own is not None and parameters.axis is None:
-        axis = own.point, own.axis
+def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotation | None, CyclicAxis | None]:
+    """Rotation and cyclic symmetry, SI, that the study gives, else the deck; None where there is none.
+
+    Raises SceneError where a speed or a number of sectors has no axis, or parts of the deck turn differently.
+    """
+    speed, given, n_sectors = parameters.rotation_speed, parameters.axis, parameters.n_sectors
+    own = None if speed is not None and given is not None else rotation_of_deck(deck, units)
+    of_study = of_sector = None
+    if given is not None:
+        of_study = np.array(given.point), _unit(np.array(given.direction))
+    if deck.cyclic is not None:
+        n_sectors = n_sectors or deck.cyclic.n_sectors
+        start, end = deck.cyclic.axis * units.length
+        of_sector = start, _unit(end - start)
+    rotation, turning = None, None if own is None else (own.point, own.axis)
+    if speed or (speed is None and own is not None):
+        axis = of_study or turning or of_sector
+        if axis is None:
+            raise SceneError("axis", "missing", "give {point, direction} of the axis of rotation: the deck has none")
+        omega_squared = own.omega_squared if speed is None and own is not None else (np.pi * (speed or 0.0) / 30.0) ** 2
+        rotation = Rotation(omega_squared, *axis)
+    if n_sectors is None:
+        for key in ("cut_faces", "next_sector"):
+            if getattr(parameters, key):
+                raise SceneError("n_sectors", "missing", f"give the number of sectors with {key}")
+        return rotation, None
+    axis = of_study or of_sector or (None if rotation is None else (rotation.point, rotation.axis))
     if axis is None:
-        raise SceneError("axis", "missing", "give {point, direction} of the axis of rotation: the deck has none")
-    omega_squared = own.omega_squared if speed is None and own is not None else (np.pi * (speed or 0.0) / 30.0) ** 2
-    return Rotation(omega_squared, *axis)
+        raise SceneError("axis", "missing", "give {point, direction} of the axis of the cyclic structure")
+    return rotation, CyclicAxis(n_sectors, *axis)
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
@@ -123,37 +144,6 @@ def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
         found = f"{deck.path}: {turning.size} of {elements.size} elements have a centrifugal load"
         raise SceneError("model", found, "give it to all of them")
     return Rotation(loads[0].omega_squared, loads[0].point * units.length, loads[0].axis)
-
-
-def find_cyclic_axis(deck: Deck, parameters: Parameters, units: Units) -> CyclicAxis | None:
-    """Axis and number of sectors that the study gives, else those of the deck; None of no sector. Raises SceneError."""
-    n_sectors = parameters.n_sectors
-    if n_sectors is None and deck.cyclic is not None:
-        n_sectors = deck.cyclic.n_sectors
-    if n_sectors is None:
-        for key in ("cut_faces", "next_sector"):
-            if getattr(parameters, key):
-                raise SceneError("n_sectors", "missing", f"give the number of sectors with {key}")
-        return None
-    found = _axis(deck, parameters, units)
-    if found is None:
-        rotation = find_rotation(deck, parameters, units)
-        if rotation is None:
-            raise SceneError("axis", "missing", "give {point, direction} of the axis of the cyclic structure")
-        found = rotation.point, rotation.axis
-    return CyclicAxis(n_sectors, *found)
-
-
-def _axis(deck: Deck, parameters: Parameters, units: Units) -> tuple[FloatArray, FloatArray] | None:
-    """Point, m, and direction of the axis, of unit length, that the study or the cyclic deck gives."""
-    if parameters.axis is not None:
-        point, along = np.array(parameters.axis.point), np.array(parameters.axis.direction)
-    elif deck.cyclic is not None:
-        point, end = deck.cyclic.axis * units.length
-        along = end - point
-    else:
-        return None
-    return point, along / np.linalg.norm(along)
 
 
 def check_units(deck: Deck, mass: float | None, units: Units) -> None:

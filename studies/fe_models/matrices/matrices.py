@@ -130,18 +130,14 @@ def _symmetric(entries: Entries, labels: IntArray) -> sp.csr_array:
     if matrix.nnz < values.size:
         wrong(file, f"{values.size - matrix.nnz} entries are given twice", "export it again")
     twin = matrix.T.tocsr()
-    if _have_entry_in_common(sp.triu(matrix, 1, "csr"), sp.triu(twin, 1, "csr")):
+    # entries that may be 0 stand in both triangles, beside those of the diagonal
+    stored = sp.csr_array((np.ones(matrix.nnz, dtype=bool), matrix.indices, matrix.indptr), shape=(n, n))
+    if stored.multiply(stored.T).nnz > np.count_nonzero(places[0] == places[1]):
         difference = abs(matrix - twin)
         if difference.nnz and difference.max() > _ASYMMETRY * abs(values).max():
             wrong(file, "the matrix is not symmetric", "export it without damping, gyroscopic terms and friction")
         return sp.csr_array((matrix + twin) / 2)
     return sp.csr_array(matrix + twin - sp.diags_array(matrix.diagonal()))
-
-
-def _have_entry_in_common(one: sp.csr_array, other: sp.csr_array) -> bool:
-    """Whether an entry, which may be 0, stands in both matrices."""
-    patterns = [sp.csr_array((np.ones(a.nnz, dtype=bool), a.indices, a.indptr), shape=a.shape) for a in (one, other)]
-    return bool(patterns[0].multiply(patterns[1]).nnz)
 
 
 def _forces(entries: Entries, labels: IntArray) -> FloatArray:

@@ -4,9 +4,9 @@ import numpy as np
 
 from studies.finite_element.cut_faces import CyclicAxis, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
-from studies.finite_element.joint_model import FeModel, JointDefinition, mean_motion
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.structure import FeModel, JointDefinition, mean_motion
 from studies.finite_element.surfaces import surface_of_faces
 from tests.studies.fe_models.solid_meshes import block, joined
 

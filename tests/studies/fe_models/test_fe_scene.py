@@ -8,16 +8,10 @@ from scipy import linalg
 
 from studies.fe_models.from_files.check import describe_rest
 from studies.finite_element import reduction
-from studies.finite_element.joint_model import (
-    FeModel,
-    JointDefinition,
-    ReductionOptions,
-    Retainer,
-    mean_motion,
-)
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.finite_element.solid_mesh import Material, Rotation, assemble_mass, assemble_stiffness, spin_softening
+from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import surface_of_nodes
 from studies.model_check import check_model
 from studies.scene_error import SceneError

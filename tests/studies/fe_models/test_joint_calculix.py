@@ -11,9 +11,9 @@ from studies.fe_models.from_files.model import find_files, load_model, reduce_mo
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.model_files import UNITS
-from studies.finite_element.joint_model import FeModel, ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import Rotation
+from studies.finite_element.structure import FeModel, ReductionOptions
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import listed_frequencies
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z

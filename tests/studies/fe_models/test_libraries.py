@@ -63,6 +63,11 @@ def test_gmsh_41(tmp_path):
     sets = {name: nodes.tolist() for name, nodes in deck.node_sets.items()}
     assert sets == {"UNDER": [1, 2, 3], "BLOCK": [1, 2, 3, 4, 5]}
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
+    # words of Python say nothing of the file
+    with pytest.raises(
+        SceneError, match=r"mesh.msh is damaged, or of a kind that meshio does not know; write it again"
+    ):
+        read_mesh_file(write(tmp_path, GMSH_41.replace("1 5 1 5", "1 5 x 5")))
 
 
 def write_cdb(folder, commands, types):
