@@ -59,7 +59,7 @@ def wall_history(step, scheme, end=1000.0):
 @pytest.mark.parametrize(("share", "impacts"), [(0.98, True), (1.02, False)])
 def test_the_exact_branch_ends_at_the_depth_of_the_jump(share, impacts):
     depth = share * wall_history(5.0, "implicit").wear_depth[-1, 0]
-    orbit = vibro_impact_orbit(1.0, 0.05, 1.0, FORCE, 100.0, GAP + depth, OMEGA, sweep_start=0.7)
+    orbit = vibro_impact_orbit(1.0, 0.05, 1.0, FORCE, 100.0, GAP + depth, OMEGA, begin=0.7)
     assert (abs(orbit.harmonic(0)) > 0.05) == impacts
 
 

@@ -9,7 +9,7 @@ from solver import Outcome, SolverSettings, balance_of, build_model, frequency_r
 from solver.stability.floquet import Multipliers
 from tests.benchmarks.ring import FRICTION, WEAR, ring_in_time
 from tests.contact_pair import ContactPair
-from tests.ring_of_masses import one_sector
+from tests.rings import one_sector
 from tests.solver.models import OMEGA, cyclic_model, random_model, scene
 from tests.solver.reconstruction import harmonic_structure
 from tests.solver.test_continuation import GRAZING, WALL_OMEGA

@@ -19,7 +19,7 @@ from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, Standing
 from studyrunner.task_runs import TaskProgress
-from tests.benchmarks.simulation import MemoryIndex
+from tests.benchmarks.scheduling import MemoryIndex
 from tests.studyrunner.fakes import fake_history, fake_sweep, plan_of
 
 
