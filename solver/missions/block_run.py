@@ -17,7 +17,7 @@ from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import states_of_sweeps
-from solver.loading_history.sweep import KEPT_NODES, STEPS_OF_REFERENCE
+from solver.loading_history.sweep import LAST_NODES, STEPS_OF_REFERENCE
 from solver.missions.mission import Block, MissionRequest, Passage
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
@@ -286,7 +286,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
     while ahead:
         after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
         if after is not None and coarse.change(states[-1], after) <= LARGEST_CHANGE * stride:
-            states = (*states, after)[-KEPT_NODES:]
+            states = (*states, after)[-LAST_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > ATTEMPTS:
             return None
