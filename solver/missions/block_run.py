@@ -179,11 +179,11 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         problem = WearProblem(given.at(start), start, asked, stable_end=given.with_switching)
     else:
         problem = reference_of(given.at(start), start, asked, given.guide, counts)
-    ended = Integrator(given.time_left).integrate(problem)
-    state = ended.state
-    if state is None or ended.failure.outcome is not Outcome.CONVERGED:
-        return ended.failure
-    values, slope = ended.course.read(counts), None
+    solution = Integrator(given.time_left).integrate(problem)
+    state = solution.state
+    if state is None or solution.end.outcome is not Outcome.CONVERGED:
+        return solution.end
+    values, slope = solution.course.read(counts), None
     depth = values["wear_depth"]
     volume = float(depth[-1] @ given.mission.area)
     if given.with_slope:
@@ -205,7 +205,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         guide=Guide(state.resolutions, state.first_length),
         last=_last(state, start) if given.is_continued else None,
         begun=begun,
-        iterations=start.newton_iterations + ended.iterations,
+        iterations=start.newton_iterations + solution.iterations,
     )
 
 

@@ -175,7 +175,7 @@ def integrate_missions(
     """
     integrator = Integrator(mission.settings.time_limit, keep, resume)
     fine = integrator.integrate(MissionProblem(mission))
-    if fine.state is not None and fine.failure.outcome not in ENDS_ALL:
+    if fine.state is not None and fine.end.outcome not in ENDS_ALL:
         fine = replace(fine, compared=integrator.integrate(MissionProblem(mission, fine), fine.seconds))
     history = _assembled(mission, fine)
     if history.outcome is not Outcome.CONVERGED:
@@ -202,8 +202,8 @@ def _assembled(mission: MissionRequest, fine: Solution) -> MissionHistory:
         response_peak_end=values["response_peak"][:, :, 1],
         response_error=np.array([each.response for each in blocks]).T,
         excitation_frequency=np.array([block.ends for block in mission.blocks]),
-        outcome=fine.ended.outcome,
-        message=fine.ended.message,
+        outcome=fine.end_of_all.outcome,
+        message=fine.end_of_all.message,
         missions=counts,
         worn_volume=depth @ area,
         worn_volume_error=whole.worn_volume,
