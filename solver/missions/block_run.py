@@ -18,14 +18,14 @@ from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import states_of_sweeps
 from solver.loading_history.sweep import LAST_NODES, STEPS_OF_REFERENCE
-from solver.missions.mission import Block, MissionRequest, Passage
+from solver.missions.mission import Block, MissionRequest
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import periodic_state
-from solver.settings import Direction, Resolution
+from solver.settings import Direction, Passage, Resolution
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
 from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of

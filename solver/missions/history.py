@@ -14,7 +14,7 @@ from solver.accuracy.history_error import HistoryError, error_of_target
 from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import Begun, BlockInput, BlockResult, run_block
-from solver.missions.mission import MissionHistory, MissionRequest, Passage
+from solver.missions.mission import MissionHistory, MissionRequest
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
@@ -22,6 +22,7 @@ from solver.newton.run import Budget, guarded
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, packable
 from solver.results.history import describe_cut_off, describe_uncertain
+from solver.settings import Passage
 from solver.wear.history import compare
 from solver.wear.slow_time import (
     ENDS_ALL,

@@ -9,9 +9,9 @@ import pytest
 from solver.harmonic_balance.state import Failure
 from solver.missions import history as missions
 from solver.missions.block_run import BlockResult
-from solver.missions.mission import Passage
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
+from solver.settings import Passage
 from solver.wear.slow_time import Guide
 from studyrunner import task_runs
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
