@@ -1,5 +1,8 @@
 """The command `study-report`: what it writes, what it says, how it ends."""
 
+import errno
+import os
+
 import pytest
 
 from studyrunner.report import contents
@@ -60,6 +63,13 @@ def test_bad_input_is_one_line(draw, tmp_path, capsys, arguments, key):
     assert line.startswith("study-report: ")
     assert key in line
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results", "text.nc"]
+
+
+def test_a_full_disk_is_one_line(draw, capsys):
+    draw(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+    assert main(["results/worn.x.nc", "-o", "out", "--no-compute"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith('study-report: command line: -o = "out": ')
 
 
 def test_failures_have_a_traceback_and_signals_have_none(draw, capsys):
