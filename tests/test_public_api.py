@@ -318,6 +318,7 @@ def test_a_point_that_fails_is_one_point():
         ({"area": 0.0}, "area: give a positive area, m2, to every contact pair"),
         ({"load_harmonic": [1.0]}, "load_harmonic: give shape (2,) instead of (1,)"),
         ({"response": [2]}, "response: give whole numbers from 0 to 1"),
+        ({"response": []}, "response: give at least one displacement"),
         ({"surface": "left"}, "surface: give 1 texts"),
     ],
 )
@@ -345,6 +346,8 @@ def test_what_is_wrong_with_matrices_is_said_in_one_line(change, message):
         ({"scheme": "euler", "step": 1.0}, "scheme: give one of explicit, implicit, adaptive, final instead of 'eul"),
         ({"scheme": "implicit"}, 'step: give the length of a step in cycles to the scheme "implicit"'),
         ({"settings": SolverSettings(harmonics=5, samples=10)}, "settings.samples: give more than 10"),
+        ({"law": "energy"}, "law: give WearLaw(...)"),
+        ({"until": 1e-6}, "until: give WearTarget(...)"),
     ],
 )
 def test_what_is_wrong_with_a_march_is_said_in_one_line(change, message):
