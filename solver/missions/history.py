@@ -21,7 +21,7 @@ from solver.model import FloatArray
 from solver.newton.run import Budget, guarded
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, packable
-from solver.results.history import describe_cut_off, describe_uncertain
+from solver.results.history import describe_cut_off, describe_uncertain, last_error
 from solver.settings import Passage
 from solver.wear.history import compare
 from solver.wear.slow_time import (
@@ -214,7 +214,9 @@ def _assembled(mission: MissionRequest, fine: Solution) -> MissionHistory:
         block_volume_error=np.array([each.worn_volume for each in blocks]).T,
         reference_volume=other @ area,
         sweep_rate=np.zeros(n_block) if state is None else state.sweep_rate,
-        error_estimate=float(whole.worn_volume[reached[-1]]) if reached.size else math.nan,
+        error_estimate=last_error(
+            counts[reached], whole.worn_volume[reached], values["wear_rate"][reached], course.ends[-1]
+        ),
         last_mission=course.ends[-1],
         steps=np.diff(course.ends),
         missions_to_target=target,

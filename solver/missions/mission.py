@@ -94,7 +94,7 @@ class MissionHistory(Presented):
     - reference_volume (n_output,): m3, worn volume of the reference solution.
     - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, of the damping ratio of the joint at rest; 0 where
       nothing wears and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
-    - error_estimate: `worn_volume_error` at the last number that was reached.
+    - error_estimate: `worn_volume_error` at the last number that was reached; NaN at 0 where the joint wears.
     - last_mission: number of missions that were computed. steps (n_step,): missions in each step.
     - missions_to_target, missions_to_target_error: number at which the target was reached, and its error; NaN if never.
     - newton_iterations, run_time, CPU seconds: of history and reference solution.

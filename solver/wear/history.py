@@ -54,7 +54,8 @@ def integrate_together(
         history = _assembled(model, start, each, own)
         # the counts that were reached
         rows = np.flatnonzero(np.isfinite(history.worn_volume))
-        history = replace(history, error_estimate=last_error(history, rows, history.last_cycle))
+        reached = (history.cycles[rows], history.worn_volume_error[rows], history.wear_rate[rows])
+        history = replace(history, error_estimate=last_error(*reached, history.last_cycle))
         if history.outcome is Outcome.CONVERGED:
             outcome, message = judge(history, rows, settings.rtol)
             history = replace(history, outcome=outcome, message=message)

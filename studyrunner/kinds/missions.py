@@ -13,6 +13,7 @@ import numpy as np
 from solver.contact.wear_law import WearLaw
 from solver.missions.mission import Begin, Block, MissionRequest
 from solver.packing import Packed
+from solver.results.history import last_error
 from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
 from studyrunner.kinds.task import (
@@ -208,7 +209,12 @@ def _values(task: Mission, history: MissionHistory) -> dict[str, Any]:
         "wear_depth_error": depth_error,
         "outcome": int(history.outcome),
         # a mission is computed for the vibration at 0
-        "error_estimate": history.error_estimate if counts[-1] > 0.0 else 0.0,
+        "error_estimate": last_error(
+            counts[reached],
+            history.worn_volume_error[rows[reached]],
+            rate[reached],
+            min(history.last_mission, counts[-1]),
+        ),
         "last_mission": min(history.last_mission, float(counts[-1])) if is_state else math.nan,
         "largest_wear_depth": float(last.max(initial=0.0)) if reached.size else math.nan,
         "message": "; ".join(filter(None, (history.message, target))),
