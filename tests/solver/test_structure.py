@@ -56,8 +56,7 @@ def test_analysis_undoes_synthesis_for_any_orders(orders, extra, seed):
 
 
 @pytest.mark.parametrize(
-    ("orders", "wanted"),
-    [((1, 2, 3, 4, 5), (1, 3, 5)), ((1, 3, 5), (1, 2, 5, 8)), ((), (1, 3)), ((1, 3), ())],
+    ("orders", "wanted"), [((1, 2, 3, 4, 5), (1, 3, 5)), ((1, 3, 5), (1, 2, 5, 8)), ((), (1, 3)), ((1, 3), ())]
 )
 def test_changed_orders_keep_the_harmonics_that_both_have(orders, wanted):
     values_h = np.random.default_rng(3).normal(size=(2, 3, 2 * len(orders) + 1))

@@ -37,13 +37,7 @@ def slider_start() -> tuple[ReducedModel, StartState]:
 
 
 def march(
-    step: float,
-    scheme: Scheme,
-    cycles: FloatArray = CYCLES,
-    *,
-    wear: float = WEAR,
-    rtol: float = 1e-2,
-    **asked: object,
+    step: float, scheme: Scheme, cycles: FloatArray = CYCLES, *, wear: float = WEAR, rtol: float = 1e-2, **asked: object
 ) -> WearHistory:
     """The history of the slider; asked: as of `models.march_wear`."""
     model, start = slider_start()
