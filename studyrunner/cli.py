@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 import time
 import traceback
@@ -291,7 +292,7 @@ def _new_study(name: str, deck: Path | None) -> str:
     from studyrunner.study.keys import write_new_study
 
     path = write_new_study(name, deck)
-    return f"{path}: run-study {path} computes it"
+    return f"{path}: run-study {shlex.quote(str(path))} computes it"
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ LONGEST_AXIS = 100_000
 """Values of an axis: the effective study, which lists them, is to be read again."""
 
 _LARGEST_WHOLE = 2.0**53
+_TOO_LARGE = 1e100  # its square is still a number
 
 
 class Wrong(NamedTuple):
@@ -102,8 +103,8 @@ def read_axis(value: object) -> tuple[Any, ...]:
     return once(values)
 
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0, lt=_TOO_LARGE)]
+NotNegative = Annotated[float, Field(ge=0, lt=_TOO_LARGE)]
 Fraction = Annotated[float, Field(gt=0, lt=1)]
 Whole = Annotated[int, Field(strict=False), BeforeValidator(_no_text)]
 """A whole number; 5.0 and 1e4 are whole numbers, too, true and "5" are not."""

@@ -64,7 +64,7 @@ class FrequencySweep:
     model: ReducedModel
     friction_coefficient: float | FloatArray | None
     excitation_amplitude: float
-    sweep: Direction
+    direction: Direction
     settings: SolverSettings
     every: bool = True
     known: tuple[tuple[float, Resolution], ...] = ()
@@ -105,8 +105,8 @@ class FrequencySweep:
         its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
         """
         omega = 2.0 * np.pi * frequency
-        present = self._new_sweep(cell_of(frequency), omega if self.sweep == "ramp" else None)
-        present.direction = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
+        present = self._new_sweep(cell_of(frequency), omega if self.direction == "ramp" else None)
+        present.sign = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
         return present.begin(replace(present.path, case=case), state)
 
     def advance(self, frequency: float) -> StartState | Failure:
@@ -147,14 +147,14 @@ class FrequencySweep:
         beyond: whether the present sweep will do although it has passed the frequency.
         """
         omega, cell, present = 2.0 * np.pi * frequency, cell_of(frequency), self.present
-        ramp = omega if self.sweep == "ramp" else None
+        ramp = omega if self.direction == "ramp" else None
         if present is not None and (self.cell, self.omega) == (cell, ramp):
-            passed = present.last is not None and (omega - present.last.parameter) * present.direction < 0.0
+            passed = present.last is not None and (omega - present.last.parameter) * present.sign < 0.0
             if ramp or beyond or not passed:
                 return present
         present = self._new_sweep(cell, ramp)
         present.budget.limit = FIRST_ITERATIONS
-        place = 2.0 * np.pi * first_frequency(self.model, cell, self.sweep) if ramp is None else FREE_STEP
+        place = 2.0 * np.pi * first_frequency(self.model, cell, self.direction) if ramp is None else FREE_STEP
         present.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
         first = self._first(present.path, place, present.run)
         if isinstance(first, Failure):
@@ -168,9 +168,9 @@ class FrequencySweep:
         # the penalty belongs to the upper end of the cell
         case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * edge_of(cell + 1), self.settings)
         path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
-        budget, direction = Budget(deadline=of.deadline, report=of.report), -1.0 if self.sweep == "down" else 1.0
+        budget, sign = Budget(deadline=of.deadline, report=of.report), -1.0 if self.direction == "down" else 1.0
         self.cell, self.omega = cell, omega
-        self.present = Sweep(path, direction, budget, with_reference=not self.known, save=self.save)
+        self.present = Sweep(path, sign, budget, with_reference=not self.known, save=self.save)
         return self.present
 
     def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Failure:

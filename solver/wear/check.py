@@ -22,7 +22,7 @@ from solver.results.state_report import report_state
 from solver.settings import NEGLIGIBLE, Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.jump import creeps, free_slide
-from solver.wear.slow_time import AS_ASKED, Course
+from solver.wear.slow_time import REGULAR_END, Course
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
@@ -138,10 +138,10 @@ def unstable_at_end(setup: WearingJoint, state: WearState) -> Failure | None:
 
 
 def end_of_wear(state: WearState, course: Course, final_share: float) -> Failure | None:
-    """Why a history to the end of wear ends: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
+    """Why a history to the end of wear ends: REGULAR_END, or NO_FINAL_STATE where wear has no end; None to go on."""
     largest = state.largest_rates[:-1]
     if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():
-        return AS_ASKED
+        return REGULAR_END
     n_steps = len(course.ends) - 1
     if state.depth.max() > DEEPEST or state.cycle > LONGEST_HISTORY or n_steps >= STEPS_TO_THE_END:
         at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"

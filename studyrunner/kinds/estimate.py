@@ -62,7 +62,7 @@ def iterations_of_mode(n_amplitudes: int) -> int:
     return _OF_MODE + _A_MODE_POINT * (n_amplitudes - 1)
 
 
-def iterations_of_histories(steps: Sequence[tuple[str, float]], cycles: float) -> int:
+def iterations_of_histories(steps: Sequence[tuple[str, float]], cycles: float) -> float:
     """Newton iterations of histories over so many cycles from one state where the joint wears.
 
     steps: scheme and step of each. Those with given steps are compared with the adaptive history.
@@ -70,7 +70,7 @@ def iterations_of_histories(steps: Sequence[tuple[str, float]], cycles: float) -
     if cycles == 0.0:
         return _A_STEP
     given = [step for scheme, step in steps if scheme not in ("adaptive", "final")]
-    n_steps = sum(max(1, math.ceil(cycles / step)) if cycles < math.inf else _STEPS_TO_THE_END for step in given)
+    n_steps = sum(max(1.0, cycles / step) if cycles < math.inf else _STEPS_TO_THE_END for step in given)
     adaptive = _ADAPTIVE_STEPS if cycles < math.inf else _STEPS_TO_THE_END
     return _AN_ADAPTIVE_STEP * adaptive + _A_STEP * n_steps
 
@@ -110,7 +110,7 @@ def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_wi
 
 
 def largest_memory() -> float:
-    """Largest memory of this process so far, bytes; 0 where the system does not tell.
+    """Largest memory of this process so far, bytes; 0 where the system does not say.
 
     `getrusage` is not used: its value includes the memory of the process that has started this one.
     """

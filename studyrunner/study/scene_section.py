@@ -73,7 +73,7 @@ class Worn(Section):
     def rules(self) -> Iterator[Wrong]:
         """Each state has a cycle count, or none where there is one state."""
         if len(self.depth) != max(1, len(self.cycle)):
-            found = Verbatim(f"{len(self.depth)} states with {len(self.cycle)} cycle counts")
+            found = Verbatim(f"{counted(len(self.depth), 'state')} with {counted(len(self.cycle), 'cycle count')}")
             remedy = "give one cycle count in scene.worn.cycle for each state, or one state without a count"
             yield Wrong("depth", found, remedy)
 

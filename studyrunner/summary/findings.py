@@ -149,17 +149,17 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
 
 
 def _nothing(result: Result, resonance: str) -> Finding:
-    """Why no point that was computed to the end wears."""
+    """Why no point whose worn volume is known wears."""
     slip, why = math.nan, ""
     if result.has("slip_range"):
         largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=-1))
         slip = float(largest[result.best_known].max())
         slip = slip if slip >= _NO_MOTION else 0.0
         why = f": pairs slip by up to {_show(slip, 'm')} without wear" if slip else ": all pairs stick"
-    n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
+    n_points, n_known = result.usable.size, int(np.count_nonzero(result.usable))
     where = f"at all {n_points} points" if n_points > 1 else f"at {where_is(result, result.shown)}"
-    if n_computed < n_points:
-        where = f"at {n_computed} of {n_points} points, the others have no result"
+    if n_known < n_points:
+        where = f"at {n_known} of {count(n_points, 'point')}, the worn volume of the others is not known"
     text = f"nothing wore{why} {where}" + (f" ({resonance})" if resonance else "")
     return Finding("wear", "wear", text, {"worn_volume": 0.0, "largest_slip": slip})
 
@@ -252,15 +252,17 @@ def shortest_life(result: Result) -> Finding | None:
     reaches = (
         f"{quantity.replace('_', ' ')} {_show(target, {'wear_depth': 'm', 'worn_volume': 'm3'}.get(quantity, '1'))}"
     )
-    unsure = f"; the life of {count(n_unsure, 'point')} is not known" if n_unsure else ""
+    unsure = f"the life of {count(n_unsure, 'point')} is not known" if n_unsure else ""
     values = {"target": target, "count": math.nan, "n_beyond": n_beyond, "n_unsure": n_unsure}
     if np.isnan(lives).all():
-        text = f"no {'other ' if unsure else ''}point computed to the end reaches {reaches}{unsure}"
+        none = f"no {'other ' if unsure else ''}point computed to the end reaches {reaches}"
+        text = "; ".join(filter(None, ("" if unsure and not n_beyond else none, unsure)))
         return Finding("life", "life", text, values)
     point = result.largest(-np.nan_to_num(lives, nan=np.inf))
     life, error = (float(each[result.place(point)]) for each in (lives, errors))
-    known = f"± {show_percent(error / life)}" if math.isfinite(error) else "(error not known)"
-    text = f"{show_cycles(round(life), result.counted)} {known} to {reaches} at {where_is(result, point)}{unsure}"
+    known = f"± {show_percent(error / life)}" if math.isfinite(error) and life > 0.0 else "(error not known)"
+    text = f"{show_cycles(round(life), result.counted)} {known} to {reaches} at {where_is(result, point)}"
+    text += f"; {unsure}" if unsure else ""
     text += f"; not reached by {count(n_beyond, 'point')}" if n_beyond else ""
     return Finding("life", "life", text, values | {"count": life, "error": error, "point": point})
 

@@ -50,6 +50,7 @@ WRONG = {
         scene.area=-1e-4
         scene.mass=[1.0, 2.0]
         axes.frequency=fast
+        axes.frequency=[1, 1e200] -> axes.frequency = 1e+200
         axes.step=2026-11-26
         axes.frequency=[1, 2, 1.0] -> axes.frequency = 1.0
         axes.frequency={{start = 1, stop = 2}}
@@ -134,6 +135,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         axes.frequency=peak ; loading.between=[1, 2] -> axes.frequency
         axes.normal_load=[1, 2] ; mission.0.normal_load=1.0 ; mission.1.normal_load=1.0 -> axes.normal_load
         mission.cruise.frequency={start=1.0, stop=2.0}
+        mission.run-up.frequency={start=1.0, stop=1e300, rate=1.0} -> mission.run-up.frequency.stop
         mission.heavy.engine_order=4
         mission.cruise.engine_order=4 -> axes.frequency
         mission.heavy.begin=continue

@@ -105,11 +105,6 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
 # --- nothing wore ---
 
 
-def test_a_joint_that_does_not_move_has_no_amplitude_of_round_off():
-    made = wearing("axes.frequency=100", volume=lambda _: 0.0, response_amplitude=lambda _: np.full((21, 1), 4e-25))
-    assert any("does not move" in line for line in summary(made).lines)
-
-
 def test_nothing_wore_says_why():
     still = summary(wearing("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive", volume=lambda _: 0.0))
     assert still.values["wear"] == {"worn_volume": 0.0, "largest_slip": 0.0}
@@ -117,6 +112,9 @@ def test_nothing_wore_says_why():
     assert summary(slips).values["wear"]["largest_slip"] == 1e-6
     some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)
     assert "at 3 of 9 points" in summary(some).lines[0]
+    two = ("axes.frequency=[1, 2]", "axes.scheme=adaptive")
+    unknown = wearing(*two, volume=lambda p: 1e-9 * p[0], error_estimate=lambda p: 0.01 + p[0])
+    assert "at 1 of 2 points" in summary(unknown).lines[0]
     stuck = summary(
         made_result(read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))).assign(
             stuck_frequency=212.6
@@ -172,6 +170,14 @@ def test_the_shortest_life():
     never = summary(made.assign(cycles_to_target=made["cycles_to_target"] * math.nan)).values["life"]
     assert math.isnan(never["count"])
     assert never["n_beyond"] == 3
+    unsure = made.assign(cycles_to_target_error=1e9 + made["cycles_to_target"]).isel(frequency=[0])
+    assert dict(summary(unsure).rows)["life"] == "the life of 1 point is not known"
+    at_once = summary(
+        made.assign(
+            cycles_to_target=made["cycles_to_target"] * 0.0, cycles_to_target_error=0.0 * made["cycles_to_target"]
+        )
+    )
+    assert at_once.values["life"]["count"] == 0.0
 
 
 def test_a_target_before_the_second_count_and_one_without_a_unit():
