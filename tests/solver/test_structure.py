@@ -225,13 +225,11 @@ def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series():
     cycles = np.array([0.0, 100.0, 250.0])
     expected = slider_wear_depth(
         cycles,
-        wear_coefficient=1.1e-14,
-        area=1e-4,
-        friction_coefficient=0.5,
+        lambda friction: den_hartog_amplitude(0.1, 1.6e5, 10.0, friction, 2.0 * np.pi * 160.0),
+        wear=1.1e-14,
         # the far end of the pressing spring stays where it is
-        normal_load=10.0 / (1.0 + 5e10 / 1e11),
-        normal_stiffness=1.0 / (1.0 / 5e10 + 1.0 / 1e11),
-        amplitude=lambda friction: den_hartog_amplitude(0.1, 1.6e5, 10.0, friction, 2.0 * np.pi * 160.0),
+        load=10.0 / (1.0 + 5e10 / 1e11),
+        stiffness=1.0 / (1.0 / 5e10 + 1.0 / 1e11),
     )
     history = march_wear(build_scene("sdof_slider", **springs), 160.0, 10.0, 0.5, 1.1e-14, cycles)
     assert expected[-1] > 0.3 * 10.0 / 5e10

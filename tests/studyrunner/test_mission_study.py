@@ -122,6 +122,11 @@ def test_a_target_ends_the_missions(blocks):
     assert (result.missions_to_target_error > 0.0).all()
     assert all("later missions are not computed" in message for message in result.message.values.ravel())
     assert summary(result).values["life"]["count"] == fast
+    # no number is stored of what has worn then
+    early = run(*LINE, f"slow_time.until={{worn_volume={1e-3 * goal!r}}}")
+    assert (early.missions_to_target < early.mission[1]).all()
+    assert np.isnan(early.error_estimate).all()
+    assert "nothing wore" not in str(summary(early))
 
 
 @pytest.mark.slow

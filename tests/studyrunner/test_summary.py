@@ -112,6 +112,8 @@ def test_nothing_wore_says_why():
     assert summary(slips).values["wear"]["largest_slip"] == 1e-6
     some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)
     assert "at 3 of 9 points" in summary(some).lines[0]
+    early = wearing("axes.frequency=1", volume=lambda _: np.where(np.arange(21.0) > 5, np.nan, 1e-9))
+    assert "worn_volume" not in summary(early.isel(cycle=[-1])).values.get("wear", {})
     two = ("axes.frequency=[1, 2]", "axes.scheme=adaptive")
     unknown = wearing(*two, volume=lambda p: 1e-9 * p[0], error_estimate=lambda p: 0.01 + p[0])
     assert "at 1 of 2 points" in summary(unknown).lines[0]

@@ -83,7 +83,8 @@ def test_points_know_their_task():
 def printed_plan(overrides, capsys, study="sdof_slider"):
     assert main([study, "--plan", *options(*overrides)]) == 0
     captured = capsys.readouterr()
-    assert captured.err == ""
+    # progress, where the machine is slow
+    assert all("building scene" in line for line in captured.err.splitlines())
     return {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
 
 

@@ -1,5 +1,7 @@
 """The result file as the report reads it, how well volumes are known, and the command `study-report`."""
 
+import errno
+import os
 from html import unescape
 
 import numpy as np
@@ -156,6 +158,13 @@ def test_bad_input_is_one_line(draw, tmp_path, capsys, arguments, key):
     assert line.startswith("study-report: ")
     assert key in line
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results", "text.nc"]
+
+
+def test_a_full_disk_is_one_line(draw, capsys):
+    draw(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+    assert main(["results/worn.x.nc", "-o", "out", "--no-compute"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith('study-report: command line: -o = "out": ')
 
 
 @pytest.mark.processes
