@@ -13,6 +13,8 @@ import pytest
 
 from studyrunner import task_runs
 from studyrunner.cli import main
+from studyrunner.mpi import dispatch
+from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.mapped_file import open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import TaskHandler, serve_tasks
@@ -180,3 +182,24 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
             assert progress.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
     assert progress.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
     assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
+
+
+def test_what_waits_is_bounded(monkeypatch):
+    """A sweep does not go first where more waits than all ranks have use for."""
+    monkeypatch.setattr(dispatch, "_WAITING", 10)
+    monkeypatch.setattr(dispatch, "_WAITING_A_RANK", 0)
+    dispatcher = Dispatcher(1, CostModel(), time.monotonic)
+    dispatcher.add([Job("sweep", 1.0, 4, True)] * 50)
+    most, n_done, waiting = 0, 0, 0
+    while not dispatcher.done:
+        ((rank, number, task),) = dispatcher.assign()
+        for _ in range(task.n_results):
+            dispatcher.deliver(rank, number, 1.0)
+            if task.gives_starts:
+                dispatcher.add([Job("history", 1.0)])
+                waiting += 1
+        if not task.gives_starts:
+            n_done, waiting = n_done + 1, waiting - 1
+        most = max(most, waiting)
+    assert (n_done, waiting) == (200, 0)
+    assert most < 10 + 4

@@ -5,11 +5,13 @@ import pytest
 
 from studyrunner import open_result
 from studyrunner.accessor import join_results
+from studyrunner.cli import main
 from studyrunner.report.figures.wear import draw_excitation
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from studyrunner.variables import CERTIFICATE, LOOPS, OF_A_HISTORY, USUAL
+from tests.mpi.launching import options
 from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import UNWORN, compute
 
@@ -194,3 +196,17 @@ def test_a_study_with_shortcuts_is_one_without(overrides):
     assert (worn.where(short.wear_coefficient > 0.0, drop=True) > 0.0).all() == (UNWORN[0] not in overrides)
     force = long.loop_force.isel(component=0).mean("phase")
     np.testing.assert_allclose(force, long.mean_pressure * long.contact_area, rtol=1e-9)
+
+
+def test_every_point_without_a_resonance_says_why(capsys):
+    # so little excitation that the slider sticks: its resonance is far above the range
+    small = ("axes.excitation_amplitude=1.0", "slow_time.cycles=10.0", "scatter.samples=2")
+    scatter = "scatter.excitation_amplitude={uniform={half_width=0.1}}"
+    assert main(["sdof_slider", "-o", "out.nc", *options(*FOLLOWED, *small, scatter)]) == 3
+    said = capsys.readouterr().out
+    with open_result("out.nc") as result:
+        messages = {str(message) for message in result.message.values.ravel()}
+    assert messages == {"the sweep up meets no resonance between 180 and 230 Hz: give another range"}
+    assert "another axes.sweep" in said
+    assert "ramp" not in said
+    assert "205 Hz" not in said
