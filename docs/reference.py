@@ -20,8 +20,8 @@ from studyrunner.study.keys import key_list
 from studyrunner.variables import (
     ASKED,
     COUNTS,
-    KEPT,
     LOOPS,
+    OF_A_HISTORY,
     OF_A_MISSION,
     OF_A_MODE_POINT,
     OF_MISSIONS,
@@ -32,7 +32,7 @@ from studyrunner.variables import (
 
 def reference() -> str:
     """All lists, Markdown, each under a heading of the second level."""
-    wear = ASKED | COUNTS | LOOPS | KEPT | SCENE["exact"] | SCENE["natural_frequency"] | SCENE["mesh"]
+    wear = ASKED | COUNTS | LOOPS | OF_A_HISTORY | SCENE["exact"] | SCENE["natural_frequency"] | SCENE["mesh"]
     sections = {
         "Keys of a study file": key_list(),
         "Bundled scenes": "\n\n".join("#" + scene_help(model) for model in BUNDLED),

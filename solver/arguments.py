@@ -40,7 +40,7 @@ def check_settings(model: ReducedModel, settings: SolverSettings) -> None:
         if check_number(f"settings.{name}", getattr(settings, name), above=0.0) >= 1.0:
             raise ValueError(f"settings.{name}: give a number between 0 and 1")
     highest = 1 if settings.harmonics == "auto" else settings.harmonics
-    if not model.holds(highest):
+    if not model.has_harmonics(highest):
         raise ValueError(f"the model does not hold the nodal diameters that harmonics up to {highest} see")
     if settings.samples != "auto" and settings.samples <= 2 * highest:
         raise ValueError(f"settings.samples: give more than {2 * highest}, twice the harmonics")

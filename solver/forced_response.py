@@ -154,7 +154,7 @@ def _read(
     joint = case.joint(state.omega, state.excitation_amplitude)
     at = evaluated(joint, state)[1]
     pressure = state.contact_force_h[:, 0, 0] / model.contact.area
-    if not math.isnan(first_cut_off(model.contact, np.zeros(1), pressure[None], state.wear_depth[None])):
+    if not math.isnan(first_cut_off(model.contact, np.zeros(1), pressure[None], np.zeros_like(pressure[None]))):
         outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
     elif outcome is Outcome.INACCURATE:
         error, name = max((start.wear_rate_error, "wear rate"), (start.response_error, "response"))

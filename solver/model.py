@@ -120,7 +120,7 @@ class ReducedModel:
             f"  responses          {', '.join(self.response_names)}"
         )
 
-    def holds(self, n_harmonics: int) -> bool:
+    def has_harmonics(self, n_harmonics: int) -> bool:
         """Whether the scene has the nodal diameters of all harmonics 0..n_harmonics."""
         wanted = needed_nodal_diameters(self.nodal_diameter, self.n_sectors, n_harmonics)
         return all(k in self.linear for k in wanted)

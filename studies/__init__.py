@@ -17,13 +17,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from studies.reduced_models import build_scene, read_scene
+    from studies.reduced_models import build_scene
     from studies.scene_error import SceneError
+    from studies.scene_file import read_scene
 
 __all__ = ["SceneError", "build_scene", "read_scene"]
 
 # Loaded when first asked for: the commands import this package before numpy may be loaded.
-_PLACES = {"SceneError": "scene_error", "build_scene": "reduced_models", "read_scene": "reduced_models"}
+_PLACES = {"SceneError": "scene_error", "build_scene": "reduced_models", "read_scene": "scene_file"}
 
 
 def __getattr__(name: str) -> object:

@@ -1,14 +1,12 @@
-"""Reduced models in Python: of a bundled scene by its name, and of a scene file."""
+"""The reduced model of a bundled scene by its name, in Python."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 from pydantic import ValidationError
 
 from solver.model import ReducedModel
-from studies import scene_file, scenes
+from studies import scenes
 from studies.scene_error import SceneError, remedy_of
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE as OF_A_WAVE
 
@@ -46,14 +44,3 @@ def build_scene(name: str, /, *, n_harmonics: int = OF_A_WAVE, **parameters: obj
         except (ArithmeticError, ValueError, MemoryError) as error:
             remedy = "give parameters of a possible structure"
             raise SceneError("model", f"{name} cannot be built: {error}", remedy) from None
-
-
-def read_scene(path: str | Path, *, n_harmonics: int = 1) -> ReducedModel:
-    """Reduced model of a scene file (HDF5), see `studies.scene_file`.
-
-    n_harmonics: the file must hold the nodal diameters that the harmonics 0..n_harmonics of its travelling wave see.
-
-    Raises SceneError where the file is no scene file, is damaged, or describes no possible structure; OSError where
-    there is no such file or it cannot be opened.
-    """
-    return scene_file.read_scene(path, n_harmonics)

@@ -76,11 +76,13 @@ def write_scene(
 
 
 def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> ReducedModel:
-    """Read and check a scene file.
+    """Reduced model of a scene file (HDF5), see `studies.scene_file`.
 
-    n_harmonics: harmonics 0..n_harmonics must find their nodal diameter in the file. group: where the scene stands in a
-    file that holds more. Raises SceneError about the dataset that is wrong, about "model" where the file is no HDF5;
-    OSError where it is missing or cannot be opened.
+    n_harmonics: the file must hold the nodal diameters that the harmonics 0..n_harmonics of its travelling wave see.
+    group: where the scene stands in a file that holds more.
+
+    Raises SceneError about the dataset that is wrong, about "model" where the file is no HDF5; OSError where there is
+    no such file or it cannot be opened.
     """
     with _open_scene(Path(path), group) as (root, datasets):
         prefixes = _prefixes(datasets)

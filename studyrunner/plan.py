@@ -96,16 +96,16 @@ def _of_study(study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan) -> 
     if study.follow is not None:
         what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"
         yield "frequency", what if study.output_counts[-1] == 0.0 else f"{what} and followed while the joint wears"
-    n_kept = len(study.output_counts)
+    n_stored = len(study.output_counts)
     if study.mission:
-        yield "missions", f"{study.slow_time.missions}, of which {count(n_kept, 'number is', 'numbers are')} kept"
+        yield "missions", f"{study.slow_time.missions}, of which {count(n_stored, 'number is', 'numbers are')} stored"
         for block, own in zip(study.mission, study.block_studies, strict=True):
             yield "block", f"{block.name}: {block.describe(max(own.axes.frequency))}"
     elif study.to_the_end:
         until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"
-        yield "cycles", f"{until}; {n_kept} states are kept, spaced evenly in worn volume and cycles"
+        yield "cycles", f"{until}; {n_stored} states are stored, spaced evenly in worn volume and cycles"
     elif study.kind.counted:
-        yield "cycles", f"{study.output_counts[-1]:g}, of which {count(n_kept, 'count is', 'counts are')} kept"
+        yield "cycles", f"{study.output_counts[-1]:g}, of which {count(n_stored, 'count is', 'counts are')} stored"
     yield "tasks", f"{len(tasks)}: {describe_tasks(tasks)}"
 
 

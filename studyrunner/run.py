@@ -72,7 +72,7 @@ def compute_study(
     """
     scenes = build_scenes(ranks, study, store, display.step)
     facts = merge_facts(scenes.facts)
-    attributes = {**describe_run(study, facts), **({} if scenes.kept is None else scenes.kept.origin)}
+    attributes = {**describe_run(study, facts), **({} if scenes.stored is None else scenes.stored.origin)}
     attributes |= describe_date(options.date)
     completion = _open_completion(study, scenes, store, facts, options)
 
@@ -84,7 +84,7 @@ def compute_study(
         begin_ending()
         store.flush()
         arrays = small_arrays(study, scenes.scenes, scenes.facts, scenes.variables)
-        return write_result(study, facts, completion, target, arrays, attributes, scenes.kept)
+        return write_result(study, facts, completion, target, arrays, attributes, scenes.stored)
 
     with display:
         for line in _notes(ranks, study, scenes, store, facts):
@@ -105,8 +105,8 @@ def compute_study(
         outcomes = write()
         if n_left := outcomes[Outcome.NOT_COMPUTED]:
             name, done = target.path.name, f"{n_points - n_left} of {count(n_points, 'point')}"
-            kept = f"{done} are kept, {name} is the finished result that it was" if target.finished else ""
-            raise KeyboardInterrupt(f"interrupted: {kept or f'{name} holds {done}'}, {options.again} goes on")
+            unchanged = f"{done} are kept, {name} is the finished result that it was" if target.finished else ""
+            raise KeyboardInterrupt(f"interrupted: {unchanged or f'{name} holds {done}'}, {options.again} goes on")
         return outcomes
 
 

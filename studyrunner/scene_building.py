@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from solver.packing import Packed, pack_model, unpack_model
-from studyrunner.checkpoint.store import Store
+from studyrunner.checkpoint.store import COMPUTED, Store
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.mapped_file import MappedFile, write_mapped
 from studyrunner.mpi.ranks import Ranks
-from studyrunner.mpi.schedule import Office, serve_tasks
+from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.scene import answers
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, model_key
 from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
@@ -102,8 +102,8 @@ class SceneTask:
 class SceneBuilt:
     """A scene that was built.
 
-    facts: None where the scene is wrong. variables: what the study asks of the scene. model: None where an earlier run
-    has kept it. error: what the user has to change.
+    facts: None where the scene is wrong. variables: what the study asks of the scene. model: None where it is
+    from an earlier run. error: what the user has to change.
     """
 
     facts: SceneFacts | None
@@ -117,13 +117,13 @@ class Scenes:
     """The scenes of a run.
 
     scenes: which there are. facts: of each. variables: what the study asks of them.
-    kept: the model that the result file keeps. notes: what the user should know. models: on their way to the ranks.
+    stored: the model that the result file holds. notes: what the user should know. models: on their way to the ranks.
     """
 
     scenes: SceneSet
     facts: tuple[SceneFacts, ...]
     variables: tuple[answers.SmallArray, ...]
-    kept: answers.KeptScene | None
+    stored: answers.StoredScene | None
     notes: tuple[str, ...]
     models: SceneModels
 
@@ -149,12 +149,12 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
                 raise each.error
         facts = tuple(each.facts for each in built if each.facts is not None)
         variables, notes = answers.join_scene_variables(study, scenes, [each.variables for each in built])
-        kept = answers.scene_to_keep(scenes.studies[0], building.read(0)) if len(built) == 1 else None
+        stored = answers.scene_to_store(scenes.studies[0], building.read(0)) if len(built) == 1 else None
     models = SceneModels(building.read, store.path)
-    return Scenes(at_ratios(scenes, facts), facts, (*variables, *answers.exact_answers(study)), kept, notes, models)
+    return Scenes(at_ratios(scenes, facts), facts, (*variables, *answers.exact_answers(study)), stored, notes, models)
 
 
-class _Building(Office):
+class _Building(TaskHandler):
     """Rank 0 while the scenes are built. found: those that are, by number."""
 
     def __init__(self, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> None:
@@ -167,11 +167,11 @@ class _Building(Office):
 
     def begin(self) -> Iterator[SceneTask]:
         for number, (study, key) in enumerate(zip(self._studies, self._keys, strict=True)):
-            yield SceneTask(number, study, self._store.read_computed(key))
+            yield SceneTask(number, study, self._store.read(COMPUTED, key))
 
     def take(self, task: SceneTask, result: SceneBuilt) -> Sequence[SceneTask]:
         if result.model is not None:
-            self._store.keep_computed(self._keys[task.number], result.model)
+            self._store.put(COMPUTED, self._keys[task.number], result.model)
         # a single model may be too large for the file
         several = len(self._studies) > 1
         self.found[task.number] = replace(result, model=None) if several else result
@@ -184,7 +184,7 @@ class _Building(Office):
 
     def read(self, number: int) -> ReducedModel:
         """The model of a scene. Raises RuntimeError where it is no longer there."""
-        packed = self.found[number].model or self._store.read_computed(self._keys[number])
+        packed = self.found[number].model or self._store.read(COMPUTED, self._keys[number])
         if packed is None:
             raise RuntimeError(f"the model of scene {number} has gone")
         return unpack_model(packed)

@@ -14,9 +14,9 @@ from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Keep, PointResult, Result, StartResult, Task
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
-from studyrunner.mpi.schedule import Office, Run
+from studyrunner.mpi.schedule import Run, TaskHandler
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task, hold_models
-from studyrunner.system.machine import MachineFaultError, tells_of_machine
+from studyrunner.system.machine import MachineFaultError, is_machine_fault
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
 
@@ -68,7 +68,7 @@ def evaluator() -> Run:
             for result in compute_task(replace(task, models=()), own, keep_last):
                 if isinstance(result, PointResult):
                     outcome, message = result.values["outcome"], result.values["message"]
-                    if outcome == Outcome.EXCEPTION and tells_of_machine(message):
+                    if outcome == Outcome.EXCEPTION and is_machine_fault(message):
                         # the solver takes whatever breaks it off for an end
                         raise MachineFaultError(message)
                     # a history that its time limit has ended goes on from there when it gets more
@@ -80,7 +80,7 @@ def evaluator() -> Run:
             # An exception from a signal is no failure of the task.
             raise_ending()
             message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
-            if isinstance(error, MachineFaultError) or tells_of_machine(message):
+            if isinstance(error, MachineFaultError) or is_machine_fault(message):
                 raise MachineFaultError(f"{message}, on {platform.node()}") from error
             for place in left:
                 yield task.failed(place, Outcome.EXCEPTION, message)
@@ -88,7 +88,7 @@ def evaluator() -> Run:
     return evaluate
 
 
-class TaskProgress(Office):
+class TaskProgress(TaskHandler):
     """State of the tasks of a study, and the tasks that results make possible. Results go to `completion`.
 
     A wear history becomes possible with its start state, while the sweep goes on. Results of a task do not depend on

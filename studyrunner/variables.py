@@ -142,7 +142,7 @@ CERTIFICATE = {
 }
 """Those of them that say how right a state is, none of them negative and 0 the best: what a short table calls them."""
 
-KEPT = {
+OF_A_HISTORY = {
     "outcome": Variable(
         (),
         "1",
@@ -169,7 +169,7 @@ KEPT = {
     "step_limit": Variable((), "1", "largest stable explicit step at cycle 0, predicted, cycles", "inf where none."),
     "message": Variable((), "1", "further facts on how the point ended", dtype="U240"),
 }
-"""Those that every result holds."""
+"""Those that every result of wear histories holds."""
 
 OF_MODES = {
     "natural_frequency": Variable((), "Hz", "natural frequency of the nonlinear mode"),
@@ -196,10 +196,14 @@ OF_MODES = {
 """Those that `outputs.variables` asks for in a study of nonlinear modes, in the order of the file."""
 
 OF_A_MODE_POINT = {
-    "outcome": KEPT["outcome"],
-    "newton_iterations": replace(KEPT["newton_iterations"], comment="With the whole way from the joint at rest."),
-    "run_time": replace(KEPT["run_time"], comment="With the way from the point before; differs from run to run."),
-    "message": KEPT["message"],
+    "outcome": OF_A_HISTORY["outcome"],
+    "newton_iterations": replace(
+        OF_A_HISTORY["newton_iterations"], comment="With the whole way from the joint at rest."
+    ),
+    "run_time": replace(
+        OF_A_HISTORY["run_time"], comment="With the way from the point before; differs from run to run."
+    ),
+    "message": OF_A_HISTORY["message"],
 }
 """Those that every result of nonlinear modes holds."""
 
@@ -262,8 +266,8 @@ OF_SAMPLED_MISSIONS = tuple(name for name in OF_MISSIONS if name not in ("wear_d
 """Those of a study of missions with [scatter] that names none."""
 
 
-def _kept_by_mission(name: str) -> Variable:
-    entry = KEPT[name]
+def _of_history_by_mission(name: str) -> Variable:
+    entry = OF_A_HISTORY[name]
     long_name, comment = (
         text.replace("cycle count", "number of missions").replace("cycles", "missions")
         for text in (entry.long_name, entry.comment)
@@ -272,14 +276,14 @@ def _kept_by_mission(name: str) -> Variable:
 
 
 OF_A_MISSION = {
-    "outcome": KEPT["outcome"],
-    "missions_to_target": _kept_by_mission("cycles_to_target"),
-    "missions_to_target_error": _kept_by_mission("cycles_to_target_error"),
-    "newton_iterations": replace(KEPT["newton_iterations"], comment="Of all blocks."),
-    "run_time": replace(KEPT["run_time"], comment="Of all blocks; differs from run to run."),
-    "error_estimate": KEPT["error_estimate"],
-    "last_mission": _kept_by_mission("last_cycle"),
-    "largest_wear_depth": KEPT["largest_wear_depth"],
-    "message": KEPT["message"],
+    "outcome": OF_A_HISTORY["outcome"],
+    "missions_to_target": _of_history_by_mission("cycles_to_target"),
+    "missions_to_target_error": _of_history_by_mission("cycles_to_target_error"),
+    "newton_iterations": replace(OF_A_HISTORY["newton_iterations"], comment="Of all blocks."),
+    "run_time": replace(OF_A_HISTORY["run_time"], comment="Of all blocks; differs from run to run."),
+    "error_estimate": OF_A_HISTORY["error_estimate"],
+    "last_mission": _of_history_by_mission("last_cycle"),
+    "largest_wear_depth": OF_A_HISTORY["largest_wear_depth"],
+    "message": OF_A_HISTORY["message"],
 }
 """Those that every result of missions holds."""

@@ -6,6 +6,7 @@ place while it sticks is history). Every phase of such a motion is linear in the
 are the forces of the pair and its slip velocity: rows that are multiplied by the state. Shares no code with the solver.
 """
 
+import contextlib
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from tests.event_driven import (
+    ON_SWITCH,
     FloatArray,
     NoPeriodicMotionError,
     Orbit,
@@ -26,11 +28,10 @@ from tests.event_driven import (
 SLIDING = {"forward": 1.0, "backward": -1.0}
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _CELLS = 32  # of the grid for events, of which a piece of an integral takes at most so many
-_ON_SWITCH = 1e-11  # relative size of a guard that counts as zero where a phase starts
 
 
 @dataclass(frozen=True)
-class ContactPair:
+class ContactPair(PiecewiseLinear):
     """`M x'' + C x' + K x + lambda = static + Re(harmonic exp(i omega t))`, n displacements.
 
     mass, damping, stiffness (n, n); load_static (n,), load_harmonic (n,) complex, N. normal: index of the closing
@@ -69,17 +70,17 @@ class ContactPair:
         return [index for index in range(len(self._m)) if self._m[index, index] > 0.0]
 
     @property
-    def _n(self) -> int:
-        # behind the masses lies the place of an elastic slider, whose velocity in the state is not used
+    def n(self) -> int:
+        """Displacements of the masses; behind them the place of an elastic slider, whose velocity is not used."""
         return len(self.massive) + self.elastic
 
     @property
     def _place(self) -> int:
         """Of the tangential displacement in the state."""
-        return self._n - 1 if self.elastic else self.massive.index(self.tangent)
+        return self.n - 1 if self.elastic else self.massive.index(self.tangent)
 
     def _one(self, index: int) -> FloatArray:
-        return np.eye(2 * self._n + 3)[index]
+        return np.eye(2 * self.n + 3)[index]
 
     def _load(self, index: int) -> FloatArray:
         harmonic = np.array(self.load_harmonic, np.complex128)[index]
@@ -87,7 +88,7 @@ class ContactPair:
         return harmonic.real * self._one(-3) - harmonic.imag * self._one(-2) + static * self._one(-1)
 
     def _masses(self) -> FloatArray:
-        rows = np.zeros((len(self._m), 2 * self._n + 3))
+        rows = np.zeros((len(self._m), 2 * self.n + 3))
         rows[self.massive, range(len(self.massive))] = 1.0
         return rows
 
@@ -97,7 +98,7 @@ class ContactPair:
 
     def _flow(self, rows: FloatArray, friction: FloatArray, held: bool = False) -> tuple[FloatArray, FloatArray]:
         """Flow of the masses under a friction force, or with the mass at the pair held, and what then holds it."""
-        n, masses = self._n, self.massive
+        n, masses = self.n, self.massive
         flow = np.zeros((2 * n + 3, 2 * n + 3))
         flow[2 * n, 2 * n + 1], flow[2 * n + 1, 2 * n] = -self.omega, self.omega
         velocity = np.roll(self._masses(), n, axis=1)
@@ -119,7 +120,7 @@ class ContactPair:
     @cached_property
     def _parts(self) -> dict[str, tuple[Phase, FloatArray, FloatArray, FloatArray | None]]:
         """By phase: itself, its normal force, its slip velocity, and where an elastic slider is that does not stick."""
-        nothing = np.zeros(2 * self._n + 3)
+        nothing = np.zeros(2 * self.n + 3)
         parts = {}
         closed = self._masses()
         if self.normal is not None:
@@ -136,7 +137,7 @@ class ContactPair:
                 force = self._left(self.tangent, rows) if self.elastic else held
                 guards = [limit - force, limit + force]
             elif sign:
-                slip = place @ flow if self.elastic else self._one(self._n + self._place)
+                slip = place @ flow if self.elastic else self._one(self.n + self._place)
                 guards = [sign * slip]
             else:
                 guards = []
@@ -157,7 +158,7 @@ class ContactPair:
         return force / (self._k[t, t] - sign * self.friction * self._k[n, t])
 
     def _open(self) -> tuple[Phase, FloatArray, FloatArray, FloatArray | None]:
-        nothing, rows = np.zeros(2 * self._n + 3), self._masses()
+        nothing, rows = np.zeros(2 * self.n + 3), self._masses()
         free = [self.normal, self.tangent] if self.elastic else [self.normal]
         rows[free] = np.linalg.solve(self._k[np.ix_(free, free)], [self._left(index, rows) for index in free])
         flow, _ = self._flow(rows, nothing)
@@ -167,12 +168,11 @@ class ContactPair:
         return Phase(flow, (self.gap * self._one(-1) - rows[self.normal])[np.newaxis]), nothing, nothing, place
 
     @cached_property
-    def system(self) -> PiecewiseLinear:
-        """The oscillator; its displacements are those of the masses, and the place of an elastic slider."""
-        phases = {name: part[0] for name, part in self._parts.items()}
-        return PiecewiseLinear(self._n, self.omega, phases, self._next_phase, self._phase_at)
+    def phases(self) -> dict[str, Phase]:
+        """Of these "forward", "backward" and "stick" where there is a tangent, else "closed"; "open"."""
+        return {name: part[0] for name, part in self._parts.items()}
 
-    def _next_phase(self, name: str, y: FloatArray) -> tuple[str, FloatArray]:
+    def next_phase(self, name: str, y: FloatArray) -> tuple[str, FloatArray]:
         """The first other phase whose guards are positive at once; which ones there are says the event."""
         phase, normal, _, place = self._parts[name]
         y, others = y.copy(), [other for other in self._parts if other != name]
@@ -185,8 +185,8 @@ class ContactPair:
         elif name == "stick":
             others.remove("backward" if values[0] < values[1] else "forward")
         elif self.tangent is not None and not self.elastic:
-            velocity = self._n + self._place
-            fast = np.abs(y[self._n : 2 * self._n]).max() + self.omega * np.abs(y[: self._n]).max()
+            velocity = self.n + self._place
+            fast = np.abs(y[self.n : 2 * self.n]).max() + self.omega * np.abs(y[: self.n]).max()
             sizes = [fast, max(float(np.abs(normal * y).max()), 1e-300)][: len(values)]
             if name in SLIDING and np.argmin(values / sizes) == 0:
                 y[velocity] = 0.0
@@ -199,58 +199,50 @@ class ContactPair:
 
     def _begins(self, name: str, y: FloatArray) -> bool:
         """Whether the first derivative of each guard that is not zero, the guard itself included, is positive."""
-        phase, width = self._parts[name][0], self.system.cell
+        phase, width = self._parts[name][0], self.cell
         derivatives = [y]
         for order in range(1, 5):
             derivatives.append(phase.flow @ derivatives[-1] * width / order)
         for guard in (np.array(derivatives) @ phase.guards.T).T:
-            nonzero = guard[np.abs(guard) > _ON_SWITCH * np.abs(guard).max()]
+            nonzero = guard[np.abs(guard) > ON_SWITCH * np.abs(guard).max()]
             if nonzero.size == 0 or nonzero[0] <= 0.0:
                 return False
         return True
 
-    def _phase_at(self, name: str, y: FloatArray) -> str:
+    def phase_at(self, name: str, y: FloatArray) -> str:
         if self.tangent is None:
             return self._likely_phase(y)
         if name in SLIDING and not self.elastic:
-            return "forward" if y[self._n + self._place] > 0 else "backward"
+            return "forward" if y[self.n + self._place] > 0 else "backward"
         return name
 
-    def _fixed(self, name: str) -> list[int]:
+    def fixed(self, name: str) -> list[int]:
         if self.elastic:
-            return [2 * self._n - 1] if name == "stick" else [2 * self._n - 1, self._place]
-        return [self._n + self._place] if name == "stick" else []
+            return [2 * self.n - 1] if name == "stick" else [2 * self.n - 1, self._place]
+        return [self.n + self._place] if name == "stick" else []
 
     def orbit_near(self, displacement: FloatArray, velocity: FloatArray) -> Orbit:
         """Periodic motion next to displacements and velocities (n,) at time 0, stable or not; else the one that the
         motion from there on goes over into. Those of the massless displacements other than the tangential one are not
         used. Raises NoPeriodicMotionError.
         """
-        x, v = np.zeros(self._n), np.zeros(self._n)
+        x, v = np.zeros(self.n), np.zeros(self.n)
         x[: len(self.massive)], v[: len(self.massive)] = displacement[self.massive], velocity[self.massive]
         if self.elastic:
             x[-1] = displacement[self.tangent]
         if self.tangent is not None and not self.elastic:
             fastest = np.abs(v).max() + self.omega * np.abs(x).max()
             v[self._place] = v[self._place] if abs(v[self._place]) > 1e-9 * fastest else 0.0
-        y = self.system.extended(x, v)
+        y = self.extended(x, v)
         name = self._likely_phase(y)
-        try:
-            closed = close_orbit(self.system, name, y, 0.0, self._fixed(name))
-        except NoPeriodicMotionError:
-            closed = None
-        if closed is not None:
-            return closed
-        return self._settle(name, y, transient=2, attempts=15)
+        with contextlib.suppress(NoPeriodicMotionError):
+            return close_orbit(self, name, y)
+        return solve_orbit(self, name, y, transient=2, attempts=100)
 
     def orbit_from_rest(self, transient: int) -> Orbit:
         """Periodic motion from rest, after at least so many periods. Raises NoPeriodicMotionError."""
-        y = self.system.extended(np.zeros(self._n), np.zeros(self._n))
-        return self._settle(self._likely_phase(y), y, transient, attempts=20)
-
-    def _settle(self, name: str, y: FloatArray, transient: int, attempts: int) -> Orbit:
-        moving = [phase for phase in self._parts if phase != "stick"]
-        return solve_orbit(self.system, name, y, moving, transient, attempts, self._fixed)
+        y = self.extended(np.zeros(self.n), np.zeros(self.n))
+        return solve_orbit(self, self._likely_phase(y), y, transient, attempts=20)
 
     def _likely_phase(self, y: FloatArray) -> str:
         """Phase of a state that need not be exact."""
@@ -263,7 +255,7 @@ class ContactPair:
             name = "forward" if low < high else "backward"
             slips = min(low, high) <= 0.0 and (self._parts[name][0].guards[0] @ y) > 0.0
             return name if slips else "stick"
-        velocity = y[self._n + self._place]
+        velocity = y[self.n + self._place]
         if velocity == 0.0:
             low, high = self._parts["stick"][0].guards[:2] @ y
             if min(low, high) > 0.0:
@@ -282,7 +274,7 @@ class ContactPair:
             phase, normal, slip, _ = self._parts[segment.phase]
             if segment.phase not in SLIDING:
                 continue
-            pieces = int(np.ceil(segment.duration / (_CELLS * self.system.cell)))
+            pieces = int(np.ceil(segment.duration / (_CELLS * self.cell)))
             length, y = segment.duration / pieces, segment.start
             within = np.array([expm(phase.flow * length * (node + 1.0) / 2.0) for node in _NODES])
             for _ in range(pieces):

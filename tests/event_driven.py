@@ -8,7 +8,9 @@ is discretised, the results are exact to round-off. The only grid is the one on 
 The period map is closed by Newton's method after a transient. Made for textbook systems: a handful of unknowns.
 """
 
-from collections.abc import Callable, Sequence
+import contextlib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,7 +24,7 @@ _TERMS = 24  # of the power series inside a cell, whose length is at most a quar
 _RESOLUTION = 0.25
 _MINIMUM_CELLS = 256  # in a period
 _CLOSED = 1e-12  # relative distance of the states one period apart in a periodic motion
-_ON_SWITCH = 1e-11  # relative size of a guard that counts as zero where a phase starts
+ON_SWITCH = 1e-9  # relative size of a guard that counts as zero where a phase starts; round-off: 1e-10
 
 
 class NoPeriodicMotionError(RuntimeError):
@@ -49,19 +51,31 @@ class Segment:
     duration: float
 
 
-@dataclass(frozen=True)
-class PiecewiseLinear:
-    """Oscillator with n displacements.
+class PiecewiseLinear(ABC):
+    """Oscillator with n displacements under a force of the angular frequency omega, rad/s."""
 
-    phases: by name. next_phase(name, y): the phase after an event, and y with the event exactly on its switch.
-    phase_at(name, y): the phase of a state near one of the phase `name`, away from the switches.
-    """
-
-    n: int
     omega: float
-    phases: dict[str, Phase]
-    next_phase: Callable[[str, FloatArray], tuple[str, FloatArray]]
-    phase_at: Callable[[str, FloatArray], str]
+
+    @property
+    @abstractmethod
+    def n(self) -> int: ...
+
+    @property
+    @abstractmethod
+    def phases(self) -> Mapping[str, Phase]:
+        """By name; in "stick" nothing need move."""
+
+    @abstractmethod
+    def next_phase(self, name: str, y: FloatArray) -> tuple[str, FloatArray]:
+        """The phase after an event, and y with the event exactly on its switch."""
+
+    @abstractmethod
+    def phase_at(self, name: str, y: FloatArray) -> str:
+        """Phase of a state near one of the phase `name`, away from the switches."""
+
+    @abstractmethod
+    def fixed(self, name: str) -> list[int]:
+        """Indices of y that cannot vary in a phase."""
 
     @property
     def period(self) -> float:
@@ -148,7 +162,7 @@ def _first_root(series: FloatArray, width: float, starts_on_switch: bool) -> flo
     velocity and the acceleration both start at zero.
     """
     sizes = np.abs(series) * width ** np.arange(len(series))
-    while starts_on_switch and sizes[0] <= _ON_SWITCH * sizes.max() and len(series) > _TERMS - 2:
+    while starts_on_switch and sizes[0] <= ON_SWITCH * sizes.max() and len(series) > _TERMS - 2:
         series, sizes = series[1:], sizes[1:]
     if starts_on_switch and series[0] <= 0:
         raise NoPeriodicMotionError("a phase ended as it began")
@@ -220,50 +234,35 @@ class Orbit:
         return float(sum(abs(end - part.start[dof]) for part, end in parts if part.phase in phases))
 
 
-def solve_orbit(
-    system: PiecewiseLinear,
-    name: str,
-    y: FloatArray,
-    moving: Sequence[str] = (),
-    transient: int = 30,
-    attempts: int = 20,
-    fixed: Callable[[str], Sequence[int]] | None = None,
-) -> Orbit:
+def solve_orbit(system: PiecewiseLinear, name: str, y: FloatArray, transient: int, attempts: int) -> Orbit:
     """Periodic motion reached from a phase and state at time 0 of the force.
 
-    moving: phases in whose middle the period is cut, where the motion has one; the cut must not lie on a switch.
-    fixed(phase): indices of y that cannot vary in a phase. transient: periods before Newton's method, which is tried
-    `attempts` times.
-
-    Raises NoPeriodicMotionError.
+    Newton's method is tried `attempts` times, each after so many periods; the period is cut in the middle of the
+    longest phase that is not "stick". Raises NoPeriodicMotionError.
     """
     start_time = 0.0
     for _ in range(attempts):
         segments: list[Segment] = []
         for _ in range(transient):
             name, y, segments = system.advance(name, y, system.period)
-        cut = max((s for s in segments if s.phase in moving), key=lambda s: s.duration, default=None)
+        cut = max((s for s in segments if s.phase != "stick"), key=lambda s: s.duration, default=None)
         if cut is not None:
             position = next(i for i, segment in enumerate(segments) if segment is cut)
             elapsed = sum(segment.duration for segment in segments[:position]) + cut.duration / 2
             name, y, _ = system.advance(name, y, elapsed)
             start_time = (start_time + elapsed) % system.period
-        closed = close_orbit(system, name, y, start_time, () if fixed is None else fixed(name))
-        if closed is not None:
-            return closed
+        with contextlib.suppress(NoPeriodicMotionError):
+            return close_orbit(system, name, y, start_time)
     raise NoPeriodicMotionError(f"no periodic motion at {system.omega} rad/s after {attempts * transient} periods")
 
 
-def close_orbit(
-    system: PiecewiseLinear, name: str, y: FloatArray, start_time: float = 0.0, fixed: Sequence[int] = ()
-) -> Orbit | None:
-    """Periodic motion next to a phase and state at `start_time`, stable or not; None where Newton's method finds none.
+def close_orbit(system: PiecewiseLinear, name: str, y: FloatArray, start_time: float = 0.0) -> Orbit:
+    """Periodic motion next to a phase and state at `start_time`, stable or not. Raises NoPeriodicMotionError.
 
     Newton's method on the period map, its derivative from differences, its steps halved until the defect shrinks.
-    fixed: indices of y that cannot vary.
     """
     n = system.n
-    free = [index for index in range(2 * n) if index not in fixed]
+    free = [index for index in range(2 * n) if index not in system.fixed(name)]
     y = system.extended(y[:n], y[n : 2 * n], start_time)
     name = system.phase_at(name, y)
     orbit, defect = _defect(system, name, y, start_time, free)
@@ -287,9 +286,9 @@ def close_orbit(
             if np.abs(moved_defect / scale[free]).max() < np.abs(defect / scale[free]).max():
                 break
         else:
-            return None
+            break
         name, y, orbit, defect = moved_name, moved, moved_orbit, moved_defect
-    return None
+    raise NoPeriodicMotionError("Newton's method does not close the period")
 
 
 def _defect(

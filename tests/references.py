@@ -4,7 +4,6 @@ All of them are general in their parameters, in SI units, and share no code with
 """
 
 from collections.abc import Callable
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 from tests.contact_pair import ContactPair
-from tests.event_driven import FloatArray, NoPeriodicMotionError, Orbit, PiecewiseLinear, close_orbit, solve_orbit
+from tests.event_driven import FloatArray, Orbit
 
 
 class StopsOccurError(ValueError):
@@ -69,9 +68,9 @@ def coulomb_orbit(
 ) -> Orbit:
     """Periodic motion of `M x'' + C x' + K x + lambda = Re(load exp(i omega t))` from rest.
 
-    mass (regular), damping, stiffness (n, n); load (n,), N, may be complex. lambda acts on `friction_dof` alone: rigid
-    Coulomb friction to ground, |lambda| <= friction_force (positive), N, with sticking. The phases of the orbit are
-    "stick", "forward" and "backward".
+    mass, damping, stiffness (n, n); load (n,), N, may be complex. lambda acts on `friction_dof` alone, which may have
+    no mass and damping: rigid Coulomb friction to ground, |lambda| <= friction_force (positive), N, with sticking. The
+    phases of the orbit are "stick", "forward" and "backward".
 
     Raises NoPeriodicMotionError.
     """
@@ -141,73 +140,21 @@ def slider_wear_depth(
 
 
 def vibro_impact_orbit(
-    mass: float,
-    damping: float,
-    stiffness: float,
-    force: float,
-    wall_stiffness: float,
-    gap: float,
-    omega: float,
-    *,
-    sweep: Literal["up", "down"] = "up",
-    sweep_start: float | None = None,
-    sweep_step: float = 0.02,
+    mass: float, damping: float, stiffness: float, force: float, wall: float, gap: float, omega: float, begin: float
 ) -> Orbit:
     """Periodic motion of a mass on a spring that meets an elastic wall at the distance `gap`, under force cos(omega t).
 
-    gap < 0: the wall presses on the resting mass. The branch is the one that a sweep up (down) reaches, from rest at
-    `sweep_start`, rad/s, which is half (four times) the undamped frequency without wall if not given, in steps of
-    `sweep_step` times that frequency. The phases of the orbit are "open" and "closed". damping must be positive: a
-    transient has to die out.
+    wall: N/m. gap < 0: the wall presses on the resting mass. The branch is the one that a sweep reaches from rest at
+    `begin`, rad/s, in steps of 2 % of the undamped frequency without wall; behind its end the motion falls on another
+    one. The phases of the orbit are "open" and "closed". damping must be positive: a transient has to die out.
 
     Raises NoPeriodicMotionError.
     """
-    natural = float(np.sqrt(stiffness / mass))
-    if sweep_start is None:
-        sweep_start = min(0.5 * natural, omega) if sweep == "up" else max(4.0 * natural, omega)
-
-    spring = np.array([[wall_stiffness, -wall_stiffness], [-wall_stiffness, wall_stiffness + stiffness]])
+    spring = np.array([[wall, -wall], [-wall, wall + stiffness]])
     parts = np.diag([0.0, mass]), np.diag([0.0, damping]), spring, np.zeros(2), np.array([0.0, force])
-
-    def system_at(frequency: float) -> PiecewiseLinear:
-        return ContactPair(*parts, 0, None, 0.0, gap, 0.0, frequency).system
-
-    start = system_at(sweep_start)
-    at_rest = np.array([min(wall_stiffness * gap / (stiffness + wall_stiffness), 0.0), 0.0])
-    orbit = _settle(start, at_rest)
-    state, here, largest, previous = _state(orbit, at_rest), sweep_start, sweep_step * natural, None
-    step = largest
-    while here != omega:
-        there = _towards(here, omega, step)
-        slope = np.zeros(2) if previous is None else (state - previous[1]) / (here - previous[0])
-        guess = state + slope * (there - here)
-        system = system_at(there)
-        orbit = close_orbit(system, "open", system.extended(guess[:1], guess[1:]))
-        if orbit is not None:
-            previous, step = (here, state), min(1.5 * step, largest)
-        elif step > 1e-4 * largest:
-            step /= 2
-            continue
-        else:  # the branch has ended: a whole step behind its end the motion falls on another one
-            there, previous, step = _towards(here, omega, largest), None, largest
-            orbit = _settle(system_at(there), state)
-        state, here = _state(orbit, state), there
-    if orbit is None:
-        raise NoPeriodicMotionError(f"no periodic motion at {omega} rad/s on a sweep {sweep} from {sweep_start} rad/s")
+    first, *others = np.append(np.arange(begin, omega, 0.02 * np.sqrt(stiffness / mass)), omega)
+    orbit = ContactPair(*parts, 0, None, 0.0, gap, 0.0, first).orbit_from_rest(30)
+    for there in others:
+        displacement, velocity = np.pad(orbit.sample(1), ((0, 0), (1, 0)))
+        orbit = ContactPair(*parts, 0, None, 0.0, gap, 0.0, there).orbit_near(displacement, velocity)
     return orbit
-
-
-def _towards(here: float, end: float, step: float) -> float:
-    return end if abs(end - here) <= step else here + float(np.copysign(step, end - here))
-
-
-def _settle(system: PiecewiseLinear, state: FloatArray) -> Orbit | None:
-    y = system.extended(state[:1], state[1:])
-    try:
-        return solve_orbit(system, system.phase_at("open", y), y, attempts=10)
-    except NoPeriodicMotionError:
-        return None  # chaos, or a period of several forces: the sweep goes on behind it
-
-
-def _state(orbit: Orbit | None, otherwise: FloatArray) -> FloatArray:
-    return otherwise if orbit is None else orbit.sample(1)[:, 0]

@@ -91,7 +91,7 @@ def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase():
 
 @pytest.mark.parametrize(("omega", "known"), [(1.2, 0.1146716), (1.5, 0.1889205)])
 def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega, known):
-    orbit = vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85)
+    orbit = vibro_impact_orbit(*VIBRO_IMPACT, omega, begin=0.85)
     assert phases(orbit) == {"open", "closed"}
     assert abs(orbit.harmonic(0)) == pytest.approx(known, rel=3e-7)
 

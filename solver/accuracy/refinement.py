@@ -229,7 +229,7 @@ class _Search:
             # more harmonics for friction without impacts only, whose harmonics are odd
             most = min(most, EXPENSIVE_UNKNOWNS) if all(order % 2 for order in resolution.orders) else 0
         # the two highest levels serve for a comparison only
-        in_levels = resolution.highest <= HARMONIC_LEVELS[-3] and here.case.model.holds(resolution.highest)
+        in_levels = resolution.highest <= HARMONIC_LEVELS[-3] and here.case.model.has_harmonics(resolution.highest)
         return in_levels and resolution.samples <= MOST_SAMPLES and unknowns <= most
 
     def _relaxed(self, here: ResolvedState, estimate: Estimate) -> Refined:
@@ -259,7 +259,9 @@ def _richer(here: ResolvedState) -> list[Resolution]:
     resolution, at, model = here.case.resolution, here.point.evaluation, here.case.model
     levels = enumerate(shifted(resolution, level) for level in range(1, len(HARMONIC_LEVELS)))
     most = here.limit(COMPARED_UNKNOWNS), FAR_UNKNOWNS
-    found = [each for place, each in levels if model.holds(each.highest) and here.unknowns(each) <= most[place > 1]]
+    found = [
+        each for place, each in levels if model.has_harmonics(each.highest) and here.unknowns(each) <= most[place > 1]
+    ]
     if len(found) <= 2:
         return found
     contact = shortest_contact(at.status_t, at.force_t[:, 0], FAINT_SHARE * here.case.settings.rtol)

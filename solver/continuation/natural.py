@@ -44,8 +44,8 @@ HereT = TypeVar("HereT", contravariant=True)
 EndT = TypeVar("EndT")
 
 
-class Line(Protocol[HereT, EndT]):
-    """What the steps go along."""
+class SteppedProblem(Protocol[HereT, EndT]):
+    """What goes on by steps (`take_step`)."""
 
     def attempt(self, here: HereT, length: float, /) -> EndT | None:
         """End of a step; None where it is not found."""
@@ -54,14 +54,14 @@ class Line(Protocol[HereT, EndT]):
         """Change or error of a step over the allowed one; above 1 the step is refused."""
 
     def rescue(self, here: HereT, length: float, /) -> EndT | Failure:
-        """End of a step that is not found, or refused, however short; or why the line ends."""
+        """End of a step that is not found, or refused, however short; or why no step goes on."""
 
 
 @dataclass(frozen=True)
 class Lengths:
     """The rule for the length of a step.
 
-    order: power of the length with which the ratio of `Line` grows. safety: as `STEP_SAFETY`.
+    order: power of the length with which the ratio of `SteppedProblem` grows. safety: as `STEP_SAFETY`.
     shortest: shortest step. rescue: length at and below which a step that is not found is left to the rescue.
     """
 
@@ -77,17 +77,19 @@ class Lengths:
         return float(np.clip(wanted, *((least, most) if accepted else (SMALLEST_STEP_RATIO, least))))
 
 
-def take_step(line: Line[HereT, EndT], here: HereT, length: float, lengths: Lengths) -> tuple[EndT, float] | Failure:
+def take_step(
+    problem: SteppedProblem[HereT, EndT], here: HereT, length: float, lengths: Lengths
+) -> tuple[EndT, float] | Failure:
     """The end of one step and the length of the next one, or why there is none; length: of the first attempt."""
     length = max(length, lengths.shortest)
     while True:
-        end = line.attempt(here, length)
-        ratio = math.inf if end is None else line.ratio(here, end, length)
+        end = problem.attempt(here, length)
+        ratio = math.inf if end is None else problem.ratio(here, end, length)
         if end is not None and ratio <= 1.0:
             return end, length * lengths.factor(ratio, accepted=True)
         floor = lengths.rescue if end is None else lengths.shortest
         if length <= floor:
-            rescued = line.rescue(here, length)
+            rescued = problem.rescue(here, length)
             return rescued if isinstance(rescued, Failure) else (rescued, length)
         length = max(lengths.factor(ratio, accepted=False) * length, floor)
 

@@ -126,7 +126,7 @@ def tail_orders(joint: Joint) -> tuple[int, ...]:
     # three times the highest harmonic: what the usual samples of a harmonic still resolve
     resolved = (SAMPLES_PER_HARMONIC // 2 - 1) * orders[-1]
     last = min(resolved, joint.basis.n_samples // 2 - orders[-1], FINE_SAMPLES // 4)
-    return tuple(order for order in range(orders[-1] + stride, last + 1, stride) if joint.model.holds(order))
+    return tuple(order for order in range(orders[-1] + stride, last + 1, stride) if joint.model.has_harmonics(order))
 
 
 def _tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> FloatArray:

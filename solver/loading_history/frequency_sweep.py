@@ -57,19 +57,19 @@ class FrequencySweep:
     known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
         is not estimated, and there is no reference sweep.
     keep: called with the saved state, and with the position in words.
-    nodes, cell, omega: the present sweep, its cell, and the frequency of a ramp, rad/s, else None.
+    present, cell, omega: the present sweep, its cell, and the frequency of a ramp, rad/s, else None.
     run: of the state at the current frequency, without the sweep to this frequency.
     """
 
     model: ReducedModel
     friction_coefficient: float | FloatArray | None
     excitation_amplitude: float
-    sweep: Direction
+    direction: Direction
     settings: SolverSettings
     every: bool = True
     known: tuple[tuple[float, Resolution], ...] = ()
     keep: Callable[[Packed | str], None] = lambda _: None
-    nodes: Sweep[State] | None = None
+    present: Sweep[State] | None = None
     cell: int = 0
     omega: float | None = None
     run: Run = field(init=False)
@@ -80,23 +80,23 @@ class FrequencySweep:
     @property
     def n_iterations(self) -> int:
         """Newton iterations to the current frequency: of the sweep from its start, and of the state."""
-        return self.run.budget.iterations + (0 if self.nodes is None else self.nodes.budget.iterations)
+        return self.run.budget.iterations + (0 if self.present is None else self.present.budget.iterations)
 
     def set_deadline(self, deadline: float) -> None:
         """Set the CPU time of the thread, s, after which the search for the present state ends."""
         self.run.budget.deadline = deadline
-        if self.nodes is not None:
-            self.nodes.budget.deadline = deadline
+        if self.present is not None:
+            self.present.budget.deadline = deadline
 
     def save(self) -> None:
         """Give `keep` what another sweep needs to go on."""
-        if self.nodes is not None and self.nodes.saved:
-            self.keep(pack((self.cell, self.omega, self.nodes.saved)))
+        if self.present is not None and self.present.saved:
+            self.keep(pack((self.cell, self.omega, self.present.saved)))
 
     def load(self, saved: Packed) -> None:
         """Go on from what another sweep has given to `keep`."""
-        cell, omega, nodes = unpack(saved)
-        self._new_sweep(cell, omega).load(nodes)
+        cell, omega, present = unpack(saved)
+        self._new_sweep(cell, omega).load(present)
 
     def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
         """Begin at a known state; False where the state is rejected.
@@ -105,37 +105,37 @@ class FrequencySweep:
         its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
         """
         omega = 2.0 * np.pi * frequency
-        nodes = self._new_sweep(cell_of(frequency), omega if self.sweep == "ramp" else None)
-        nodes.direction = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
-        return nodes.begin(replace(nodes.path, case=case), state)
+        present = self._new_sweep(cell_of(frequency), omega if self.direction == "ramp" else None)
+        present.sign = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
+        return present.begin(replace(present.path, case=case), state)
 
     def advance(self, frequency: float) -> StartState | Failure:
         """State at the next frequency, Hz, with the harmonics it needs, or why there is none. Raises LinAlgError."""
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
         run.budget.iterations, run.budget.limit = 0, NODE_ITERATIONS
-        nodes = self.sweep_to(frequency)
+        present = self.sweep_to(frequency)
         target = 2.0 * np.pi * frequency if self.omega is None else 1.0
-        nodes.advance_to(target)
-        path, reached = nodes.path, nodes.state_at(target, run.fresh())
+        present.advance_to(target)
+        path, reached = present.path, present.state_at(target, run.fresh())
         if isinstance(reached, Failure):
             run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
             first = self._first(path, target, run)
             if isinstance(first, Failure):
-                return lost(nodes, first)
+                return lost(present, first)
             path, reached = first[0], Step(first[1])
         refined = self._at_known(path, reached.state) if self.known else None
         refined = refined or refine(path.case, path.joint_of(reached.state), reached.state, run)
-        return self._judged(refined, nodes, reached.folds)
+        return self._judged(refined, present, reached.folds)
 
     def without_state(self, failure: Failure) -> StartState:
         """No state at the current frequency, and why."""
-        nodes = self.nodes
+        present = self.present
         return StartState(
             outcome=failure.outcome,
             state=None,
-            penalty_omega=math.nan if nodes is None else nodes.path.case.penalty_omega,
-            resolution=Resolution((1,), 4) if nodes is None else nodes.path.case.resolution,
+            penalty_omega=math.nan if present is None else present.path.case.penalty_omega,
+            resolution=Resolution((1,), 4) if present is None else present.path.case.resolution,
             response_error=math.inf,
             wear_rate_error=math.inf,
             message=failure.message,
@@ -146,32 +146,32 @@ class FrequencySweep:
 
         beyond: whether the present sweep will do although it has passed the frequency.
         """
-        omega, cell, nodes = 2.0 * np.pi * frequency, cell_of(frequency), self.nodes
-        ramp = omega if self.sweep == "ramp" else None
-        if nodes is not None and (self.cell, self.omega) == (cell, ramp):
-            passed = nodes.last is not None and (omega - nodes.last.parameter) * nodes.direction < 0.0
+        omega, cell, present = 2.0 * np.pi * frequency, cell_of(frequency), self.present
+        ramp = omega if self.direction == "ramp" else None
+        if present is not None and (self.cell, self.omega) == (cell, ramp):
+            passed = present.last is not None and (omega - present.last.parameter) * present.sign < 0.0
             if ramp or beyond or not passed:
-                return nodes
-        nodes = self._new_sweep(cell, ramp)
-        nodes.budget.limit = FIRST_ITERATIONS
-        place = 2.0 * np.pi * first_frequency(self.model, cell, self.sweep) if ramp is None else FREE_STEP
-        nodes.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
-        first = self._first(nodes.path, place, nodes.run)
+                return present
+        present = self._new_sweep(cell, ramp)
+        present.budget.limit = FIRST_ITERATIONS
+        place = 2.0 * np.pi * first_frequency(self.model, cell, self.direction) if ramp is None else FREE_STEP
+        present.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
+        first = self._first(present.path, place, present.run)
         if isinstance(first, Failure):
-            nodes.failure = first
+            present.failure = first
         else:
-            nodes.begin(*first)
-        return nodes
+            present.begin(*first)
+        return present
 
     def _new_sweep(self, cell: int, omega: float | None) -> Sweep[State]:
         """A sweep before its first node. omega: of a ramp, rad/s, else None."""
         # the penalty belongs to the upper end of the cell
         case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * edge_of(cell + 1), self.settings)
         path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
-        budget, direction = Budget(deadline=of.deadline, report=of.report), -1.0 if self.sweep == "down" else 1.0
+        budget, sign = Budget(deadline=of.deadline, report=of.report), -1.0 if self.direction == "down" else 1.0
         self.cell, self.omega = cell, omega
-        self.nodes = Sweep(path, direction, budget, with_reference=not self.known, save=self.save)
-        return self.nodes
+        self.present = Sweep(path, sign, budget, with_reference=not self.known, save=self.save)
+        return self.present
 
     def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Failure:
         """A state from the static one at a value of the parameter, and its path, with the harmonics of a path, or else
@@ -198,7 +198,7 @@ class FrequencySweep:
         moved = state if wanted.case is path.case else path.move(state, wanted, self.run)
         return None if moved is None else Refined(wanted.case, wanted.joint_of(moved), moved, NOTHING, accurate=True)
 
-    def _judged(self, found: Refined, nodes: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
+    def _judged(self, found: Refined, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
         """A refined state with its errors and the state of the reference sweep, or why it is no result.
 
         folds: that the sweep has jumped over between its last node and the state.
@@ -208,11 +208,11 @@ class FrequencySweep:
             return Failure(Outcome.CERTIFICATE_FAILED)
         if unstable := find_instability(found.case, joint, at, self.run, self.every):
             return unstable
-        reference = nodes.reference_of(replace(nodes.path, case=found.case), found.point, self.run)
+        reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
         # folds of a ramp are load factors
-        fold = (nodes.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
+        fold = (present.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
         return StartState(
             outcome=Outcome.CONVERGED if found.accurate else Outcome.INACCURATE,
             state=periodic_state(joint, found.point),
@@ -220,18 +220,18 @@ class FrequencySweep:
             resolution=found.case.resolution,
             response_error=estimate.response,
             wear_rate_error=estimate.wear_rate,
-            branch=nodes.branch + len(folds),
+            branch=present.branch + len(folds),
             fold_frequency=float(fold),
             reference=None if reference is None else periodic_state(joint, reference),
         )
 
 
-def lost(nodes: Sweep[State], failure: Failure) -> Failure:
+def lost(present: Sweep[State], failure: Failure) -> Failure:
     """Why a sweep has no state, and where its states end. failure: of the last search."""
-    if nodes.last is None:
+    if present.last is None:
         return failure
     reason = Outcome.BRANCH_LOST if failure.outcome is Outcome.START_FAILED else failure.outcome
-    return Failure(reason, f"stable states end {nodes.path.describe(nodes.last)}")
+    return Failure(reason, f"stable states end {present.path.describe(present.last)}")
 
 
 def cell_of(frequency: float) -> int:

@@ -8,8 +8,8 @@ from typing import ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.accuracy.refinement import VIBRATION_RECHECK, refine
-from solver.accuracy.resolved_state import nothing_happens
+from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
+from solver.accuracy.resolved_state import Estimate, left_out, nothing_happens
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
@@ -115,8 +115,8 @@ class Path(ABC, Generic[S]):
         """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
         return False
 
-    def suits(self, checked: S, state: S) -> bool:
-        """Whether the harmonics chosen for an earlier state are about those of a state."""
+    def suits(self, checked: S, _: float, state: S) -> bool:
+        """Whether the harmonics chosen for an earlier state, with an estimated error, are about those of a state."""
         return self.differs(checked, state) <= VIBRATION_RECHECK
 
     def at(self, resolution: Resolution) -> Self:
@@ -135,8 +135,8 @@ class Path(ABC, Generic[S]):
         return other.near(state, start, balance.history, run.fresh())
 
     @abstractmethod
-    def choose(self, state: S, run: Run) -> tuple[Self, S, float]:
-        """Path and state with the harmonics that the state needs, and the relative error of its response."""
+    def choose(self, state: S, run: Run) -> tuple[Self, S, Estimate]:
+        """Path and state with the harmonics that the state needs, and its estimated error."""
 
     @abstractmethod
     def describe(self, state: S) -> str:
@@ -253,18 +253,29 @@ class LoadingPath(Path[State]):
         moved = np.abs(at.displacement_h[:, 1:, 1:]).sum(axis=(1, 2))
         return bool((opens | (slip > LEAST_SLIP * moved)).all())
 
-    def suits(self, checked: State, state: State) -> bool:
-        """As in Path; any harmonics where all pairs slip and none opens: such a node only serves to begin the next."""
-        if super().suits(checked, state):
-            return True
-        if self.rests(state):
-            return self.case.resolution == first_resolution(self.case.settings)
-        return self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any()
+    def suits(self, checked: State, error: float, state: State) -> bool:
+        """As in Path: the error grows and falls with the part of the contact force in harmonics that are left out.
 
-    def choose(self, state: State, run: Run) -> tuple[Self, State, float]:
+        Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice.
+        """
+        settings, resolution = self.case.settings, self.case.resolution
+        fewest = resolution == first_resolution(settings)
+        if super().suits(checked, error, state) or (fewest and self.rests(state)):
+            return True
+        if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
+            return True
+        before, now = (left_out(resolution.orders, at.evaluation) for at in (checked, state))
+        if self.rests(state) or not (0.0 < error < np.inf and before > 0.0):
+            return False
+        foreseen = error * now / before
+        enough = fewest or foreseen >= KEPT_FRACTION**2 * settings.rtol
+        # where the error is above rtol already, there are no more harmonics
+        return enough and (foreseen <= settings.rtol or error > settings.rtol)
+
+    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:
         """As in Path."""
         found = refine(self.case, self.joint_of(state), state, run, node=True)
-        return replace(self, case=found.case), found.point, found.estimate.response
+        return replace(self, case=found.case), found.point, found.estimate
 
     def describe(self, state: State) -> str:
         """As in Path, with the number of pairs that slip or open."""

@@ -55,54 +55,58 @@ def follow_branch(
         to frequencies not yet passed. The states are equal to the last bit, except `run_time`.
     """
     asked = model, friction_coefficient, excitation_amplitude, sweep, settings
-    line = FrequencySweep(*asked, keep=keep or (lambda _: None))
+    sweeps = FrequencySweep(*asked, keep=keep or (lambda _: None))
     if resume is not None:
-        line.load(resume)
-    return follow_line(line, frequencies)
+        sweeps.load(resume)
+    return states_of_sweeps(sweeps, frequencies)
 
 
-def follow_line(line: FrequencySweep, frequencies: FloatArray | FollowedFrequency) -> Iterator[tuple[int, StartState]]:
-    """The states of `follow_branch` from a sweep before its first state."""
+def states_of_sweeps(
+    sweeps: FrequencySweep, frequencies: FloatArray | FollowedFrequency
+) -> Iterator[tuple[int, StartState]]:
+    """The states of `follow_branch`, from sweeps before their first state."""
     n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
     started = computing_time()
-    for index in np.arange(n_states)[:: -1 if line.sweep == "down" else 1].tolist():
-        line.set_deadline(started + line.settings.time_limit)
-        ended = guarded(partial(_next_state, line, frequencies, index))
-        found = line.without_state(ended) if isinstance(ended, Failure) else ended
+    for index in np.arange(n_states)[:: -1 if sweeps.direction == "down" else 1].tolist():
+        sweeps.set_deadline(started + sweeps.settings.time_limit)
+        ended = guarded(partial(_next_state, sweeps, frequencies, index))
+        found = sweeps.without_state(ended) if isinstance(ended, Failure) else ended
         now = computing_time()
-        yield index, replace(found, newton_iterations=line.n_iterations, run_time=now - started)
+        yield index, replace(found, newton_iterations=sweeps.n_iterations, run_time=now - started)
         started = now
-        line.save()
+        sweeps.save()
 
 
-def _next_state(line: FrequencySweep, frequencies: FloatArray | FollowedFrequency, index: int) -> StartState | Failure:
+def _next_state(
+    sweeps: FrequencySweep, frequencies: FloatArray | FollowedFrequency, index: int
+) -> StartState | Failure:
     if not isinstance(frequencies, FollowedFrequency):
-        return line.advance(float(frequencies[index]))
-    resonance = find_resonance(line, frequencies)
-    return resonance if isinstance(resonance, Failure) else line.advance(resonance)
+        return sweeps.advance(float(frequencies[index]))
+    resonance = find_resonance(sweeps, frequencies)
+    return resonance if isinstance(resonance, Failure) else sweeps.advance(resonance)
 
 
-def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float | Failure:
+def find_resonance(sweeps: FrequencySweep, follow: FollowedFrequency) -> float | Failure:
     """Frequency of the first resonance that a sweep meets in a range, Hz, or why it meets none.
 
-    line: sweep "up" or "down", at its beginning or as saved on its way.
+    sweeps: "up" or "down", at their beginning or as saved on their way.
     """
-    for near, far in _segments(follow, line.sweep == "down"):
+    for near, far in _segments(follow, sweeps.direction == "down"):
         # the state at a frequency belongs to the sweep of its cell
-        nodes = line.sweep_to(0.5 * (near + far), beyond=True)
-        nodes.advance_to(2.0 * math.pi * near)
-        while (here := nodes.here) is not None and (step := nodes.ahead) is not None:
-            found = _resonance_between(line, nodes, here, step, follow)
+        present = sweeps.sweep_to(0.5 * (near + far), beyond=True)
+        present.advance_to(2.0 * math.pi * near)
+        while (here := present.here) is not None and (step := present.ahead) is not None:
+            found = _resonance_between(sweeps, present, here, step, follow)
             if found is not None:
                 return found
             end = step.state.parameter
-            if (2.0 * math.pi * far - end) * nodes.direction <= 0.0:
+            if (2.0 * math.pi * far - end) * present.sign <= 0.0:
                 break
-            nodes.advance_to(float(np.nextafter(end, nodes.direction * math.inf)))
+            present.advance_to(float(np.nextafter(end, present.sign * math.inf)))
         else:
-            return lost(nodes, nodes.failure or Failure(Outcome.BRANCH_LOST))
+            return lost(present, present.failure or Failure(Outcome.BRANCH_LOST))
     within = f"between {follow.low:g} and {follow.high:g} Hz: give another range"
-    return Failure(Outcome.RESONANCE_LOST, f"the sweep {line.sweep} meets no {follow.of} {within}")
+    return Failure(Outcome.RESONANCE_LOST, f"the sweep {sweeps.direction} meets no {follow.of} {within}")
 
 
 def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, float]]:
@@ -113,35 +117,35 @@ def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, fl
 
 
 def _resonance_between(
-    line: FrequencySweep, nodes: Sweep[State], here: State, step: Step[State], follow: FollowedFrequency
+    sweeps: FrequencySweep, present: Sweep[State], here: State, step: Step[State], follow: FollowedFrequency
 ) -> float | Failure | None:
     """Frequency, Hz, of a resonance between two nodes, with the history of the first one; None where there is none."""
-    case, load, ahead = nodes.path.case, line.excitation_amplitude, step.state
+    path, load, ahead = present.path, sweeps.excitation_amplitude, step.state
     # positive before a resonance on the way of the sweep, negative behind
-    one, other = (nodes.direction * math.cos(phase_lag(nodes.path.joint_of(at), at.evaluation)) for at in (here, ahead))
+    one, other = (present.sign * math.cos(phase_lag(path.joint_of(at), at.evaluation)) for at in (here, ahead))
     if not one > 0.0 >= other:
         return None
     part = 0.0 if step.folds else one / (one - other)
-    joint = case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
+    joint = path.case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
     balance = Balance(joint, history_at_rest(joint, here), here.evaluation.wear_depth)
     before = here.evaluation.predicted_h
-    run = Run(line.settings.tolerance, Budget(deadline=line.run.budget.deadline))
+    run = Run(sweeps.settings.tolerance, Budget(deadline=sweeps.run.budget.deadline))
     start = before + part * (ahead.evaluation.predicted_h - before)
-    found = solve_at_lag(case, balance, start, 0.5 * math.pi, run)
+    found = solve_at_lag(path.case, balance, start, 0.5 * math.pi, run)
     omega = math.nan if found is None else float(found.values[0])
     if not abs(omega - joint.omega) <= 2.0 * abs(ahead.parameter - here.parameter):
         # none, or another resonance
         found = None
     for fold in step.folds:
-        before_fold = (fold - omega) * nodes.direction > FREE_STEP * fold
+        before_fold = (fold - omega) * present.sign > FREE_STEP * fold
         if found is None or not before_fold or not run.is_stable(found.balance, found.at):
-            way = f'give sweep = "{"down" if line.sweep == "up" else "up"}"'
-            over = f"the sweep {line.sweep} jumps over the resonance at {fold / (2.0 * math.pi):.6g} Hz"
+            way = f'give sweep = "{"down" if sweeps.direction == "up" else "up"}"'
+            over = f"the sweep {sweeps.direction} jumps over the resonance at {fold / (2.0 * math.pi):.6g} Hz"
             return Failure(Outcome.RESONANCE_LOST, f"{over}: {way}")
     if found is not None and not follow.low <= omega / (2.0 * math.pi) <= follow.high:
         return None
     if found is not None and follow.of == "peak":
-        peak = solve_at_peak(case, found.balance, found.at.predicted_h, 0.5 * math.pi, run)
+        peak = solve_at_peak(path.case, found.balance, found.at.predicted_h, 0.5 * math.pi, run)
         found = None if peak is None else peak[0]
     if found is None:
         return Failure(Outcome.RESONANCE_LOST, f"no {follow.of} is found near {joint.omega / (2.0 * math.pi):.6g} Hz")

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Generic
 
-from solver.accuracy.resolved_state import fewer
+from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure, carried_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, Path, S, Step
@@ -61,18 +61,18 @@ class Nodes:
         return replace(self, states=(*self.states, state)[-KEPT_NODES:])
 
 
-_SAVED = ("nodes", "failure", "length", "rate", "checked", "branch", "fold", "reference", "skipped")
+_SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
 """Attributes of a `Sweep` with which it goes on from a node, and the Newton iterations so far."""
 
 
 class Sweep(Generic[S]):
-    """A sweep, node by node, up (direction 1) or down (-1) along the parameter of its path; the line of `take_step`.
+    """A sweep, node by node, up (sign 1) or down (-1) along the parameter of its path; stepped by `take_step`.
 
     budget: of the nodes, those of the reference sweep included. save: called where the sweep was saved, as `saved`.
     nodes, ahead: last nodes, and the next one, where it is known. passed: parameters of the nodes so far.
     failure: why there is no state, at the start or behind the last node; None where there is one.
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
-    checked: the node at which the harmonics were chosen.
+    checked, error: the node at which the harmonics were chosen, and its largest estimated error.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
     reference: last nodes of the reference sweep, None for none; skipped: parameters of the nodes since then.
     """
@@ -80,13 +80,13 @@ class Sweep(Generic[S]):
     def __init__(
         self,
         path: Path[S],
-        direction: float,
+        sign: float,
         budget: Budget,
         *,
         with_reference: bool = True,
         save: Callable[[], None] = lambda: None,
     ) -> None:
-        self.path, self.direction, self.budget, self.save = path, direction, budget, save
+        self.path, self.sign, self.budget, self.save = path, sign, budget, save
         self.with_reference = with_reference
         self.run = self._reference_run = Run(path.case.settings.tolerance, budget)
         self.nodes = Nodes(path.case.resolution)
@@ -95,6 +95,7 @@ class Sweep(Generic[S]):
         self.failure: Failure | None = Failure(Outcome.START_FAILED)
         self.length, self.rate = path.longest, 0.0
         self.checked: S | None = None
+        self.error = 0.0
         self.branch, self.fold = 0, math.nan
         self.reference: Nodes | None = None
         self.skipped: tuple[float, ...] = ()
@@ -146,7 +147,7 @@ class Sweep(Generic[S]):
         while (here := self.here) is not None:
             if self.ahead is None:
                 self._look_ahead(here)
-            elif (self.ahead.state.parameter - parameter) * self.direction >= 0.0:
+            elif (self.ahead.state.parameter - parameter) * self.sign >= 0.0:
                 return
             else:
                 self._advance(here, self.ahead)
@@ -164,20 +165,20 @@ class Sweep(Generic[S]):
         return path.rescue(self.here, parameter, run) if found is None else Step(found)
 
     def attempt(self, here: S, length: float) -> Step[S] | None:
-        """As in Line."""
+        """As in SteppedProblem."""
         run = self.run.with_tolerance(self.path.case.settings.rough_tolerance)
-        found = self.path.solve(self.nodes.states, self.path.ahead(here.parameter, self.direction * length), run)
+        found = self.path.solve(self.nodes.states, self.path.ahead(here.parameter, self.sign * length), run)
         return None if found is None else Step(found)
 
     def ratio(self, here: S, end: Step[S], length: float) -> float:
-        """As in Line: the shortest step is accepted, whatever the change of the vibration is."""
+        """As in SteppedProblem: the shortest step is accepted, whatever the change of the vibration is."""
         ratio = self.path.change(here, end.state)
         self.rate = ratio / length
         return min(ratio, 1.0) if length <= self.path.shortest else ratio
 
     def rescue(self, here: S, length: float) -> Step[S] | Failure:
-        """As in Line."""
-        return self.path.rescue(here, self.path.ahead(here.parameter, self.direction * length), self.run)
+        """As in SteppedProblem."""
+        return self.path.rescue(here, self.path.ahead(here.parameter, self.sign * length), self.run)
 
     def _look_ahead(self, here: S) -> None:
         """Find the next node, or lose the sweep."""
@@ -203,7 +204,7 @@ class Sweep(Generic[S]):
         self.branch, self.fold = self.branch + len(step.folds), (self.fold, *step.folds)[-1]
         if self.with_reference:
             self._lead_reference(before, step)
-        if self.checked is None or not self.path.suits(self.checked, step.state):
+        if self.checked is None or not self.path.suits(self.checked, self.error, step.state):
             self._choose_resolution()
         if self.budget.iterations >= self.saved["iterations"] + ITERATIONS_PER_SAVE:
             self._save()
@@ -240,7 +241,7 @@ class Sweep(Generic[S]):
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
-        self.checked, error = self.nodes.states[-1], 0.0
+        self.checked, error = self.nodes.states[-1], NOTHING
         if self.path.case.settings.automatic:
             path, self.checked, error = self.path.choose(self.checked, self.run)
             if path.case.resolution == self.nodes.resolution:
@@ -248,7 +249,8 @@ class Sweep(Generic[S]):
             else:
                 self.nodes, self.path = Nodes(path.case.resolution, (self.checked,)), path
                 self.run = self.run.fresh()
-        return error
+        self.error = error.largest
+        return error.response
 
     def _save(self) -> None:
         """Save the current node, and go on as a sweep that is resumed there."""

@@ -16,7 +16,7 @@ from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.start_states import follow_line
+from solver.loading_history.start_states import states_of_sweeps
 from solver.loading_history.sweep import KEPT_NODES, STEPS_OF_REFERENCE
 from solver.missions.mission import Block, MissionRequest, Passage
 from solver.model import ComplexArray, FloatArray, ReducedModel
@@ -148,14 +148,14 @@ class BlockCase:
         """A computation until the deadline."""
         return Run(self.mission.settings.tolerance, Budget(deadline=self.deadline))
 
-    def line(self, sweep: Direction, amplitude: float | None = None) -> FrequencySweep:
+    def sweeps(self, direction: Direction, amplitude: float | None = None) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N; that of the block if not given."""
         load = self.block.excitation_amplitude if amplitude is None else amplitude
         settings = replace(self.mission.settings, time_limit=self.time_left)
-        line = FrequencySweep(self.model, self.block.friction_coefficient, load, sweep, settings)
-        line.every = self.every
-        line.set_deadline(self.deadline)
-        return line
+        sweeps = FrequencySweep(self.model, self.block.friction_coefficient, load, direction, settings)
+        sweeps.every = self.every
+        sweeps.set_deadline(self.deadline)
+        return sweeps
 
     def at(self, start: StartState) -> Case:
         """The case at the depth before the block, with harmonics, samples and penalty of a state."""
@@ -233,13 +233,13 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
     if case.begun is not None and (again := _by_earlier_sweep(case, case.begun)) is not None:
         return again, case.begun
     way = case.block.way
-    line = case.line(case.mission.first if way == "continue" else way)
-    _, start = next(follow_line(line, np.array([case.block.ends[0]])))
-    nodes = line.nodes
-    if start.state is None or nodes is None or way == "continue":
+    sweeps = case.sweeps(case.mission.first if way == "continue" else way)
+    _, start = next(states_of_sweeps(sweeps, np.array([case.block.ends[0]])))
+    present = sweeps.present
+    if start.state is None or present is None or way == "continue":
         return start, None
-    passed = tuple(nodes.passed) if nodes.here is not None and start.branch == 0 else ()
-    return start, Begun(passed, start, nodes.path.case.resolution)
+    passed = tuple(present.passed) if present.here is not None and start.branch == 0 else ()
+    return start, Begun(passed, start, present.path.case.resolution)
 
 
 def _by_earlier_sweep(case: BlockCase, begun: Begun) -> StartState | None:
@@ -324,11 +324,11 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
             break
         if here.excitation_amplitude == load if way == "ramp" else here.omega == 2.0 * np.pi * target:
             continue
-        line, (setup, last) = case.line(way, load), case.begin(start)
+        sweeps, (setup, last) = case.sweeps(way, load), case.begin(start)
         parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
-        if not line.go_on_from(setup.case, replace(last.point, parameter=parameter), target):
+        if not sweeps.go_on_from(setup.case, replace(last.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)
-        _, after = next(follow_line(line, np.array([target])))
+        _, after = next(states_of_sweeps(sweeps, np.array([target])))
         start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)
         iterations += after.newton_iterations
     return replace(start, newton_iterations=iterations)

@@ -24,8 +24,8 @@ from solver.packing import Packed, packable
 from solver.results.history import describe_cut_off, describe_uncertain
 from solver.wear.history import compare
 from solver.wear.slow_time import (
-    AS_ASKED,
     ENDS_ALL,
+    REGULAR_END,
     RTOL_RATIO,
     Course,
     Guide,
@@ -64,7 +64,7 @@ Here = tuple[MissionState, Course]
 
 
 class MissionProblem:
-    """A mission history, or its reference solution, as `SlowProblem`; its missions are the line of `take_step`.
+    """A mission history, or its reference solution, as `SlowProblem`; stepped by `take_step` over its missions.
 
     fine: the history of which it is the reference solution; None for a history.
     """
@@ -80,7 +80,7 @@ class MissionProblem:
         self._begun: list[Begun | None] = []
         self._failure = Failure(Outcome.MARCH_FAILED)
 
-    def fresh(self) -> None:
+    def drop_factor(self) -> None:
         """As in SlowProblem: nothing."""
 
     def advance(self, state: MissionState | None, course: Course) -> Here | Failure:
@@ -88,8 +88,9 @@ class MissionProblem:
         state = state or MissionState()
         done = int(course.ends[-1])
         if done >= self.last or (self.fine is None and not math.isnan(course.reached)):
-            return AS_ASKED
+            return REGULAR_END
         longest = min(self.last - done, self.mission.largest_step or self.last)
+        # a step over more than one extrapolates from three nodes
         longest = min(longest, self.last if len(course.ends) > 2 else 1)
         earlier = state.runs if done or self.fine is None else self.fine.state.first
         self._begun = [run.begun for run in earlier] or [None] * len(self.mission.blocks)
@@ -113,21 +114,21 @@ class MissionProblem:
         return after, course.after(step.node)
 
     def attempt(self, here: Here, length: float) -> MissionStep | None:
-        """As in Line. The last mission of the step is computed."""
+        """As in SteppedProblem. The last mission of the step is computed."""
         nodes, rtol = here[1].nodes, self.mission.settings.rtol * (1.0 if self.fine is None else RTOL_RATIO)
-        run = partial(self._mission, here[0], int(nodes[-1].count + length))
-        found = attempt_step(nodes, int(length), self.mission.area, run, STEP_ERROR_FRACTION * rtol)
+        run_mission = partial(self._mission, here[0], int(nodes[-1].count + length))
+        found = attempt_step(nodes, int(length), self.mission.area, run_mission, STEP_ERROR_FRACTION * rtol)
         if isinstance(found, MissionStep):
             return found
         self._failure = found
         return None
 
     def ratio(self, _: Here, end: MissionStep, __: float) -> float:
-        """As in Line."""
+        """As in SteppedProblem."""
         return end.ratio
 
     def rescue(self, _: Here, __: float) -> Failure:
-        """As in Line: a mission that fails by itself ends the history."""
+        """As in SteppedProblem: a mission that fails by itself ends the history."""
         return self._failure
 
     def _mission(

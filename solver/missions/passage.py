@@ -33,7 +33,7 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure, largest_responses
-from solver.loading_history.start_states import follow_line
+from solver.loading_history.start_states import states_of_sweeps
 from solver.missions.block_run import Begun, BlockCase, BlockRun
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
@@ -223,20 +223,20 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    found, line = [], case.line(case.passage.sweep)
+    found, sweeps = [], case.sweeps(case.passage.sweep)
     if case.guide is not None:
         # errors of a reference solution are not used
-        line.known = case.guide.resolutions
-    for index, start in follow_line(line, frequencies):
+        sweeps.known = case.guide.resolutions
+    for index, start in states_of_sweeps(sweeps, frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() > case.deadline:
             return Failure(Outcome.TIME_LIMIT)
-        setup, begun = case.begin(start)
-        joint, frequency = setup.joint_of(begun), float(frequencies[index])
-        density = begun.rate * frequency / case.passage.rate
-        response = to_complex(joint.structure.response_h(joint.to_relative(begun.at.displacement_h)))[:, 0]
-        found.append(SweptState(frequency, start, density, response, largest_responses(joint, begun.at)))
+        setup, state = case.begin(start)
+        joint, frequency = setup.joint_of(state), float(frequencies[index])
+        density = state.rate * frequency / case.passage.rate
+        response = to_complex(joint.structure.response_h(joint.to_relative(state.at.displacement_h)))[:, 0]
+        found.append(SweptState(frequency, start, density, response, largest_responses(joint, state.at)))
     return found
 
 

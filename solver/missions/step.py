@@ -48,7 +48,7 @@ class MissionStep:
 
 
 def attempt_step(
-    nodes: Sequence[Node], length: int, area: FloatArray, run: RunMission, share: float
+    nodes: Sequence[Node], length: int, area: FloatArray, run_mission: RunMission, share: float
 ) -> MissionStep | Failure:
     """A step over missions; over more than one from the third mission on.
 
@@ -69,7 +69,7 @@ def attempt_step(
         base = base + (h - 1.0) * h / (2.0 * h - 1.0 + a) * last
         factor = float((h - 1.0) * (h - 1.0 + a) / (2.0 * h - 1.0 + a))
         first, error_factor = np.maximum(first, base.sum(axis=0)), float(factor / (h + a + b))
-    runs = run(first, length > 1)
+    runs = run_mission(first, length > 1)
     if isinstance(runs, Failure):
         return runs
     rates, error = np.array([each.growth for each in runs]), np.zeros(area.size)

@@ -17,6 +17,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from solver.accuracy.refinement import refine
+from solver.accuracy.resolved_state import NOTHING, Estimate
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
@@ -151,13 +152,13 @@ class NonlinearMode(Path[ModeState]):
         """As in Path."""
         return self.find(state.parameter, (predicted_h, state.values), history, run)
 
-    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, float]:
+    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:
         """As in Path."""
         found = refine(self.case_of(state.values), self.joint_of(state), state, run, node=True)
         other = self.at(found.case.resolution)
         moved = state if other.case is self.case else self.move(state, other, run)
         # the error of the first response is judged in a sweep of the frequency only
-        return (self, state, 0.0) if moved is None else (other, moved, 0.0)
+        return (self, state, NOTHING) if moved is None else (other, moved, NOTHING)
 
     def describe(self, state: ModeState) -> str:
         """As in Path."""

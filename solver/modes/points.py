@@ -175,10 +175,10 @@ class _Way:
         return self.down
 
 
-def _begun(mode: NonlinearMode, first: ModeState | None, direction: float, budget: Budget) -> Sweep[ModeState] | None:
+def _begun(mode: NonlinearMode, first: ModeState | None, sign: float, budget: Budget) -> Sweep[ModeState] | None:
     if first is None:
         return None
-    sweep: Sweep[ModeState] = Sweep(mode, direction, budget)
+    sweep: Sweep[ModeState] = Sweep(mode, sign, budget)
     sweep.begin(mode, first)
     return sweep
 
@@ -235,14 +235,14 @@ def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> Fl
         # twice as many samples come last: an event may stay next to the same sample
         for samples in (3 * other.samples + 2, 4 * other.samples + 2, 2 * other.samples):
             richer = mode.at(Resolution(other.orders, samples))
-            if mode.model.holds(other.highest) and (found := mode.move(state, richer, run)) is not None:
+            if mode.model.has_harmonics(other.highest) and (found := mode.move(state, richer, run)) is not None:
                 return ERROR_OVER_CHANGE * np.abs(found.values - state.values)
     return np.full(3, math.inf)
 
 
 def _lost(sweep: Sweep[ModeState]) -> Failure:
     """The end of a mode: its last amplitude, and what may end the mode there."""
-    here, (way, beyond) = sweep.last, ("up", "larger") if sweep.direction > 0.0 else ("down", "smaller")
+    here, (way, beyond) = sweep.last, ("up", "larger") if sweep.sign > 0.0 else ("down", "smaller")
     assert here is not None
     at = f"{here.parameter:.4g} m sqrt(kg), at {here.omega / (2.0 * np.pi):.6g} Hz"
     ends = "the mode turns back there (a fold), meets another mode at a multiple of its frequency, or ends"

@@ -21,14 +21,13 @@ this fraction at most, far below any rtol. Dovetail, friction 0.3, 1 N: 5e-7 to 
 @packable
 @dataclass(frozen=True)
 class PeriodicState:
-    """One periodic state of the joint.
+    """One periodic state of a joint whose gaps contain what has worn before.
 
     omega: angular frequency, rad/s. excitation_amplitude: N.
     displacement_h (n_contact, 3, 2H+1): relative displacement, m, harmonics ordered 0, cos 1, sin 1, ...
     contact_force_h (n_contact, 3, 2H+1): contact force, N, compression positive.
     start_history (n_contact, 2): corrected slip X_T at the start of the solution, m, which reproduces the state. The
         next state starts from the slip at the end of the period.
-    wear_depth (n_contact,): m.
     """
 
     omega: float
@@ -36,7 +35,6 @@ class PeriodicState:
     displacement_h: FloatArray
     contact_force_h: FloatArray
     start_history: FloatArray
-    wear_depth: FloatArray
 
 
 @packable

@@ -25,13 +25,13 @@ LOOP_PHASES = 128
 def periodic_state(joint: Joint, point: State) -> PeriodicState:
     """The state as a result in physical units; its arrays lie in rows, as when read from a file."""
     at = point.evaluation
-    arrays = (at.displacement_h, at.force_h, at.history, at.wear_depth)
+    arrays = (at.displacement_h, at.force_h, at.history)
     return PeriodicState(joint.omega, joint.excitation_amplitude, *(np.array(each, order="C") for each in arrays))
 
 
 def evaluated(joint: Joint, state: PeriodicState) -> tuple[Balance, Evaluation]:
-    """The balance of a state of a joint whose gaps hold the wear, and its evaluation."""
-    balance = Balance(joint, state.start_history, np.zeros_like(state.wear_depth))
+    """The balance of a state, and its evaluation."""
+    balance = Balance(joint, state.start_history, np.zeros(joint.contact.n_contact))
     return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
 
 

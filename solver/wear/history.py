@@ -85,7 +85,7 @@ def _solve(integrator: Integrator, case: Case, start: StartState, asked: WearReq
         # one for all given steps to one last count; to another end no longer than needed
         known = not isinstance(asked.cycles, ToTheEnd) and asked.until is None
         cycles = _counts(asked, own) if known else np.array([0.0, min(own.course.ends[-1], asked.end)])
-        adaptive = asked.compared(Adaptive(case.settings.rtol), cycles)
+        adaptive = asked.with_steps(Adaptive(case.settings.rtol), cycles)
         return replace(own, compared=_solve(integrator, case, start, adaptive, spent))
     guide = Guide(own.state.resolutions, own.state.first_length)
     # NaN where no target was reached

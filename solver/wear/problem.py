@@ -39,7 +39,7 @@ from solver.settings import (
 from solver.structure.joint import Case
 from solver.wear.check import end_of_wear, full_check, report_only, unstable_at_end
 from solver.wear.jump import jump
-from solver.wear.slow_time import AS_ASKED, RTOL_RATIO, Course, Guide, Node
+from solver.wear.slow_time import REGULAR_END, RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import allowed_error, attempt_step, explicit_step_limit, too_long
 from solver.wear.wearing_joint import WearingJoint, WearState
 
@@ -125,7 +125,7 @@ class WearRequest:
         """Last cycle count; inf where it is not known."""
         return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
 
-    def compared(self, steps: Adaptive, counts: FloatArray) -> WearRequest:
+    def with_steps(self, steps: Adaptive, counts: FloatArray) -> WearRequest:
         """The same with other steps, to the last of some counts (n,), whatever target is reached before."""
         never = self.until and replace(self.until, value=math.inf)
         return replace(self, steps=steps, cycles=counts, until=never)
@@ -133,10 +133,10 @@ class WearRequest:
 
 class WearProblem:
     """The problem over the slow time of a history, or of the reference solution of an adaptive one, as `SlowProblem`;
-    its cycles are the line of `take_step`.
+    stepped by `take_step` over its cycles.
 
     guide: of a reference solution; None for a history. stable_end: whether the stability of the last state is tested.
-    limit: cycle count beyond which no step goes; adaptive steps go beyond the last count, where nothing begins there.
+    limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`.
     """
 
     # 1 s of 48 pairs, 17 s of 336; the cost of one more factorisation is negligible
@@ -158,7 +158,7 @@ class WearProblem:
         self.course = Course(self.setup.area, counts, asked.until)
         self.limit = math.inf if isinstance(self.steps, Adaptive) and not asked.ends_at_last else asked.end
 
-    def fresh(self) -> None:
+    def drop_factor(self) -> None:
         """As in SlowProblem."""
         self.setup.drop_factor()
 
@@ -197,13 +197,13 @@ class WearProblem:
         found, cycles, end = None, self.asked.cycles, self.asked.end
         still = not state.wears and end == math.inf
         if still or not math.isnan(course.reached) or course.ends[-1] >= end * (1.0 - 1e-12):
-            found = AS_ASKED
+            found = REGULAR_END
         elif isinstance(cycles, ToTheEnd):
-            found = end_of_wear(self.setup, state, course, cycles.final_share)
+            found = end_of_wear(state, course, cycles.final_share)
         most = HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
         if found is None and state.wears and self.budget.iterations > most:
             found = Failure(Outcome.MARCH_FAILED)
-        if found is AS_ASKED and self.stable_end:
+        if found is REGULAR_END and self.stable_end:
             found = unstable_at_end(self.setup, state) or found
         return found
 
@@ -243,7 +243,13 @@ class WearProblem:
         end, follow = replace(taken[0], length=taken[1]), self.asked.follow
         if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
             return self.setup.lost(end)
-        return too_long(self.setup, state, end.depth, end.cycle - state.cycle) or end
+        return self._too_long(state, end.depth, end.cycle - state.cycle) or end
+
+    def _too_long(self, state: WearState, depth: FloatArray, length: float) -> Failure | None:
+        """As `too_long`; never of a reference solution, whose difference is the warning: in a last long step nearly all
+        of the force of a joint that comes to its end is moved.
+        """
+        return None if self.guide is not None else too_long(self.setup, state, depth, length)
 
     def _shortest(self, state: WearState, length: float) -> float:
         """Shortest step, cycles, of one that is `length` long: the accuracy to which a branch end is located."""
@@ -252,14 +258,14 @@ class WearProblem:
         return SHORTEST_STEP * length
 
     def attempt(self, state: WearState, length: float) -> WearState | None:
-        """As in Line."""
+        """As in SteppedProblem."""
         if isinstance(self.steps, Adaptive):
             return attempt_step(self.setup, state, length, "adaptive")
         return self._euler_step(state, length, self.steps.scheme)
 
     def ratio(self, state: WearState, end: WearState, length: float) -> float:
-        """As in Line: an Euler step counts whatever its error, the shortest adaptive step where the vibration changes
-        little: at a corner of the wear rate.
+        """As in SteppedProblem: an Euler step counts whatever its error, the shortest adaptive step where the vibration
+        changes little: at a corner of the wear rate.
         """
         if not isinstance(self.steps, Adaptive):
             return 0.0
@@ -269,14 +275,14 @@ class WearProblem:
         return min(ratio, 1.0) if smooth else ratio
 
     def rescue(self, state: WearState, length: float) -> WearState | Failure:
-        """As in Line. In this order: an Euler step, a longer step across corners (both adaptive only), and a jump."""
+        """As in SteppedProblem. In this order: an Euler step, a longer one across corners (both adaptive), a jump."""
         setup = self.setup
         if isinstance(self.steps, Adaptive):
             found = self._euler_step(state, length, "implicit") or self._step_across(state, length)
             if found is not None:
                 return found
         worn = state.depth + length * state.rate
-        if (failure := too_long(setup, state, worn, length)) is not None:
+        if (failure := self._too_long(state, worn, length)) is not None:
             return failure
         beyond = jump(setup, state, worn, state.cycle + length)
         if isinstance(beyond, Failure):
@@ -313,7 +319,7 @@ def reference_of(case: Case, start: StartState, asked: WearRequest, guide: Guide
     """
     # a short history may consist of its first steps, which do not depend on rtol
     first = guide.first_length * (2.0 if asked.ends_at_last else 1.0)
-    return WearProblem(case, start, asked.compared(Adaptive(RTOL_RATIO * case.settings.rtol, first), counts), guide)
+    return WearProblem(case, start, asked.with_steps(Adaptive(RTOL_RATIO * case.settings.rtol, first), counts), guide)
 
 
 def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
@@ -321,7 +327,7 @@ def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
     that slips is another joint: three harmonics or one become more, where the model has matrices for them.
     """
     richer = shifted(resolution, 1)
-    if resolution.highest <= FIRST_HARMONICS and model.holds(richer.highest):
+    if resolution.highest <= FIRST_HARMONICS and model.has_harmonics(richer.highest):
         return richer
     # of automatic settings, which reduce both harmonics and samples
     return fewer(resolution, SolverSettings())

@@ -22,7 +22,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed, in_rows, pack, packable, unpack
 from solver.settings import Resolution, WearTarget
 
-AS_ASKED, UNFINISHED = Failure(Outcome.CONVERGED), Failure(Outcome.NOT_COMPUTED)
+REGULAR_END, UNFINISHED = Failure(Outcome.CONVERGED), Failure(Outcome.NOT_COMPUTED)
 """The regular end of a history, and that of one that goes on."""
 
 ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
@@ -181,7 +181,7 @@ class Course:
         """Count at which a target is reached, NaN if never, and its error by a resonance and its interpolation."""
         from scipy.optimize import brentq  # where it is used: it takes a while to load
 
-        values = self._compared(target, self.counts)
+        values = self._values_of(target, self.counts)
         end = int(np.argmax(values >= target.value))
         if not values[end] >= target.value:
             return math.nan, 0.0
@@ -189,7 +189,7 @@ class Course:
         low, high = float(self.counts[start]), float(self.counts[end])
 
         def above(fraction: float) -> float:
-            return float(self._compared(target, np.array([low + fraction * (high - low)]))[0]) - target.value
+            return float(self._values_of(target, np.array([low + fraction * (high - low)]))[0]) - target.value
 
         count = low if above(0.0) >= 0.0 else high
         if above(0.0) < 0.0 < above(1.0):
@@ -202,7 +202,7 @@ class Course:
         error = max(self.nodes[place].values["resonance_error"] for place in (0, end))
         return count, float(abs(count - straight) + error * per_shift)
 
-    def _compared(self, target: WearTarget, counts: FloatArray) -> FloatArray:
+    def _values_of(self, target: WearTarget, counts: FloatArray) -> FloatArray:
         """What a target is compared with at counts (n,): wear, or the relative shift of the resonance up or down."""
         if target.quantity == "frequency_shift":
             return np.asarray(np.abs(self.read(counts)["resonance"] / self.nodes[0].values["resonance"] - 1.0))
@@ -227,7 +227,7 @@ class SlowProblem(Protocol):
     def advance(self, state: Any, course: Course, /) -> tuple[Any, Course] | Failure:
         """State and course after the next step, or the first ones where the state is None; or why the history ends."""
 
-    def fresh(self) -> None:
+    def drop_factor(self) -> None:
         """Drop what a resumed history would not have beside its state."""
 
 
@@ -301,7 +301,7 @@ class Integrator:
             state, course = after
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
-                problem.fresh()
+                problem.drop_factor()
                 state, saved_at = in_rows(state), budget.iterations
                 self._known[name] = Solution(state, UNFINISHED, course, saved_at, computing_time() - began)
                 if self._keep is not None:

@@ -29,7 +29,8 @@ from studyrunner.system.process import uninterrupted
 from studyrunner.user_error import StorageError, UserError, Verbatim
 
 STARTS, PROGRESS, RESULTS, COMPUTED = "start", "progress", "result", "computed"
-"""Kinds of entries: start states; progress of tasks; results of points; what is computed once for a study."""
+"""Kinds of entries: start states; progress of tasks; results of points; what is computed once for a
+study, by the hash of its inputs."""
 
 LARGEST = 9 * 10**8
 """Largest size of an entry, bytes. SQLite has no larger ones."""
@@ -168,14 +169,6 @@ class Store:
             return from_blob(blob)
         self.forget(kind, key)
         return None
-
-    def keep_computed(self, key: str, value: Packed) -> None:
-        """Keeps what is computed once for a study. key: hash of its inputs."""
-        self.put(COMPUTED, key, value)
-
-    def read_computed(self, key: str) -> Packed | None:
-        """What `keep_computed` has kept, in this run or an earlier one; None where there is nothing."""
-        return self.read(COMPUTED, key)
 
     def forget(self, kind: str, key: str) -> None:
         """Removes an entry with the next transaction."""

@@ -110,7 +110,7 @@ def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_wi
 
 
 def largest_memory() -> float:
-    """Largest memory of this process so far, bytes; 0 where the system does not tell.
+    """Largest memory of this process so far, bytes; 0 where the system does not say.
 
     `getrusage` is not used: its value includes the memory of the process that has started this one.
     """

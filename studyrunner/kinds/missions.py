@@ -19,10 +19,10 @@ from studyrunner.kinds.estimate import iterations_of_missions, missions_computed
 from studyrunner.kinds.task import (
     Identity,
     Index,
-    Joint,
     Keep,
     PointResult,
     Task,
+    TaskJoint,
     TaskPlan,
     deepest,
     describe_target,
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
     from solver.model import ReducedModel
 
-_NO_JOINT = Joint(0, None)
+_NO_JOINT = TaskJoint(0, None)
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class PlannedBlock:
     """
 
     name: str
-    joint: Joint
+    joint: TaskJoint
     frequency: float | Passage
     excitation_amplitude: float
     cycles: float
@@ -116,9 +116,9 @@ class Mission(Task):
             keep(progress)
             keep(f"{next(n_computed)} of about {n_planned} missions that are computed")
 
-        kept = {int(number) for number in self.missions}
+        wanted = {int(number) for number in self.missions}
         # with those before, for the wear of one
-        read = tuple(sorted({0, 1} | kept | {max(number - 1, 0) for number in kept}))
+        read = tuple(sorted({0, 1} | wanted | {max(number - 1, 0) for number in wanted}))
         first = cast("Direction", self.first)
         asked = of_solver.MissionRequest(
             blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first

@@ -44,7 +44,7 @@ EQUAL_POINTS = "all values are those of another point"
 
 
 @dataclass(frozen=True)
-class Joint:
+class TaskJoint:
     """The joint that a task computes.
 
     scene: number of the scene (`SceneSet`). friction_coefficient: of all pairs; None where each pair has its own.
@@ -62,10 +62,10 @@ class Joint:
         return replace(model, contact=replace(model.contact, **drawn)) if drawn else model
 
 
-def joint_of(study: Study, scene: int, contact: ContactChange) -> Joint:
+def joint_of(study: Study, scene: int, contact: ContactChange) -> TaskJoint:
     """The joint of a part of a study. scene: its number. contact: what is drawn for its pairs."""
     of_pairs = any(name == "friction_coefficient" for name, _ in contact)
-    return Joint(scene, None if of_pairs else study.friction_coefficient, contact)
+    return TaskJoint(scene, None if of_pairs else study.friction_coefficient, contact)
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Identity:
     scenes: tuple[str, ...]
     record: str
 
-    def joint(self, joint: Joint) -> tuple[object, ...]:
+    def joint(self, joint: TaskJoint) -> tuple[object, ...]:
         """Scene and friction, and the solver."""
         return (self.scenes[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
 
@@ -220,7 +220,7 @@ class Task(ABC):
 class JointTask(Task):
     """A task of one joint."""
 
-    joint: Joint
+    joint: TaskJoint
 
     @property
     def scenes(self) -> tuple[int, ...]:

@@ -26,7 +26,7 @@ from studyrunner.kinds.task import (
     up_or_down,
 )
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.system.machine import MachineFaultError, tells_of_machine
+from studyrunner.system.machine import MachineFaultError, is_machine_fault
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -140,7 +140,7 @@ class Sweep(_FromRest):
             keep=keep,
             resume=self.resume,
         ):
-            if start.outcome is Outcome.EXCEPTION and tells_of_machine(start.message):
+            if start.outcome is Outcome.EXCEPTION and is_machine_fault(start.message):
                 raise MachineFaultError(start.message)
             n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
             yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
@@ -219,9 +219,9 @@ class History(_FromRest):
     def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the histories: of their start state, and of all that is done with it."""
         start = self.name_of_start(identity, self.frequency)
-        kept = _digest_once(identity.record, self.cycles, self.loops, self.until, self.to_the_end)
+        outputs = _digest_once(identity.record, self.cycles, self.loops, self.until, self.to_the_end)
         return tuple(
-            digest("history", start, kept, self.law, each.identity, number > 0, each.wear_coefficients[number])
+            digest("history", start, outputs, self.law, each.identity, number > 0, each.wear_coefficients[number])
             for each, number in self.results
         )
 
@@ -249,7 +249,7 @@ class History(_FromRest):
         if self.to_the_end is not None and not integrated.unworn:
             counts = self.to_the_end
         else:
-            # a history begins at cycle 0, whether that count is kept or not
+            # a history begins at cycle 0, whether that count is asked for or not
             read = (integrated.counts(self.cycles, number) for number in range(len(integrated.wear_coefficients)))
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
         return WearRequest(

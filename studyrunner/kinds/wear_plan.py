@@ -16,7 +16,7 @@ from typing import NamedTuple
 from solver.contact.wear_law import WearLaw
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
-from studyrunner.kinds.task import EQUAL_POINTS, Index, Joint, TaskPlan, grid, joint_of, n_unknowns_of, settings_at
+from studyrunner.kinds.task import EQUAL_POINTS, Index, TaskJoint, TaskPlan, grid, joint_of, n_unknowns_of, settings_at
 from studyrunner.kinds.wear import OWN_STEPS, History, Integrated, Sweep
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
@@ -41,7 +41,7 @@ _REASONS = {
 class _Case(NamedTuple):
     """What the states of a sweep have in common."""
 
-    joint: Joint
+    joint: TaskJoint
     excitation_amplitude: float
     direction: str
     settings: SolverSettings

@@ -14,7 +14,7 @@ from solver.results.history import WearHistory, judge, last_error
 from studyrunner.kinds.task import PointResult, deepest, describe_target, first_harmonic, named
 from studyrunner.kinds.wear import History, Integrated
 from studyrunner.units import describe_reach
-from studyrunner.variables import KEPT
+from studyrunner.variables import OF_A_HISTORY
 
 _ROUND_OFF = 1e-10
 
@@ -24,8 +24,8 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
 
     integrated: the history that was integrated. place: number among those that are read from it.
 
-    What is per cycle is per cycle of that history. It knows nothing of what came after its last count: jumps, errors,
-    the end of the integrated history. What was computed of a history that ends early is kept. Effort is that of the
+    What is per cycle is per cycle of that history. What came after its last count has no part in it: jumps, errors, the
+    end of the integrated history. A history that ends early has the values up to there. Effort is that of the
     integrated history.
     """
     slower = integrated.wear_coefficients[place] / integrated.wear_coefficients[0] if place else 1.0
@@ -66,7 +66,7 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
         "message": message or (describe_target(task.until, target, "cycle", whole=whole) if known.size else ""),
     }
-    values = _at_counts(history, task.variables, slower, rows, reached) | named(tuple(KEPT), own, history)
+    values = _at_counts(history, task.variables, slower, rows, reached) | named(tuple(OF_A_HISTORY), own, history)
     return PointResult(values, place)
 
 

@@ -71,7 +71,7 @@ class _Unseen:
     number: int
 
 
-class Office:
+class TaskHandler:
     """What rank 0 does with tasks, results and messages. All of it is called in the main thread.
 
     costs: learns the run times of the tasks.
@@ -102,13 +102,13 @@ class Office:
         """Called many times a second. running: returns the running tasks, as `Dispatcher.running`."""
 
 
-def serve_tasks(ranks: Ranks, office: Office, run: Run) -> None:
+def serve_tasks(ranks: Ranks, handler: TaskHandler, run: Run) -> None:
     """Rank 0: has all tasks done and computes some of them.
 
     An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here, and
     MachineFaultError or KeyboardInterrupt where another rank has said so.
     """
-    server = _Server(ranks, office, run)
+    server = _Server(ranks, handler, run)
     try:
         with uninterrupted():
             server.hand_out()
@@ -207,10 +207,10 @@ class _LocalWorker:
 
 
 class _Server:
-    def __init__(self, ranks: Ranks, office: Office, run: Run) -> None:
-        self._ranks, self._office = ranks, office
-        self._waiting = iter(office.begin())
-        self.dispatcher = Dispatcher(ranks.size, office.costs, time.monotonic)
+    def __init__(self, ranks: Ranks, handler: TaskHandler, run: Run) -> None:
+        self._ranks, self._handler = ranks, handler
+        self._waiting = iter(handler.begin())
+        self.dispatcher = Dispatcher(ranks.size, handler.costs, time.monotonic)
         self.local = _LocalWorker(run, ranks.size)
 
     def look(self) -> None:
@@ -223,7 +223,7 @@ class _Server:
             if quiet := received is None and message is None:
                 break
         self.dispatcher.watch()
-        self._office.tick(self.dispatcher.running)
+        self._handler.tick(self.dispatcher.running)
         if quiet:
             # no wait for a message: a signal may make that of `queue.SimpleQueue` endless in Python 3.11
             time.sleep(POLL_SECONDS)
@@ -233,7 +233,7 @@ class _Server:
         while self.dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
             self.dispatcher.add(more)
         for rank, number, task in self.dispatcher.assign():
-            self._send(rank, _Assignment(number, self._office.prepare(rank, task)))
+            self._send(rank, _Assignment(number, self._handler.prepare(rank, task)))
 
     def _send(self, rank: int, assignment: _Assignment) -> None:
         if rank == 0:
@@ -243,13 +243,13 @@ class _Server:
 
     def _accept(self, rank: int, message: object) -> None:
         if isinstance(message, _Progress):
-            self._office.keep(self.dispatcher.task(message.number), message.progress)
+            self._handler.keep(self.dispatcher.task(message.number), message.progress)
         elif isinstance(message, _Delivery):
             task = self.dispatcher.deliver(rank, message.number, message.seconds)
-            self.dispatcher.add(self._office.take(task, message.result))
+            self.dispatcher.add(self._handler.take(task, message.result))
             self.hand_out()
         elif isinstance(message, _Unseen):
-            task = self._office.prepare(rank, self.dispatcher.task(message.number), unseen=True)
+            task = self._handler.prepare(rank, self.dispatcher.task(message.number), unseen=True)
             self._send(rank, _Assignment(message.number, task))
         elif isinstance(message, RankInterrupted):
             begin_ending()

@@ -26,8 +26,8 @@ from studyrunner.variables import (
     ASKED,
     CERTIFICATE,
     COUNTS,
-    KEPT,
     LOOPS,
+    OF_A_HISTORY,
     OF_A_MISSION,
     OF_A_MODE_POINT,
     OF_MISSIONS,
@@ -82,18 +82,18 @@ def open_result(path: str | Path) -> xr.Dataset:
     """
     opened = _open(path)[0]
     # without axes of one value, which would leave no room for the words where the dataset is printed
-    kept = opened.assign_coords({ENDED: outcome_words(opened["outcome"]).squeeze(drop=True)})
+    result = opened.assign_coords({ENDED: outcome_words(opened["outcome"]).squeeze(drop=True)})
     loops = [name for name in LOOPS if name in opened]
     asked = study_tables(opened.attrs).get("outputs", {}).get("loops")
     pairs = [pair for pair in opened["contact"].values.tolist() if isinstance(asked, list) and pair in asked]
     if loops and pairs:
-        others = [name for name, array in kept.coords.items() if "contact" in array.dims and name != "contact"]
-        own = kept[loops].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
-        own["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are kept, see outputs.loops"
-        kept = kept.drop_vars(loops).assign(own.data_vars)
-    kept.encoding = opened.encoding
-    kept.set_close(opened.close)
-    return kept
+        others = [name for name, array in result.coords.items() if "contact" in array.dims and name != "contact"]
+        own = result[loops].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
+        own["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are stored, see outputs.loops"
+        result = result.drop_vars(loops).assign(own.data_vars)
+    result.encoding = opened.encoding
+    result.set_close(opened.close)
+    return result
 
 
 def open_known(path: str | Path) -> xr.Dataset:
@@ -243,7 +243,7 @@ def _known_variables(
     need: _Need, dataset: xr.Dataset, axes: Sequence[str], slow: str
 ) -> dict[str, tuple[tuple[str, ...], Variable | None]]:
     """Of each variable that the report knows its dimensions and what it is, None for the values of an axis."""
-    with_axes = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
+    with_axes = ASKED | OF_A_HISTORY | LOOPS | COUNTS | SCENE["exact"]
     if slow == "mission":
         with_axes = OF_MISSIONS | OF_A_MISSION
     elif "modal_amplitude" in axes:
@@ -290,28 +290,28 @@ def _check_variable(
         need(right.all(), name, "a value that is no finite number")
 
 
-def _check_values(need: _Need, kept: xr.Dataset, axes: Sequence[str], slow: str) -> None:
+def _check_values(need: _Need, dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
     """Tests the values that lead to other values: cycles or missions, pairs, flags and mesh."""
     # worn joints whose modes are sought stand in any order
-    counts = np.sort(kept[slow].values) if slow in axes else kept[slow].values
+    counts = np.sort(dataset[slow].values) if slow in axes else dataset[slow].values
     rising = counts.dtype.kind in "iuf" and counts[0] >= 0 and (np.diff(counts) > 0).all()
     need(rising, slow, "no counts in ascending order")
-    pairs = kept["contact"].values
+    pairs = dataset["contact"].values
     differ = pairs.dtype.kind in "iu" and len(set(pairs.tolist())) == pairs.size
     need(differ, "contact", "no whole numbers that differ")
-    flags = np.atleast_1d(kept["outcome"].attrs.get("flag_values", np.zeros(0, int)))
+    flags = np.atleast_1d(dataset["outcome"].attrs.get("flag_values", np.zeros(0, int)))
     need(flags.dtype.kind in "iu", "outcome:flag_values", "no whole numbers")
-    nodes = [kept[name].values for name in ("mesh_x", "mesh_y", "mesh_z") if name in kept]
+    nodes = [dataset[name].values for name in ("mesh_x", "mesh_y", "mesh_z") if name in dataset]
     need(all(np.isfinite(each).all() for each in nodes), "mesh_x", "no finite number, here or beside it")
-    if "mesh_quad" in kept:
-        quad, n_nodes = kept["mesh_quad"].values, min((each.size for each in nodes), default=0)
+    if "mesh_quad" in dataset:
+        quad, n_nodes = dataset["mesh_quad"].values, min((each.size for each in nodes), default=0)
         need(((quad >= 0) & (quad < n_nodes)).all(), "mesh_quad", "nodes that there are not")
 
 
 def _attributes(found: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes without control characters, in one line but for texts of several."""
-    kept = {name: value if name == "flag_values" else _line(value) for name, value in found.items()}
-    return kept | {name: show_text(_decoded(found[name])) for name in _LONG if name in found}
+    cleaned = {name: value if name == "flag_values" else _line(value) for name, value in found.items()}
+    return cleaned | {name: show_text(_decoded(found[name])) for name in _LONG if name in found}
 
 
 @functools.lru_cache(maxsize=4096)  # most messages are the same

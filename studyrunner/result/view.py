@@ -268,7 +268,7 @@ class Result:
         return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
 
     def cycle_label(self, index: int) -> str:
-        """A kept cycle count in words."""
+        """A cycle count of the file in words."""
         return show_cycles(float(self.cycles[index]), self.counted)
 
     @cached_property
@@ -318,12 +318,12 @@ class Result:
 
     def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
-        kept = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
+        named = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
         followed = f"the {self.followed}" if self.followed else ""
         return ", ".join(
             (name == "frequency" and followed) or show_value(self.dataset[name], point[name])
             for name in self.axes
-            if name in kept and name in point
+            if name in named and name in point
         )
 
 

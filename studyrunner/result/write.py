@@ -26,7 +26,7 @@ from studyrunner.checkpoint.store import RESULTS
 from studyrunner.result.arrays import attributes
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.result.target import Target
-from studyrunner.scene.answers import KeptScene, SmallArray
+from studyrunner.scene.answers import SmallArray, StoredScene
 from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.study.study import Study
 from studyrunner.study.text import SCENE_GROUP
@@ -50,7 +50,7 @@ def write_result(
     target: Target,
     arrays: Sequence[SmallArray],
     origin: Mapping[str, object],
-    scene: KeptScene | None = None,
+    scene: StoredScene | None = None,
 ) -> Counter[int]:
     """Writes the result of a study: axes in the order of the study, then cycle or mission, then others.
 
@@ -143,7 +143,7 @@ def _create_all(
 ) -> dict[str, Variable]:
     """Dimensions and variables of the histories."""
     sizes = {name: len(values) for name, values in study.dimensions.items()} | variable_sizes(study, facts)
-    variables = {**study.recorded, **study.kind.kept}
+    variables = {**study.recorded, **study.kind.always}
     for name, size in sizes.items():
         file.createDimension(name, size)
     of_pairs = sorted(each.name for each in arrays if each.name.startswith("contact_"))
@@ -195,7 +195,7 @@ def _write_array(file: netCDF4.Dataset, shape: Sequence[int], slab: Sequence[int
     variable[:] = values.astype(object) if is_text else values
 
 
-def _write_scene(root: netCDF4.Group, scene: KeptScene) -> None:
+def _write_scene(root: netCDF4.Group, scene: StoredScene) -> None:
     """Writes the group with the contents of a scene file, under the same names; complex numbers are pairs {r, i}."""
     root.setncattr("comment", "The reduced model that the study was computed with, in the layout of scene files.")
     root.setncatts({name: np.int64(value) for name, value in scene.attributes.items()})

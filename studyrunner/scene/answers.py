@@ -78,7 +78,7 @@ def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
 
 
 @dataclass(frozen=True)
-class KeptScene:
+class StoredScene:
     """A scene in a result file: attributes, and datasets with groups, by the names of scene files.
 
     origin: attributes of the result on the files of a finite-element model.
@@ -89,7 +89,7 @@ class KeptScene:
     origin: Mapping[str, str] = field(default_factory=dict)
 
 
-def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
+def scene_to_store(study: Study, model: ReducedModel) -> StoredScene | None:
     """Contents of a scene file for the result; of a bundled scene only on request, as the parameters give it again."""
     if study.scene.is_bundled and not study.outputs.scene:
         return None
@@ -97,7 +97,7 @@ def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
 
     with scene_errors(study.source, study.scene.path):
         datasets = tuple(scene_datasets(model, build_mesh(study)))
-        return KeptScene(scene_attributes(model), datasets, describe_origin(study))
+        return StoredScene(scene_attributes(model), datasets, describe_origin(study))
 
 
 def write_study_scene(study: Study, path: Path, progress: Callable[[str], None]) -> None:

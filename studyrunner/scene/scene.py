@@ -177,7 +177,7 @@ def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
 def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple[int, ...]]]:
     """Name, data type and shape of each value of a result."""
     sizes, fields = variable_sizes(study, facts), []
-    for name, entry in {**study.kind.kept, **study.recorded}.items():
+    for name, entry in {**study.kind.always, **study.recorded}.items():
         # of all pairs, only those asked for have a loop
         lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
         fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))

@@ -13,7 +13,7 @@ from studyrunner.study.mistakes import nearest_name
 from studyrunner.study.sections import AUTO, DEFAULT
 from studyrunner.study.study import MISSIONS, MODES, NUMBERS, WEAR, Study
 from studyrunner.values import Wrong
-from studyrunner.variables import KEPT
+from studyrunner.variables import OF_A_HISTORY
 
 _MOST_POINTS = 1_000_000
 
@@ -112,7 +112,7 @@ def _variables(study: Study) -> Iterator[Wrong]:
     no_exact = study.to_the_end or _followed(study) or study.axes.frequency_ratio
     of_pairs = () if study.scatter is None else study.scatter.of_pairs
     for name in study.outputs.variables:
-        if name not in (DEFAULT, *KEPT, *known):
+        if name not in (DEFAULT, *OF_A_HISTORY, *known):
             yield Wrong("outputs.variables", name, f"give {nearest_name(name, known)}, for {study.kind.name}")
         elif name in ("mesh", "exact") and name not in study.scene.offers:
             yield Wrong("outputs.variables", name, f"leave it out: the scene {study.scene.model} has none")

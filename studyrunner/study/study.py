@@ -38,7 +38,7 @@ class Kind:
 
     name: what its points are. about: what a result holds, of a {scene}. time: how well the time of a run is known.
     axes: axes of the result that are neither keys of the solver, of [scene] and [wear], nor samples, in their order.
-    asked, kept: variables that its points may have, and that its result always holds.
+    asked, always: variables that its points may have, and that its result always holds.
     usual, of_samples: variables where the study names none, and where samples are drawn.
     counted: what the slow time counts; empty where nothing wears.
     unused: keys without a use, by table. why: the remedy where one is given.
@@ -49,7 +49,7 @@ class Kind:
     time: str
     axes: tuple[str, ...]
     asked: Mapping[str, variables.Variable]
-    kept: Mapping[str, variables.Variable]
+    always: Mapping[str, variables.Variable]
     usual: tuple[str, ...]
     of_samples: tuple[str, ...]
     counted: str = ""
@@ -74,7 +74,7 @@ WEAR = Kind(
     "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long",
     _other_axes("frequency_ratio", "modal_amplitude", "mode"),
     variables.ASKED,
-    variables.KEPT,
+    variables.OF_A_HISTORY,
     variables.USUAL,
     variables.OF_SAMPLES,
     "cycle",

@@ -23,7 +23,7 @@ class MachineFaultError(Exception):
     """A disk or the cache of the kernels is at fault, and not the task that broke off: the run ends with one line."""
 
 
-def tells_of_machine(message: str) -> bool:
+def is_machine_fault(message: str) -> bool:
     """Whether a line of `describe_error` tells of such a fault."""
     return message.partition(":")[0] in _NAMES
 

@@ -55,7 +55,7 @@ def integrations(
             return time_integration.loaded(model, FRICTION, time_integration.run_up(*at, periods), n_steps)
         structure, gap = time_integration.build(model, FRICTION, *at, n_steps), model.contact.gap
         rest = time_integration.at_rest(model, structure, gap)
-        return structure, time_integration.settle(structure, rest, gap, work_change=5e-3)[0]
+        return structure, time_integration.settle(structure, rest, gap, work_change=5e-3)
 
     begun = measure(unworn)
     for length in each:

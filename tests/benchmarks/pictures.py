@@ -5,7 +5,7 @@
 `dovetail.nc` is the result of `run-study dovetail --set 'outputs.variables=["default", "natural_frequency"]'`. The
 picture of the other study shows CPU times and is in no test. Written are the PNG files of `NAMES`, as the report draws
 them, and `numbers.json`: the study, what the artists of each figure hold, and a checksum of each picture.
-`tests/studyrunner/report/test_pictures.py` compares all of that with the bundled study, with the files, and with points
+`tests/studyrunner/test_bundled_studies.py` compares all of that with the bundled study, with the files, and with points
 that are computed anew.
 """
 

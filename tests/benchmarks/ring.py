@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.ring
 
-The ring (`tests.ring_of_masses`) has all sectors and contacts, without symmetry. Periods are integrated one by one with
+The ring (`tests.rings`) has all sectors and contacts, without symmetry. Periods are integrated one by one with
 n and 2 n steps until the motion repeats, and extrapolated. Printed: first harmonic of the tips and worn volume of a
 sector after some cycles, of the ring and of the sector by harmonic balance.
 
@@ -18,7 +18,7 @@ import numpy as np
 from solver import march_wear
 from tests.benchmarks.frame import Table
 from tests.benchmarks.time_integration import at_rest, build, first_harmonic, one_period, ramp
-from tests.ring_of_masses import N, one_sector, whole_ring
+from tests.rings import N, one_sector, whole_ring
 
 FRICTION, WEAR, CYCLES, EACH = 0.3, 1e-10, 300.0, 1.0
 CASES = ((0, 138.0, 0.5), (1, 280.0, 3.3), (2, 300.0, 10.0), (3, 320.0, 12.0), (4, 300.0, 10.0), (5, 280.0, 3.3))

@@ -27,7 +27,7 @@ def time_integrated(model: ReducedModel, passage: Passage, amplitude: float, n_s
     """Slip work of the pairs (n_contact,), J, of a passage at constant depth, begun with the settled motion."""
     gap, middle = model.contact.gap, 0.5 * (passage.start + passage.stop)
     structure = build(model, FRICTION, passage.start, amplitude, n_steps)
-    motion, _ = settle(structure, at_rest(model, structure, gap), gap)
+    motion = settle(structure, at_rest(model, structure, gap), gap)
     # equal steps, with weights for the middle of the range
     structure = build(model, FRICTION, middle, amplitude, n_steps)
     rate = passage.rate * np.sign(passage.stop - passage.start)

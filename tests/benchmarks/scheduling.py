@@ -2,6 +2,9 @@
 
     python -m tests.benchmarks.scheduling [usual] [many_lines] [one_line] [samples] [--ranks 64 1024]
 
+Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
+result makes possible is decided by `studyrunner.mpi.dispatch` and `studyrunner.task_runs`.
+
 The costs are CPU seconds of one core. `dovetail_costs.csv`: the bundled dovetail, a sweep along 100 frequencies from
 209.5 to 213.5 Hz, and two implicit histories of 100 steps from every fourth of them (wear coefficient 0: the start
 state). `scatter_costs.csv`: the start state and the history of each sample of the bundled study. Every sweep of a study
@@ -15,15 +18,20 @@ its unknowns, which the cost model uses, is 0.57, with the iterations and the ru
 """
 
 import csv
+import heapq
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from studyrunner.kinds.task import StartResult, TaskPlan
+from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
+from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.study.study_file import read_study
+from studyrunner.task_runs import TaskProgress
 from tests.benchmarks.frame import Table, arguments
-from tests.benchmarks.simulation import Overheads, replay
 from tests.studyrunner.fakes import plan_of
 
 N_DISPLACEMENTS = 144
@@ -31,6 +39,8 @@ SHIFT = 0.2  # Hz, at most, from sweep to sweep
 SPREAD_SWEEP, SPREAD_TASK = 0.3, 0.2
 RECORDED_STEPS = 100
 LEAST_WEAR = 3e-12  # recorded: this and ten times as much
+# s: of the master for a result and for an assignment, one after the other, and until a message is looked at
+RESULT, ASSIGNMENT, LATENCY = 3e-4, 1e-4, 1e-3
 
 
 def dovetail(n_frequencies: int, n_amplitudes: int, n_sweeps: int, first: float = 210.9, last: float = 212.5):
@@ -65,7 +75,7 @@ def start_result(place: int, row: dict[str, float]) -> StartResult:
 
 
 class DovetailCosts:
-    """Costs, s, of the tasks of a study with the shape of the recorded ones."""
+    """Costs, s, of the tasks of a study with the shape of the recorded one."""
 
     def __init__(self, plan: TaskPlan) -> None:
         rows, rng = recorded("dovetail"), np.random.default_rng(0)
@@ -82,7 +92,7 @@ class DovetailCosts:
         self._history_factors = np.exp(SPREAD_TASK * rng.standard_normal(len(plan.results)))
 
     def start(self, sweep: Sweep, place: int) -> tuple[StartResult, float]:
-        """A start state and its cost, s: the first of a sweep has the way to it, which the recorded one had."""
+        """A start state and its cost: the first of a sweep has the way to it, which the recorded one had."""
         at = self._place(sweep.number, sweep.frequencies[place])
         seconds = self._starts[max(at, 1)]["seconds"]
         seconds += self._starts[0]["seconds"] if place == sweep.order[0] else 0.0
@@ -90,7 +100,7 @@ class DovetailCosts:
         return start_result(place, self._starts[at]), float(seconds)
 
     def history(self, task: History) -> float:
-        """Cost of a history, s: as a power of the wear coefficient, by the two that were recorded nearby."""
+        """As a power of the wear coefficient, by the two that were recorded nearby."""
         place = self._place(task.sweep, task.frequency)
         moves = self._starts[place]["moves"]
         nearest = min(self._histories, key=lambda at: (self._starts[at]["moves"] != moves, abs(at - place)))
@@ -121,6 +131,99 @@ class ScatterCosts:
         return float(self._rows[task.sweep]["seconds"] * self._factors[task.sweep, 1])
 
 
+class MemoryIndex:
+    """Takes the place of `CompletionIndex`, without a disk: nothing is there from an earlier run."""
+
+    n_points_finished = 0
+
+    def __init__(self, plan: TaskPlan) -> None:
+        # keys as in a file
+        self.plan = replace(
+            plan,
+            sweeps=tuple(replace(task, key=f"sweep {task.number}") for task in plan.sweeps),
+            results=tuple(replace(task, key=str(task.number)) for task in plan.results),
+        )
+
+    def sweeps_left(self) -> list[Task]:
+        return list(self.plan.sweeps)
+
+    def is_finished(self, _: Task) -> bool:
+        return False
+
+    is_suspect = is_finished
+
+    def known_starts(self) -> list[tuple[Task, StartResult]]:
+        return []
+
+    def waiting_for(self, start: tuple[int, int] | None) -> Sequence[Task]:
+        return () if start is None else self.plan.waiting.get(start, ())
+
+    def add(self, task: Task, result: Result) -> None:
+        """The result is not stored."""
+
+
+def replay(plan: TaskPlan, costs: DovetailCosts | ScatterCosts, n_ranks: int) -> tuple[float, float, float]:
+    """Tasks of a plan on ranks with a simulated clock: time, s, efficiency, and the one that no order exceeds."""
+    clock = work = longest_way = 0.0
+    index = MemoryIndex(plan)
+    plan, progress = index.plan, TaskProgress(index)  # type: ignore[arg-type]
+    dispatcher: Dispatcher = Dispatcher(n_ranks, progress.costs, lambda: clock)
+    ticket = itertools.count()
+    arrivals: list[tuple[float, int, int, int, float, Result]] = []
+    queues: list[list[tuple[float, int, Task]]] = [[] for _ in range(n_ranks)]
+    free_at, computing = [0.0] * n_ranks, [False] * n_ranks
+    ways: dict[tuple[int, int], float] = {}
+    left: dict[int, int] = {}
+
+    def begin(rank: int) -> None:
+        """The rank takes the next task that it has been sent; what it will send is known at once."""
+        nonlocal work, longest_way
+        sent, number, task = queues[rank].pop(0)
+        computing[rank] = True
+        now = max(sent + LATENCY, free_at[rank])
+        results: list[tuple[Result, float]] = []
+        if isinstance(task, Sweep):
+            results = [costs.start(task, place) for place in task.order]
+            along = itertools.accumulate(seconds for _, seconds in results)
+            ways.update({(task.number, place): way for place, way in zip(task.order, along, strict=True)})
+        else:
+            seconds = costs.history(task)
+            longest_way = max(longest_way, ways[task.sweep, task.position] + seconds)
+            points = (PointResult({"outcome": 0}, place) for place in task.order)
+            results = [(point, seconds / task.n_results) for point in points]
+        for result, seconds in results:
+            now += seconds
+            work += seconds
+            heapq.heappush(arrivals, (now + LATENCY, next(ticket), rank, number, seconds, result))
+        free_at[rank] = now
+
+    def hand_out() -> None:
+        nonlocal clock
+        for rank, number, task in dispatcher.assign():
+            clock += ASSIGNMENT
+            queues[rank].append((clock, number, task))
+            if not computing[rank]:
+                begin(rank)
+
+    dispatcher.add(list(plan.sweeps))
+    hand_out()
+    while arrivals:
+        arrived, _, rank, number, seconds, result = heapq.heappop(arrivals)
+        # The master takes one message after the other.
+        clock = max(clock, arrived) + RESULT
+        task = dispatcher.deliver(rank, number, seconds)
+        left[number] = left.get(number, task.n_results) - 1
+        if left[number] == 0:
+            computing[rank] = False
+            if queues[rank]:
+                begin(rank)
+        dispatcher.add(list(progress.take(task, result)))
+        dispatcher.watch()
+        hand_out()
+    assert progress.n_points == plan.n_points
+    return clock, work / (n_ranks * clock), min(1.0, work / (n_ranks * longest_way))
+
+
 def main() -> None:
     given = arguments(__doc__, tuple(STUDIES), ranks=[2, 16, 64, 256, 1024, 4096])
     for name in given.chosen:
@@ -129,8 +232,7 @@ def main() -> None:
         costs = (ScatterCosts if study == "scatter" else DovetailCosts)(plan)
         table = Table(name, "time, s", "efficiency", "possible")
         for n_ranks in given.ranks:
-            found = replay(plan, costs.start, costs.history, n_ranks, Overheads())
-            table.row(f"{n_ranks} ranks", found.makespan, found.efficiency, found.possible)
+            table.row(f"{n_ranks} ranks", *replay(plan, costs, n_ranks))
 
 
 if __name__ == "__main__":

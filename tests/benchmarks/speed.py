@@ -52,7 +52,7 @@ def iteration() -> None:
     model = scene("dovetail_sector", 5)
     (start,) = branch_states(model, FRICTION, 0.5, [omega], settings)
     joint, state = build_case(model, FRICTION, start.penalty_omega, settings).joint(omega, 0.5), start.state
-    balance = Balance(joint, state.start_history, state.wear_depth)
+    balance = Balance(joint, state.start_history, np.zeros(model.contact.n_contact))
     predicted, kept = balance.predict(state.displacement_h, state.contact_force_h), JacobianSolver()
 
     def once(solver: JacobianSolver) -> None:

@@ -7,7 +7,7 @@ volume and tip amplitude of the bundled dovetail root; `--single 16000` takes th
 
 - Time: backward differences of second order whose three weights are exact for the excitation frequency. With them
   M x'' + C x' + K x + S^T lambda = f becomes x = G (r - S^T lambda) at each step, and the relative displacements of the
-  pairs are u = u_free - D lambda with a constant matrix D.
+  pairs are u = S x = u_free - D lambda with a constant matrix D = S G S^T.
 - Contact, implicit and without penalty: Signorini u_N <= gap + depth, lambda_N >= 0, one of them equal; Coulomb with
   the increment of u_T over a step along lambda_T, zero inside the cone. Newton's method on the set of open, sticking
   and slipping pairs.
@@ -25,7 +25,7 @@ volume and tip amplitude of the bundled dovetail root; `--single 16000` takes th
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -34,7 +34,7 @@ from numba import njit
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from studies import build_scene
 from tests.benchmarks.frame import Table, arguments
-from tests.benchmarks.ring_of_sectors import ring_of_sectors
+from tests.rings import ring_of_sectors
 
 _LOAD_STEPS = 20  # of the static load
 _CONTACT_ITERATIONS = 90
@@ -47,15 +47,15 @@ _AHEAD = 15.0  # periods in one of the glued mode; |1 + 15 (mu - 1)| < 1 for its
 _BEAT = 0.08  # relative difference of the changes of the mode in two periods, above which fewer are taken in one
 
 
-@dataclass(frozen=True)
-class Structure:
+class Structure(NamedTuple):
     """A model at one frequency and amplitude, for steps of equal length.
 
     - omega, step: rad/s, s.
     - weights (3,): of the derivative, 1/s: `weights @ (x now, before, before that)`.
     - inertia, drag (n, n): M and C. flexibility (n, n): G, m/N.
     - static (n,), cosine, sine (n,): loads, N. limits: friction coefficients (n_contact,).
-    - dofs (n_contact, 3), load (n_contact,): displacements of the pairs, -1 for none; constant normal forces, N.
+    - pairs (3 n_contact, n): S, zero rows for none; contact (3 n_contact, 3 n_contact): D, m/N.
+    - load (n_contact,): constant normal forces, N.
     - mode (n,), rate: mass-normalised glued mode that the excitation moves most, its exponent, 1/s; zeros for none.
     """
 
@@ -69,14 +69,14 @@ class Structure:
     cosine: FloatArray
     sine: FloatArray
     limits: FloatArray
-    dofs: np.ndarray
+    pairs: FloatArray
+    contact: FloatArray
     load: FloatArray
     mode: ComplexArray
     rate: complex
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """State at the end of a step: displacements, m, velocities, m/s (2, n), now and before; forces, N, of the pairs.
 
     work (n_contact,): lambda_N times slip over the last period, J. responses (n_steps, n): its displacements, m.
@@ -113,72 +113,59 @@ def build(model: ReducedModel, friction: float, frequency: float, amplitude: flo
         shapes = shapes[:, np.abs(squares - most) <= 1e-6 * most]
         mode[free] = shapes @ (shapes.T @ linear.load_harmonic[free])
         size = np.sqrt(np.real(mode.conj() @ mass @ mode))
-        mode = mode / size if size > 0.0 else mode
-        rate = -0.5 * complex(mode.conj() @ damping @ mode).real + 1j * float(np.sqrt(most)) if size > 0.0 else 0.0
+        if size > 0.0:
+            mode = mode / size
+            rate = complex(-0.5 * np.real(mode.conj() @ damping @ mode), np.sqrt(most))
+    flexibility = np.linalg.inv(weights[0] ** 2 * mass + weights[0] * damping + stiffness)
+    pairs = np.where(dofs.reshape(-1, 1) >= 0, np.eye(len(mass))[dofs.ravel()], 0.0)
     return Structure(
-        omega, step, weights, mass, damping, np.linalg.inv(weights[0] ** 2 * mass + weights[0] * damping + stiffness),
-        linear.load_static, amplitude * linear.load_harmonic.real, -amplitude * linear.load_harmonic.imag,
-        np.full(len(dofs), friction), dofs, np.where(dofs[:, 0] < 0, model.contact.normal_load, 0.0), mode, rate,
+        omega, step, weights, mass, damping, flexibility, linear.load_static,
+        amplitude * linear.load_harmonic.real, -amplitude * linear.load_harmonic.imag, np.full(len(dofs), friction),
+        pairs, pairs @ flexibility @ pairs.T, np.where(dofs[:, 0] < 0, model.contact.normal_load, 0.0), mode, rate,
     )  # fmt: skip
-
-
-def spread(matrix: FloatArray, dofs: np.ndarray) -> FloatArray:
-    """Rows and columns (3 n_contact, 3 n_contact) of a matrix (n, n) at the displacements of the pairs, 0 for none."""
-    places = dofs.ravel()
-    there = (places >= 0).astype(float)
-    return matrix[np.ix_(places, places)] * np.multiply.outer(there, there)
 
 
 @njit(cache=True)
 def solve_contact(
-    free: FloatArray, before: FloatArray, flexibility: FloatArray, gap: FloatArray, limits: FloatArray,
-    load: FloatArray, dofs: np.ndarray, force: FloatArray,
-) -> tuple[FloatArray, bool]:  # fmt: skip
+    s: Structure, free: FloatArray, before: FloatArray, gap: FloatArray, force: FloatArray
+) -> tuple[FloatArray, bool]:
     """Contact forces (3 n_contact,), N, of a step, and whether they were found.
 
-    - free, before (3 n_contact,): displacements without contact forces, and those of the last step, m.
-    - flexibility (3 n_contact, 3 n_contact): m/N. gap (n_contact,): depth included, m. force: first guess, N.
+    free, before (3 n_contact,): displacements without contact forces, and those of the last step, m. gap (n_contact,):
+    depth included, m. force: first guess, N.
     """
-    n = limits.size
+    contact, n = s.contact, gap.size
     for iteration in range(_CONTACT_ITERATIONS):
-        moved = free - flexibility @ force
+        moved = free - contact @ force
         matrix, right = np.eye(3 * n), np.zeros(3 * n)
         for i in range(n):
             a = 3 * i
-            normal = load[i]
-            if dofs[i, 0] >= 0:
-                pushed = force[a] + (moved[a] - gap[i]) / flexibility[a, a]
-                if pushed <= 0.0:
+            normal = right[a] = s.load[i]
+            if contact[a, a] > 0.0:
+                normal = force[a] + (moved[a] - gap[i]) / contact[a, a]
+                if normal <= 0.0:
                     continue
-                matrix[a], right[a] = flexibility[a] / flexibility[a, a], (free[a] - gap[i]) / flexibility[a, a]
-                normal = pushed
-            else:
-                right[a] = load[i]
-            size = max(flexibility[a + 1, a + 1], flexibility[a + 2, a + 2])
+                matrix[a], right[a] = contact[a] / contact[a, a], (free[a] - gap[i]) / contact[a, a]
+            size = max(contact[a + 1, a + 1], contact[a + 2, a + 2])
             if size == 0.0:
                 continue
+            # zero along a tangent that the pair does not have
             pull = force[a + 1 : a + 3] + (moved[a + 1 : a + 3] - before[a + 1 : a + 3]) / size
-            for k in range(2):
-                if dofs[i, k + 1] < 0:
-                    pull[k] = 0.0
-            most, length = limits[i] * normal, np.hypot(pull[0], pull[1])
+            most, length = s.limits[i] * normal, np.hypot(pull[0], pull[1])
             for k in range(2):
                 row = a + 1 + k
-                if dofs[i, k + 1] < 0:
+                if contact[row, row] == 0.0:
                     continue
                 if length <= most:
-                    matrix[row], right[row] = flexibility[row] / size, (free[row] - before[row]) / size
+                    matrix[row], right[row] = contact[row] / size, (free[row] - before[row]) / size
                     continue
                 # lambda_T = mu lambda_N pull / |pull|, linearised in lambda
-                matrix[row, a] = -limits[i] * pull[k] / length
+                matrix[row, a] = -s.limits[i] * pull[k] / length
                 for j in range(2):
                     turn = most / length * ((k == j) - pull[k] * pull[j] / length**2)
                     matrix[row, a + 1 + j] -= turn
-                    matrix[row] += turn * flexibility[a + 1 + j] / size
+                    matrix[row] += turn * contact[a + 1 + j] / size
                     right[row] += turn * (free[a + 1 + j] - before[a + 1 + j]) / size
-                if dofs[i, 0] < 0:
-                    matrix[row, a] = 0.0
-                    right[row] += limits[i] * load[i] * pull[k] / length
         change = np.linalg.solve(matrix, right) - force
         # shorter steps where the sets go round in circles
         force = force + (1.0 if iteration < 20 else 0.5) * change
@@ -188,55 +175,32 @@ def solve_contact(
 
 
 @njit(cache=True)
-def march(
-    x: FloatArray, v: FloatArray, force: FloatArray, gap: FloatArray, loads: FloatArray, weights: FloatArray,
-    inertia: FloatArray, drag: FloatArray, flexibility: FloatArray, contact: FloatArray, limits: FloatArray,
-    load: FloatArray, dofs: np.ndarray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, bool]:  # fmt: skip
-    """Steps under the loads (n_steps, n), N: state as in `Motion`, work, displacements, and whether all were found."""
-    n_steps, n = loads.shape
-    pairs, work, seen = limits.size, np.zeros(limits.size), np.zeros((n_steps, n))
-    x, v = x.copy(), v.copy()
-    before, free = np.zeros(3 * pairs), np.zeros(3 * pairs)
-    for step in range(n_steps):
-        known = weights[1] * x[0] + weights[2] * x[1]
-        push = loads[step] - drag @ known - inertia @ (weights[0] * known + weights[1] * v[0] + weights[2] * v[1])
-        now = flexibility @ push
-        for i in range(pairs):
-            for k in range(3):
-                if dofs[i, k] >= 0:
-                    free[3 * i + k], before[3 * i + k] = now[dofs[i, k]], x[0, dofs[i, k]]
-        force, found = solve_contact(free, before, contact, gap, limits, load, dofs, force)
+def march(s: Structure, motion: Motion, gap: FloatArray, loads: FloatArray) -> tuple[Motion, bool]:
+    """The motion after steps under the loads (n_steps, n), N, and whether each had contact forces."""
+    x, v, force, found = motion.x.copy(), motion.v.copy(), motion.force, True
+    work, seen = np.zeros(gap.size), np.zeros(loads.shape)
+    for step in range(len(loads)):
+        known = s.weights[1] * x[0] + s.weights[2] * x[1]
+        past = s.weights[0] * known + s.weights[1] * v[0] + s.weights[2] * v[1]
+        push = loads[step] - s.drag @ known - s.inertia @ past
+        before = s.pairs @ x[0]
+        force, found = solve_contact(s, s.pairs @ (s.flexibility @ push), before, gap, force)
         if not found:
-            return x, v, force, work, seen, False
-        for i in range(pairs):
-            for k in range(3):
-                if dofs[i, k] >= 0:
-                    push[dofs[i, k]] -= force[3 * i + k]
-        now = flexibility @ push
-        for i in range(pairs):
-            slip = 0.0
-            for k in range(1, 3):
-                if dofs[i, k] >= 0:
-                    slip += (now[dofs[i, k]] - x[0, dofs[i, k]]) ** 2
-            work[i] += force[3 * i] * np.sqrt(slip)
-        speed = weights[0] * now + known
+            break
         x[1], v[1] = x[0], v[0]
-        x[0], v[0], seen[step] = now, speed, now
-    return x, v, force, work, seen, True
+        x[0] = seen[step] = s.flexibility @ (push - s.pairs.T @ force)
+        v[0] = s.weights[0] * x[0] + known
+        slip = s.pairs @ x[0] - before
+        work += force[::3] * np.hypot(slip[1::3], slip[2::3])
+    return Motion(x, v, force, work, seen), found
 
 
 def advance(structure: Structure, motion: Motion, gap: FloatArray, loads: FloatArray) -> Motion:
     """The motion after steps under loads (n_steps, n), N. Raises RuntimeError where a step has no solution."""
-    contact = spread(structure.flexibility, structure.dofs)
-    s = structure
-    *state, found = march(
-        motion.x, motion.v, motion.force, gap, loads, s.weights, s.inertia, s.drag, s.flexibility, contact, s.limits,
-        s.load, s.dofs,
-    )  # fmt: skip
+    motion, found = march(structure, motion, gap, loads)
     if not found:
         raise RuntimeError("a step in time has no contact forces")
-    return Motion(*state)
+    return motion
 
 
 def one_period(structure: Structure, motion: Motion, gap: FloatArray) -> Motion:
@@ -249,18 +213,17 @@ def one_period(structure: Structure, motion: Motion, gap: FloatArray) -> Motion:
 
 def at_rest(model: ReducedModel, structure: Structure, gap: FloatArray) -> Motion:
     """Static state: the static load is raised in steps, with friction, and held; a drag omega^2 M holds loose parts."""
-    linear = model.linear[0]
-    n, s = len(linear.mass), structure
+    s, none = structure, np.zeros((2, len(structure.static)))
     drag = s.omega**2 * s.inertia
-    stiffness = np.real(linear.stiffness)
-    still = replace(
-        s, inertia=np.zeros((n, n)), drag=drag, weights=np.array([1.0, -1.0, 0.0]),
-        flexibility=np.linalg.inv(stiffness + drag),
+    flexibility = np.linalg.inv(np.real(model.linear[0].stiffness) + drag)
+    still = s._replace(
+        inertia=0.0 * drag, drag=drag, weights=np.array([1.0, -1.0, 0.0]), flexibility=flexibility,
+        contact=s.pairs @ flexibility @ s.pairs.T,
     )  # fmt: skip
-    start = Motion(np.zeros((2, n)), np.zeros((2, n)), np.zeros(s.dofs.size), np.zeros(len(s.dofs)), np.zeros((1, n)))
     shares = np.minimum(np.arange(1, 5 * _LOAD_STEPS + 1) / _LOAD_STEPS, 1.0)
+    start = Motion(none, none, np.zeros(len(s.pairs)), np.zeros(len(gap)), none)
     found = advance(still, start, gap, np.outer(shares, s.static))
-    return replace(found, x=np.repeat(found.x[:1], 2, axis=0), v=np.zeros((2, n)))
+    return found._replace(x=np.repeat(found.x[:1], 2, axis=0), v=none)
 
 
 def amplitude_of_mode(structure: Structure, motion: Motion) -> complex:
@@ -273,17 +236,14 @@ def amplitude_of_mode(structure: Structure, motion: Motion) -> complex:
 def push_mode(structure: Structure, motion: Motion, change: complex) -> Motion:
     """The motion with another amplitude of the glued mode, which moves no pair."""
     turns = change * np.exp(-1j * structure.omega * structure.step * np.arange(2))
-    return replace(
-        motion,
+    return motion._replace(
         x=motion.x + np.outer(turns, structure.mode).real,
         v=motion.v + np.outer(1j * structure.omega * turns, structure.mode).real,
     )
 
 
-def settle(
-    structure: Structure, motion: Motion, gap: FloatArray, work_change: float = _SETTLED_WORK
-) -> tuple[Motion, int]:
-    """The periodic motion to which a motion comes, and the periods that it took. Raises RuntimeError if it does not.
+def settle(structure: Structure, motion: Motion, gap: FloatArray, work_change: float = _SETTLED_WORK) -> Motion:
+    """The periodic motion to which a motion comes. Raises RuntimeError if it does not.
 
     work_change: relative change of the slip work over a period; a mass on rigid ground turns on whole steps only.
     """
@@ -293,7 +253,7 @@ def settle(
     # far from the resonance of the mode its beat would grow: there the joint sticks, and the end is known at once
     ahead = _AHEAD if abs(1.0 + _AHEAD * growth) < 1.0 else -1.0 / growth
     calm = 0
-    for periods in range(2, _MOST_PERIODS):
+    for _ in range(_MOST_PERIODS):
         here, work = amplitude_of_mode(structure, motion), motion.work
         moved = one_period(structure, motion, gap)
         change = amplitude_of_mode(structure, moved) - here
@@ -302,15 +262,14 @@ def settle(
         still = np.abs(moved.work - work).max() <= work_change * max(float(moved.work.max()), faint)
         calm = calm + 1 if still and abs(change / growth) <= _SETTLED * size else 0
         if calm >= 2:
-            return moved, periods
+            return moved
         motion = push_mode(structure, moved, (ahead - 1.0) * change)
     raise RuntimeError(f"the motion does not settle in {_MOST_PERIODS} periods")
 
 
-def run_up(frequency: float, amplitude: float, periods: int, begin: float = 0.97) -> FloatArray:
-    """Frequencies, Hz, and amplitudes, N, (n_periods, 2): up, ever slower, after a ramp at `begin` of the frequency."""
-    share = np.linspace(0.0, 1.0, periods)
-    up = frequency * (1.0 - (1.0 - begin) * (1.0 - share) ** 3)
+def run_up(frequency: float, amplitude: float, periods: int) -> FloatArray:
+    """Frequencies, Hz, and amplitudes, N, (n_periods, 2): up, ever slower, after a ramp at 97 % of the frequency."""
+    up = frequency * (1.0 - 0.03 * (1.0 - np.linspace(0.0, 1.0, periods)) ** 3)
     return np.concatenate([ramp(up[0], amplitude, 300), np.stack([up, np.full(periods, amplitude)], axis=1)])
 
 
@@ -327,7 +286,7 @@ def loaded(model: ReducedModel, friction: float, course: FloatArray, n_steps: in
     for frequency, amplitude in (*course.tolist(), *_HELD * [course[-1].tolist()]):
         structure = build(model, friction, frequency, amplitude, n_steps)
         motion = one_period(structure, motion, gap)
-    return structure, settle(structure, motion, gap)[0]
+    return structure, settle(structure, motion, gap)
 
 
 def wear(

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -50,19 +50,6 @@ def launcher(n_ranks: int) -> list[str]:
     if found is None:
         pytest.fail("the tests need the extra mpi: there is no mpiexec")
     return [found, "-n", str(n_ranks)] if n_ranks else []
-
-
-@contextlib.contextmanager
-def mounted(folder: Path, how: str) -> Iterator[Path]:
-    """A file system in memory on a new folder; the test is skipped where none can be mounted."""
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", how, "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
-        pytest.skip("a file system can be mounted by root only")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 @dataclass(frozen=True)

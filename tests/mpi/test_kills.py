@@ -3,6 +3,7 @@
 import contextlib
 import os
 import random
+import re
 import shutil
 import signal
 import time
@@ -13,6 +14,7 @@ import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
+from studyrunner.checkpoint.completion_index import MOST_CRASHES
 from tests.mpi.launching import CHEAP, FAKED, SOON, options, results, run_here, run_to_end
 from tests.mpi.run_faked import DONE
 
@@ -223,3 +225,38 @@ def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path):
 
     ended = run_to_end(0, [str(script), "two_masses", "-o", "out.nc"], tmp_path, disturb=end_twice)
     assert (ended.status, ended.seconds < SOON) == (130, True)
+
+
+# --- tasks that crash their process, ranks that break off, full disks ---
+
+STUDY = (FAKED, *CHEAP, *options("axes.frequency=[100, 110, 120, 130, 140]", "axes.scheme=implicit"), "-o", "out.nc")
+
+
+def test_a_history_that_crashes_is_one_bad_point(tmp_path):
+    environment = {"FAKE_CRASH": "segfault", "FAKE_SECONDS": "0.01", "UCX_HANDLE_ERRORS": "none"}
+    n_crashes = 0
+    # which may take two runs more than are counted
+    while n_crashes < MOST_CRASHES + 3 and (ended := run_to_end(2, STUDY, tmp_path, environment)).status != 3:
+        assert ended.status not in (0, 1, 2, 130), ended.said
+        n_crashes += 1
+    assert MOST_CRASHES <= n_crashes < MOST_CRASHES + 3
+    found = results(tmp_path / "out.nc").squeeze()
+    assert found.outcome.values.tolist() == [0, Outcome.CRASHED, 0, 0, 0]
+    assert str(MOST_CRASHES) in str(found.message.values[1])
+    # not tried again, unless asked for, and then as often as before
+    assert run_here(STUDY, tmp_path) == 3
+    retry = [*STUDY, "--retry-failed"]
+    assert run_to_end(0, retry, tmp_path, {"FAKE_CRASH": "abort"}).status == -signal.SIGABRT
+    for name in ("out.nc", "whole.nc"):
+        assert run_here([*STUDY[:-1], name], tmp_path) == 0
+    assert results(tmp_path / "out.nc").identical(results(tmp_path / "whole.nc"))
+
+
+def test_an_exception_on_one_rank_ends_all(tmp_path):
+    ended = run_to_end(2, STUDY, tmp_path, {"FAKE_FAILURE": "1"})
+    assert ended.status == 1
+    assert "unexpected failure on rank 1 of 2" in ended.said
+    assert re.search(r"ValueError: not \d results from History", ended.said)
+    # what was finished is kept, and the result is written when the run ends in good order only
+    left = {path.name for path in tmp_path.iterdir() if path.suffix != ".partial"}
+    assert left - {"out.nc.progress-journal"} == {"out.nc.progress"}

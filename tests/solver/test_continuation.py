@@ -50,16 +50,6 @@ def wall(omega):
     return balance_at, first, size
 
 
-def test_natural_steps_reach_their_target():
-    balance_at, first, size = wall(0.5)
-    point, arrived = follow_naturally(balance_at, first(0.06), 0.01, Run(TOLERANCE))
-    assert arrived
-    assert point.parameter == 0.01
-    assert point.evaluation.scaled_residual() <= TOLERANCE
-    # below the gap the mass does not feel the wall
-    assert size(point) == pytest.approx(0.01 / abs(1 - 0.25 + 0.025j), rel=1e-7, abs=0.0)
-
-
 def test_natural_steps_end_before_a_fold_and_say_so():
     balance_at, first, size = wall(WALL_OMEGA)
     point, arrived = follow_naturally(balance_at, first(0.03), 0.06, Run(TOLERANCE))

@@ -152,6 +152,14 @@ def test_one_that_was_interrupted_is_the_same_to_the_last_bit(monkeypatch):
     assert_same(worn(ToTheEnd(9), resume=kept[-1]), whole)
 
 
+def test_a_slider_wears_until_its_force_is_gone_and_the_reference_solution_confirms_it():
+    found = march_model(build_scene("sdof_slider"), 150.0, 10.0, 0.5, 1e-9, np.inf, outputs=6)
+    assert found.outcome is Outcome.CONVERGED
+    # 10 N of a spring of 1e5 N/m
+    assert found.worn_volume[-1] == pytest.approx(1e-4 * AREA, rel=1e-3)
+    assert 0.0 < found.error_estimate < 1e-2
+
+
 def test_a_constant_load_wears_without_end_at_the_rate_of_its_path():
     model = build_scene("sdof_slider", normal_stiffness=0.0)
     found = march_model(model, 160.0, 10.0, 0.5, WEAR, np.inf, settings=COARSE, outputs=4)

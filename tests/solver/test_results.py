@@ -21,7 +21,7 @@ from studies.scenes.half_space import composite_modulus
 from studies.scenes.sphere_on_flat import point_radius
 from tests.solver.models import OMEGA, branch_states, dovetail, first_point, march_wear, random_model, scene
 from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
-from tests.studyrunner.histories import history
+from tests.studyrunner.faked_runs import history
 
 # --- states ---
 
@@ -45,13 +45,13 @@ def periodic(kinds):
 
 @pytest.mark.parametrize("kinds", KINDS)
 def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds):
-    joint, _, state = periodic(kinds)
+    joint, point, state = periodic(kinds)
     model, penalty = joint.model, joint.penalty
     motion = full_motion(model, state)
     assert not penalty.inertial.any()
     # the contact force from the plain law alone, from what the state stores
     moved = state.displacement_h.copy()
-    moved[:, 0, 0] -= model.contact.gap + state.wear_depth
+    moved[:, 0, 0] -= model.contact.gap + point.evaluation.wear_depth
     eps = np.column_stack([penalty.normal, penalty.tangential, penalty.tangential])
     predicted_h = state.contact_force_h + eps[:, :, None] * moved
     predicted_h[model.contact.dofs[:, 0] < 0, 0, 1:] = 0.0

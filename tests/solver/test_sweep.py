@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.harmonic_balance.state import Failure
-from solver.loading_history import frequency_sweep
 from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.frequency_sweep import FIRST_ITERATIONS
@@ -126,16 +124,3 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
     starts = dict(follow_branch(model, 0.5, 20.0, np.array([frequency]), "up", SolverSettings(3, 64)))
     assert starts[0].outcome is Outcome.SINGULAR
     assert starts[0].state is None
-
-
-def test_a_sweep_that_finds_no_state_has_nothing_to_keep(monkeypatch):
-    def in_vain(*given):
-        given[-1].budget.iterations += 1000
-        return Failure(Outcome.STATIC_FAILED)
-
-    monkeypatch.setattr(frequency_sweep, "solve_first_state", in_vain)
-    kept: list[Packed | str] = []
-    asked = scene("sdof_slider"), 0.3, 10.0, np.array([150.0, 160.0]), "up", SolverSettings(3, 64)
-    found = dict(follow_branch(*asked, keep=kept.append))
-    assert [found[place].outcome for place in range(2)] == [Outcome.STATIC_FAILED] * 2
-    assert all(isinstance(progress, str) for progress in kept)

@@ -68,7 +68,7 @@ def test_two_masses_are_those_of_the_reference():
 def test_the_vibro_impact_scene_is_the_bilinear_spring():
     gap, omega, n_samples = 0.1, 1.1, 2048
     model = build_scene("vibro_impact", gap=gap)
-    orbit = vibro_impact_orbit(1.0, 0.05, 1.0, 0.02, 100.0, gap, omega, sweep_start=1.05)
+    orbit = vibro_impact_orbit(1.0, 0.05, 1.0, 0.02, 100.0, gap, omega, begin=1.05)
     displacement = orbit.sample(n_samples)[0]
     contact_force = 100 * np.maximum(displacement - gap, 0)
     assert contact_force.max() > 0

@@ -1,18 +1,22 @@
-"""Runs of the command with a stand-in for the solver, which may do something else at one of its results."""
+"""Stand-ins for the solver in runs of the command, for its wear histories, and for blocks of missions."""
 
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
+import numpy as np
 import pytest
 
+from solver.harmonic_balance.state import Failure
+from solver.missions import history as missions
+from solver.missions.block_run import BlockRun
+from solver.missions.mission import Passage
+from solver.outcome import Outcome
+from solver.results.history import WearHistory
+from solver.wear.slow_time import Guide
 from studyrunner import task_runs
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
 from studyrunner.scene.scene import describe_scene
-from tests.mpi.launching import options
 from tests.studyrunner.fakes import fake_evaluate
-
-AXES = ("axes.frequency=[100, 110]", "axes.wear_coefficient=[5e-12, 1e-11]", "axes.scheme=implicit")
-SMALL = ["sdof_slider", *options(*AXES), "-o", "out.nc"]
-"""A study of two start states and four histories."""
 
 
 class Solver:
@@ -46,3 +50,73 @@ class Solver:
 
     def begin_again(self) -> None:
         self.__dict__.update(tasks=[], n_results=0, disturb=lambda *_: None)
+
+
+# --- histories ---
+
+LIKE_VOLUME = ("worn_volume", "wear_rate", "penetration", "tension", "cone_violation", "energy_error")
+LIKE_DEPTH = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "response_mean", "response_peak")
+
+
+def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np.ndarray | None = None) -> WearHistory:
+    """At these cycle counts: variables count from 0, or from what is theirs. loops: displacements, minus forces."""
+    n = len(cycles)
+    line, pair = np.arange(float(n)), np.arange(float(n)).reshape(n, 1)
+    loops = np.zeros((n, 0, 128, 3)) if loops is None else loops
+    of_cycles = {
+        **dict.fromkeys(LIKE_VOLUME, line),
+        **dict.fromkeys(LIKE_DEPTH, pair),
+        "response": (1.0 + pair) * 1j,
+        "excitation_frequency": 100.0 + line,
+        "excitation_frequency_error": 0.1 * line,
+        "residual": 1e-9 * line,
+        "response_error": 1e-3 * line,
+        "wear_rate_error": np.full(n, np.nan),
+        "harmonics_used": np.arange(n) + 3,
+        "samples_used": np.full(n, 64),
+        "worn_volume_error": 0.03 * line,
+        "wear_depth_error": 0.1 * pair,
+        "reference_volume": 1.5 * line,
+    }
+    totals = {"jump_cycle": np.nan, "error_estimate": 0.0, "newton_iterations": 7, "run_time": 0.5, "branch": 2}
+    totals |= {"last_cycle": float(cycles[-1]), "fold_frequency": 101.5, "step_limit": 250.0}
+    at = np.array(cycles)
+    return WearHistory(outcome=outcome, cycles=at, loop_displacement=loops, loop_force=-loops, **of_cycles, **totals)
+
+
+# --- missions ---
+
+_DEPTH = 1e-3
+"""Depth, m, at which nothing would wear any more."""
+
+
+class FakedBlocks:
+    """Stands for `run_block` and `run_passage`. computed: cases so far. disturb: called with the number of each."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.computed: list[Any] = []
+        self.fails: dict[str, Outcome] = {}
+        self.disturb: Any = lambda _: None
+        for name in ("run_block", "run_passage"):
+            monkeypatch.setattr(missions, name, self.run)
+
+    def run(self, case: Any) -> BlockRun | Failure:
+        """Wear with the rate k_w P A (1 - W / _DEPTH); the reference solution wears by 0.1 % more."""
+        self.disturb(len(self.computed))
+        self.computed.append(case)
+        block, contact = case.block, case.block.model.contact
+        cycles = block.frequency.cycles if isinstance(block.frequency, Passage) else block.cycles
+        rate = case.mission.wear_coefficient * block.excitation_amplitude * load_of(block) * block.ends[1] * 1e-5
+        rate = rate * (1.0 if case.guide is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
+        response = 1e-6 * block.excitation_amplitude * (1.0 + case.depth.sum() + np.array([[0.0], [1.0]]))
+        if block.name in self.fails:
+            return Failure(self.fails[block.name])
+        slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
+        return BlockRun(
+            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, guide=Guide((), 1.0), iterations=7
+        )  # fmt: skip
+
+
+def load_of(block: Any) -> float:
+    """Static load of the model of a block, N."""
+    return float(np.abs(block.model.linear[0].load_static).max())

@@ -16,7 +16,7 @@ from studyrunner.plan import build_tasks
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
+from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, OF_A_HISTORY
 
 FACTS = SceneFacts(
     n_displacements=6,
@@ -113,7 +113,7 @@ def without_values(result: PointResult, outcome: int) -> PointResult:
     values = {
         name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0)
         for name, array in result.values.items()
-        if name not in KEPT
+        if name not in OF_A_HISTORY
     }
     nothing = dict.fromkeys(("last_cycle", "error_estimate", "largest_wear_depth"), np.nan)
     return changed(result, outcome=outcome, **values, **nothing)

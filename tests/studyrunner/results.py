@@ -24,7 +24,7 @@ from studyrunner.scatter import ScatteredPairs, ScatterSection, draw
 from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOPS, OF_SAMPLES, USUAL, Variable
+from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOPS, OF_A_HISTORY, OF_SAMPLES, USUAL, Variable
 from tests.studyrunner.fakes import FACTS
 
 AXES: Mapping[str, Sequence[object]] = {
@@ -66,7 +66,7 @@ def build_file(
     found |= {"cycle": np.array(cycles, dtype=float), "contact": np.arange(len(positions)), "response": list(responses)}
     if loops:
         found |= {"phase": 2.0 * np.pi * np.arange(N_PHASES) / N_PHASES, "component": list(LOOP_COMPONENTS)}
-    asked = {name: ASKED[name] for name in variables} | (LOOPS if loops else {}) | KEPT
+    asked = {name: ASKED[name] for name in variables} | (LOOPS if loops else {}) | OF_A_HISTORY
     dataset = _empty(axes, {name: len(values) for name, values in found.items()}, asked)
     for name, variable in dataset.variables.items():
         if name not in ("outcome", "message"):
@@ -301,7 +301,7 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[PointResult
     """The result of a study: axes in the order of the study, then cycle, then contact or response."""
     axes, sizes = study.dimensions, variable_sizes(study, facts)
     sizes = {name: len(values) for name, values in axes.items()} | sizes
-    variables = {**study.recorded, **study.kind.kept}
+    variables = {**study.recorded, **study.kind.always}
     dataset = _empty(axes, sizes, variables)
     dataset["outcome"].values[...] = Outcome.CONVERGED
     for result, point in [(each, point) for points, each in results for point in points]:

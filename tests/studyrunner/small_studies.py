@@ -7,7 +7,6 @@ import xarray as xr
 
 from studyrunner.cli import main
 from tests.mpi.launching import options, results
-from tests.studyrunner import faked_blocks
 
 SLIDER = """
 [study]
@@ -25,7 +24,34 @@ MODES = '[study]\nname = "m"\n[scene]\nmodel = "sdof_slider"\n[axes]\nmodal_ampl
 FOLLOWED = SLIDER.replace("[150.0]", '"peak"\n[loading]\nbetween = [180.0, 230.0]')
 SAMPLES = SLIDER + "[scatter]\nsamples = 8\nfriction_coefficient = {normal = {std = 0.03}}\n"
 TO_THE_END = SLIDER.replace("cycles = 0", "cycles = inf")
-MISSIONS = faked_blocks.STUDY
+
+MISSIONS = """
+[study]
+name = "slider_missions"
+[scene]
+model = "sdof_slider"
+[axes]
+frequency = [160, 161]
+wear_coefficient = [1e-11, 2e-11]
+sweep = ["up", "down"]
+[slow_time]
+missions = 300
+outputs = 4
+[[mission]]
+name = "run-up"
+frequency = {start = 150, stop = 170, rate = 1.0}
+excitation_amplitude = 10.0
+[[mission]]
+name = "cruise"
+begin = "sweep"
+seconds = 10
+[[mission]]
+name = "heavy"
+normal_load = 12.0
+frequency = 155.0
+excitation_amplitude = 14.0
+cycles = 1000
+"""
 
 ROOT_OF_A_DECK = """
 [study]
@@ -84,6 +110,11 @@ CHEAP = (
 """Overrides with which a history of the slider takes milliseconds."""
 
 UNWORN = ("slow_time.cycles=0", "slow_time.outputs=1")
+
+
+AXES = ("axes.frequency=[100, 110]", "axes.wear_coefficient=[5e-12, 1e-11]", "axes.scheme=implicit")
+SMALL = ["sdof_slider", *options(*AXES), "-o", "out.nc"]
+"""A study of two start states and four histories."""
 
 
 def compute(study: str, output: str, *overrides: str) -> xr.Dataset:

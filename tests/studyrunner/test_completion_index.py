@@ -94,6 +94,7 @@ def test_a_run_that_stopped_anywhere_goes_on_there(n_tasks, folder):
         *((f"axes.{change}", (0, 12)) for change in ("step=[2000]", "scheme=['explicit']")),
         *((f"slow_time.{change}", (0, 12)) for change in ("cycles=2000", "outputs=4", "outputs=[0, 400, 1000]")),
         *((f"outputs.{change}", (0, 12)) for change in ("variables=['worn_volume']", "loops=[0]")),
+        *((change, (0, 12)) for change in ("wear.law=energy", "slow_time.until={wear_depth=1}")),
         ("axes.scheme=['adaptive']", (0, 6)),
         # start states, too
         *((f"axes.excitation_amplitude={values}", (6, 12)) for values in ("[11]", "[9, 10]")),

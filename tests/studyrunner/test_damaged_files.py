@@ -3,6 +3,7 @@
 import contextlib
 import os
 import shutil
+from collections import Counter
 from pathlib import Path
 
 import h5py
@@ -16,6 +17,7 @@ from studyrunner.report import cli as report
 from studyrunner.result.opening import check_dataset
 from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
+from tests.benchmarks.fuzz_files import answer, write_whole_files
 from tests.studies.scene_models import poke
 from tests.studyrunner.results import build_file, sample_file
 
@@ -194,3 +196,18 @@ def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
     assert "[2J" in refused(["sdof_slider", "--set", "axes.step=\x1b[2J"])
     assert main(["sdof_slider", "--plan", "--set", 'study.title="a\\u001b[2J"']) == 0
     assert "\x1b" not in capsys.readouterr().out
+
+
+# --- fuzzed scene, deck and result files: no traceback and no hang; `fuzz_files` tries thousands ---
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("folder")
+def test_fuzzed_files():
+    write_whole_files()
+    found = [answer(1, number) for number in range(16)]
+    assert [each.wrong for each in found if each.wrong] == []
+    # most of them are wrong, and not all
+    ended = Counter(each.ended.split()[-1] for each in found)
+    assert ended["2"] > 1
+    assert ended["0"] > 0

@@ -10,7 +10,7 @@ import xarray as xr
 from studyrunner import UserError, run_study
 from studyrunner.cli import main
 from studyrunner.result.provenance import POINTS_LEFT, check_date
-from tests.studyrunner.faked_runs import SMALL
+from tests.studyrunner.small_studies import SMALL
 
 pytestmark = pytest.mark.usefixtures("solver", "folder")
 
@@ -167,15 +167,6 @@ def test_what_a_killed_run_has_left_of_a_result_goes(folder):
 )
 def test_dates_are_kept_in_the_extended_form(given, kept):
     assert check_date(given, "command line", "--date") == kept
-
-
-def test_a_wrong_date_is_bad_input(capsys):
-    assert main(["sdof_slider", "--date=2026-02-29"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "--date" in line
-    assert list(Path().iterdir()) == []
-    with pytest.raises(UserError, match="run_study: date"):
-        run_study("sdof_slider", date="")
 
 
 def test_the_date_stands_in_the_result_and_changes_nothing_else(solver):

@@ -15,7 +15,7 @@ from studyrunner.kinds.wear import History, Sweep
 from studyrunner.result import write
 from studyrunner.user_error import UserError
 from tests.mpi.launching import count_entries, results
-from tests.studyrunner.faked_runs import SMALL
+from tests.studyrunner.small_studies import SMALL
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
 
@@ -69,23 +69,6 @@ def test_an_exception_is_one_bad_point(solver, capsys):
         assert main([*TWO_WAYS, *more]) == status
         assert len(solver.tasks) == n_tasks
         xr.testing.assert_identical(results(), after)
-
-
-def test_a_second_run_of_the_same_study_is_refused(solver, capsys, monkeypatch):
-    second: list[int] = []
-
-    def run_again(_, n_results):
-        # signals are for the main thread
-        if n_results == 1:
-            second.append(main(TWO_WAYS))
-
-    monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
-    monkeypatch.setattr("studyrunner.checkpoint.store._SECONDS_TO_DIE", 0.1)
-    solver.disturb = run_again
-    assert main(TWO_WAYS) == 0
-    assert second == [2]
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study:")]
-    assert "out.nc.progress: in use: by process" in line
 
 
 def test_no_other_run_writes_the_result_before_its_last_lines_are_read(solver, monkeypatch):

@@ -14,7 +14,7 @@ from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from tests.mpi.launching import options, results
-from tests.studyrunner.faked_blocks import FakedBlocks, load_of
+from tests.studyrunner.faked_runs import FakedBlocks, load_of
 from tests.studyrunner.fakes import plan_of, points_of
 from tests.studyrunner.small_studies import MISSIONS, compute
 

@@ -124,13 +124,6 @@ def test_a_plan_that_does_not_arrive(tmp_path):
     assert (status, said, len(printed.splitlines())) == (0, "", 1)
 
 
-def test_what_cannot_end_well_is_refused_at_the_beginning(tmp_path):
-    status, _, line = shell(f"{sys.executable} -m studyrunner.cli two_masses -o /dev/stdout", tmp_path)
-    assert (status, line.count("\n")) == (2, 1)
-    assert line.startswith("run-study: ")
-    assert "-o" in line
-
-
 def test_nothing_else_gets_the_number_of_a_stream(tmp_path):
     """A library that complains on stderr must not write into a file of the run."""
     code = (

@@ -14,8 +14,8 @@ from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study_file import read_study
+from tests.studyrunner.faked_runs import history
 from tests.studyrunner.fakes import plan_of, totals_of
-from tests.studyrunner.histories import history
 
 WEARS = ["0", "1e-12", "2e-12", "3e-12", "1e-11", "1.5e-11"]
 STEPS = ["100", "150", "200", "300", "700", "1000", "2e4", "3e4"]

@@ -6,14 +6,13 @@ import pytest
 from studyrunner import open_result
 from studyrunner.accessor import join_results
 from studyrunner.cli import main
-from studyrunner.kinds.task import Identity
 from studyrunner.report.figures.wear import draw_excitation
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
-from studyrunner.variables import CERTIFICATE, KEPT, LOOPS, USUAL
+from studyrunner.variables import CERTIFICATE, LOOPS, OF_A_HISTORY, USUAL
 from tests.mpi.launching import options, results
-from tests.studyrunner.fakes import FACTS, plan_of
+from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import UNWORN, compute
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
@@ -27,16 +26,6 @@ def run(*overrides):
 
 SHORT = ("axes.frequency=160", "axes.scheme=adaptive", "slow_time.cycles=20000", "slow_time.outputs=3")
 TABLE = ("wear.law=table", "wear.pressure=[1e4, 1e5]", "wear.depth=[0, 1e-5]", "wear.factor=[[1, 2], [0.5, 1]]")
-
-
-def test_a_history_is_known_by_its_law_and_a_start_state_is_not():
-    found = []
-    for wear in ((), ("wear.law=energy",), ("wear.surfaces={support=2.0}",), ("slow_time.until={wear_depth=1}",)):
-        plan = plan_of(read_study("sdof_slider", (*SHORT, *wear)), FACTS.n_displacements)
-        of = Identity((FACTS.digest,), "kind")
-        found.append((plan.sweeps[0].hashes(of), plan.results[0].hashes(of)))
-    starts, histories = map(set, zip(*found, strict=True))
-    assert (len(starts), len(histories)) == (1, 4)
 
 
 def test_the_law_of_a_study_is_the_one_that_wears():
@@ -191,7 +180,7 @@ STUDY = (
     "slow_time.outputs=[0, 130, 1000, 4000]",
 )
 FEWER = ("axes.frequency=160", "axes.scheme=['explicit', 'adaptive']")
-COMPARED = [name for name in (*USUAL, *LOOPS, *KEPT) if name not in ("newton_iterations", "run_time")]
+COMPARED = [name for name in (*USUAL, *LOOPS, *OF_A_HISTORY) if name not in ("newton_iterations", "run_time")]
 
 
 def check_same(name, short, long):

@@ -1,5 +1,6 @@
-"""What is computed again of a worn joint is what a study gives that holds it, or that begins with its depths."""
+"""Worn joints that are computed again, and studies in gross slip, whose pairs are laid as far as they wear."""
 
+import math
 import shutil
 
 import h5py
@@ -7,9 +8,19 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner import UserError, compute_worn_joint, run_study
+from solver.outcome import Outcome
+from studies import build_scene, read_scene
+from studyrunner import UserError, compute_worn_joint, read_study, run_study
+from studyrunner.cli import main
+from studyrunner.report import cli as report
 from studyrunner.report import contents
-from studyrunner.report.cli import main
+from studyrunner.scene.answers import write_study_scene
+from studyrunner.scene.scene import build_study_scene, describe_scene
+from studyrunner.scene.scene_set import find_scenes
+from studyrunner.study.parts import expected_wear, parts_of
+from studyrunner.study.study_file import format_study
+from tests.mpi.launching import options, results
+from tests.studyrunner.small_studies import compute
 
 COARSE = {"solver.harmonics": 3, "solver.samples": 64, "slow_time.cycles": 8000.0, "slow_time.outputs": 3}
 POINTS = {"axes.frequency": [150.0, 160.0], "axes.scheme": "adaptive", "outputs.loops": [0]}
@@ -46,7 +57,7 @@ def test_loops_and_responses_are_those_of_studies_that_ask_for_them(path, tmp_pa
 def test_the_command_draws_what_it_computes_and_says_what_is_wrong(path, tmp_path, monkeypatch, capsys):
     both = [entry for entry in contents.FIGURES if entry.name in ("frequency_response", "fretting_loops")]
     monkeypatch.setattr(contents, "FIGURES", both)
-    assert main([str(path), "-o", str(tmp_path), "--loops", "0"]) == 0
+    assert report.main([str(path), "-o", str(tmp_path), "--loops", "0"]) == 0
     assert "worn by" in (tmp_path / "index.html").read_text(encoding="utf-8")
     assert (tmp_path / "fretting_loops.csv").exists()
     # without the scene a sentence takes the place of the curve
@@ -56,13 +67,121 @@ def test_the_command_draws_what_it_computes_and_says_what_is_wrong(path, tmp_pat
         text = file.attrs["study"].decode().replace('model = "sdof_slider"', 'model = "gone.h5"')
         del file.attrs["study"]
         file.attrs.create("study", text, dtype=h5py.string_dtype("utf-8"))
-    for options in ([], ["--no-compute"]):
-        assert main([str(lost), "-o", str(tmp_path / "lost"), *options]) == 0
+    for more in ([], ["--no-compute"]):
+        assert report.main([str(lost), "-o", str(tmp_path / "lost"), *more]) == 0
         page = (tmp_path / "lost" / "index.html").read_text(encoding="utf-8")
-        assert ("Without the curve of the worn joint" in page) is (not options)
+        assert ("Without the curve of the worn joint" in page) is (not more)
     capsys.readouterr()
     for wrong in (["--loops", "7"], ["--loops", "a"]):
-        assert main([str(path), "-o", str(tmp_path), *wrong]) == 2
+        assert report.main([str(path), "-o", str(tmp_path), *wrong]) == 2
         assert len(capsys.readouterr().err.strip().splitlines()) == 1
     with pytest.raises(UserError, match="frequency"):
         compute_worn_joint(path, tmp_path, response=True, point={"frequency": "1"})
+
+
+# --- room for wear ---
+
+SLIDING = """
+[study]
+name = "sliding"
+[scene]
+model = "cylinder_on_flat"
+stroke = 10e-6
+friction_coefficient = 0.8
+P = 20e3
+strips = 12
+[axes]
+frequency = 20.0
+wear_coefficient = 1e-13
+sweep = "ramp"
+[slow_time]
+cycles = 2000
+outputs = 5
+[solver]
+harmonics = 3
+samples = 32
+"""
+
+
+@pytest.fixture
+def sliding(tmp_path):
+    found = tmp_path / "sliding.toml"
+    found.write_text(SLIDING)
+    return found
+
+
+def half_width(study):
+    value = dict(study.scene.parameters)["half_width"]
+    assert isinstance(value, float)
+    return value
+
+
+def test_all_that_is_made_of_the_study_has_the_width_that_it_shows(sliding):
+    study = read_study(sliding)
+    width = half_width(study)
+    model = build_study_scene(study)
+    assert model.contact.position[-1, 0] == pytest.approx(width * 11 / 12)
+    digest = describe_scene(model).digest
+    # the whole study again, also where it would wear more by now
+    sliding.write_text(format_study(study))
+    assert read_study(sliding) == read_study(sliding, {"scene.half_width": width})
+    assert half_width(read_study(sliding, {"slow_time.cycles": 1e6})) == width
+    # its scene file, and the scene in Python
+    write_study_scene(study, sliding.with_name("scene.h5"), print)
+    given = {key: value for key, value in study.scene.parameters if key != "friction_coefficient"}
+    for again in (read_scene(sliding.with_name("scene.h5")), build_scene("cylinder_on_flat", **given)):
+        assert describe_scene(again).digest == digest
+
+
+@pytest.mark.parametrize(
+    ("overrides", "factor"),
+    [
+        ({}, 1.0),
+        ({"axes.wear_coefficient": [1e-14, 3e-13, 0.0]}, 3.0),
+        ({"slow_time.cycles": 3000}, 1.5),
+        ({"slow_time.outputs": [10, 1000]}, 0.5),
+        ({"wear.law": "threshold", "wear.threshold": 1.0}, 1.0),
+        ({"wear.surfaces": {"flat": 2.0, "cylinder": 3.0}, "wear.law": "energy"}, 4.0),
+        ({"wear": {"law": "table", "pressure": [1e8, 1e9], "depth": [0, 1e-6], "factor": [[2, 7], [1, 3]]}}, 7.0),
+    ],
+)
+def test_it_is_the_most_that_any_point_wears(sliding, overrides, factor):
+    study = read_study(sliding, overrides)
+    expected = expected_wear(study)
+    assert expected.per_slip_work == pytest.approx(factor * 1e-13 * 2000, rel=1e-12)
+    assert (expected.amplitude, expected.volume, expected.depth) == (1.0, math.inf, math.inf)
+    # b^3 - a^3 of the segment is proportional to it
+    assert half_width(study) == pytest.approx(half_width(read_study(sliding)) * factor ** (1.0 / 3.0), rel=0.08)
+
+
+def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(sliding):
+    scatter = {"samples": 8, "wear_coefficient": {"lognormal": {"factor": 1.5}}}
+    study = read_study(sliding, {"scatter": scatter})
+    assert expected_wear(study).per_slip_work == pytest.approx(1.5**3.1 * 1e-13 * 2000)
+    assert half_width(study) > half_width(read_study(sliding))
+    assert half_width(read_study(sliding, {"scatter": {**scatter, "samples": 1024}})) == half_width(study)
+    widths = {half_width(part.study) for part in parts_of(study)}
+    assert widths == {half_width(study)}
+    # one scene for all
+    assert len(find_scenes(study).studies) == 1
+
+
+def test_each_sample_with_a_scene_of_its_own_has_room_for_its_wear(sliding):
+    inputs = {name: {"lognormal": {"factor": 1.5}} for name in ("P", "wear_coefficient")}
+    study = read_study(sliding, {"scatter": {"samples": 8, **inputs}})
+    for part in parts_of(study):
+        own = {"scene.P": dict(part.study.scene.parameters)["P"]}
+        alone = read_study(sliding, {**own, "axes.wear_coefficient": part.study.axes.wear_coefficient[0]})
+        assert half_width(part.study) == half_width(alone)
+
+
+@pytest.mark.slow
+def test_a_scar_that_is_cut_off_is_a_failed_point_with_a_remedy(sliding, folder, capsys):
+    assert main([str(sliding), "-o", "out.nc", *options("scene.half_width=5e-5")]) == 3
+    assert "The contact goes on beyond the modelled pairs" in capsys.readouterr().out
+    cut = results().squeeze()
+    assert cut.outcome == Outcome.CONTACT_CUT_OFF
+    assert "edge of the modelled contact" in cut.message.item()
+    wide = compute(str(sliding), "out.nc").squeeze()
+    assert not wide.mean_pressure.values[:, -1].any()
+    assert 0.0 < float(wide.wear_depth.isel(cycle=-1).max()) < float(cut.wear_depth.isel(cycle=-1).max())

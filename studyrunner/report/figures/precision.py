@@ -124,8 +124,8 @@ def _compare(label: str, settings: tuple[Setting, ...], own: Mapping[str, FloatA
         """The highest of the finest setting: smallest estimated error, no explicit steps; then the most harmonics."""
         error, setting = float(own["error_estimate"][row]), settings[row]
         error = error if math.isfinite(error) and setting.scheme != _EXPLICIT else math.inf
-        used = isinstance(setting.harmonics, str)
-        harmonics = float(own["harmonics_used"][row]) if used else float(setting.harmonics or 0.0)
+        automatic = isinstance(setting.harmonics, str)
+        harmonics = float(own["harmonics_used"][row]) if automatic else float(setting.harmonics or 0.0)
         return -error, harmonics, -(setting.step or 0.0)
 
     computed, worn, response = own["computed"] == 1.0, own["worn_volume"], own["response_amplitude"]

@@ -14,7 +14,8 @@ from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Drawing
 from studyrunner.report.page.page import build_page_data
 from studyrunner.result.view import open_for_report
-from tests.studyrunner.faked_blocks import STUDY, FakedBlocks
+from tests.studyrunner.faked_runs import FakedBlocks
+from tests.studyrunner.small_studies import MISSIONS
 
 pytestmark = pytest.mark.slow
 
@@ -28,7 +29,7 @@ BLOCKS = ["run-up", "cruise", "heavy"]
 def results(tmp_path_factory):
     """A folder with results of one point, of a grid, of samples, and of one whose second block fails."""
     folder = tmp_path_factory.mktemp("missions")
-    (folder / "missions.toml").write_text(STUDY, encoding="utf-8")
+    (folder / "missions.toml").write_text(MISSIONS, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         blocks = FakedBlocks(patch)
         for name, overrides in STUDIES.items():

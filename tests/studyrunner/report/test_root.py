@@ -1,6 +1,5 @@
 """The root in three dimensions: faces in contact, the worn shape, figures, and VTU files with the same numbers."""
 
-import math
 from xml.etree import ElementTree
 
 import meshio
@@ -69,14 +68,6 @@ def test_the_worn_shape_loses_the_worn_volume(surface, body):
     lost = (before - volume(surface.worn(depth, 50.0), own)) / 50.0
     # neighbours of the flanks are not perpendicular to them everywhere: second order
     assert lost == pytest.approx(float(depth @ area), rel=1e-4)
-
-
-@pytest.mark.parametrize("deepest", [1e-9, 3e-7, 1.07e-5, 2e-3, 0.2])
-def test_the_exaggeration_is_a_round_number_that_shows_the_depth(surface, deepest):
-    factor = surface.exaggeration(deepest)
-    head = factor / 10.0 ** math.floor(math.log10(factor) + 1e-9)
-    assert min(abs(head - each) for each in (1.0, 2.0, 5.0)) < 1e-9
-    assert 0.4 * surface.well_seen <= factor * deepest <= surface.well_seen * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize(
