@@ -14,7 +14,7 @@ from solver.arguments import check_case, check_kind, check_number, check_numbers
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.loading_history.start_states import follow_branch
 from solver.missions.history import integrate_missions
-from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest, Passage
+from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import (
@@ -23,6 +23,7 @@ from solver.settings import (
     Direction,
     Followed,
     FollowedFrequency,
+    Passage,
     Scheme,
     SolverSettings,
     ToTheEnd,

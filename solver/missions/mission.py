@@ -9,29 +9,10 @@ from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.presentation import Presented
-from solver.settings import Direction, SolverSettings, WearTarget
+from solver.settings import Direction, Passage, SolverSettings, WearTarget
 
 Begin = Literal["ramp", "up", "down", "continue"]
 """How a block begins: from the static state by a ramp of the excitation or by a sweep, or from the last block."""
-
-
-@dataclass(frozen=True)
-class Passage:
-    """Frequencies that a machine passes: start and stop, Hz, not equal, and the rate, Hz/s, above 0 up or down."""
-
-    start: float
-    stop: float
-    rate: float
-
-    @property
-    def cycles(self) -> float:
-        """Cycles of one passage."""
-        return abs(self.stop**2 - self.start**2) / (2.0 * self.rate)
-
-    @property
-    def sweep(self) -> Direction:
-        """The direction."""
-        return "up" if self.stop > self.start else "down"
 
 
 @dataclass(frozen=True)
@@ -113,7 +94,7 @@ class MissionHistory(Presented):
     - reference_volume (n_output,): m3, worn volume of the reference solution.
     - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, of the damping ratio of the joint at rest; 0 where
       nothing wears and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
-    - error_estimate: `worn_volume_error` at the last number that was reached.
+    - error_estimate: `worn_volume_error` at the last number that was reached; NaN at 0 where the joint wears.
     - last_mission: number of missions that were computed. steps (n_step,): missions in each step.
     - missions_to_target, missions_to_target_error: number at which the target was reached, and its error; NaN if never.
     - newton_iterations, run_time, CPU seconds: of history and reference solution.

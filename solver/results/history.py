@@ -176,13 +176,16 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     return outcome, "; ".join(said)
 
 
-def last_error(history: WearHistory, rows: IntArray, last: float) -> float:
+def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: float) -> float:
     """Estimated relative error of the last worn volume of a history; NaN where there is none, as where a history
-    reaches its target before its first count. rows: indices of the counts reached. last: count that was computed.
+    reaches its target before its first count.
+
+    counts, error, rate (n,): of cycles or missions that were reached; errors of the worn volume and wear rates there.
+    last: count that was computed.
     """
-    if not rows.size or (history.cycles[rows[-1]] == 0.0 and last > 0.0 and bool(history.wear_rate[rows[-1]] > 0.0)):
+    if not counts.size or (counts[-1] == 0.0 and last > 0.0 and bool(rate[-1] > 0.0)):
         return math.nan
-    return float(history.worn_volume_error[rows[-1]])
+    return float(error[-1])
 
 
 def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:

@@ -54,7 +54,8 @@ def integrate_together(
         history = _assembled(model, start, each, own)
         # the counts that were reached
         rows = np.flatnonzero(np.isfinite(history.worn_volume))
-        history = replace(history, error_estimate=last_error(history, rows, history.last_cycle))
+        reached = (history.cycles[rows], history.worn_volume_error[rows], history.wear_rate[rows])
+        history = replace(history, error_estimate=last_error(*reached, history.last_cycle))
         if history.outcome is Outcome.CONVERGED:
             outcome, message = judge(history, rows, settings.rtol)
             history = replace(history, outcome=outcome, message=message)
@@ -78,7 +79,7 @@ def _solve(integrator: Integrator, case: Case, start: StartState, asked: WearReq
     own = integrator.integrate(WearProblem(case, start, asked, stable_end=True), spent)
     if own.state is None:
         return replace(own, course=unknown_course(case.model, len(asked.loops)))
-    if (len(own.course.ends) == 1 and asked.follow is None) or own.failure.outcome in ENDS_ALL:
+    if (len(own.course.ends) == 1 and asked.follow is None) or own.end.outcome in ENDS_ALL:
         return own
     spent += own.seconds
     if isinstance(asked.steps, Given):
@@ -142,8 +143,8 @@ def _assembled(model: ReducedModel, start: StartState, asked: WearRequest, own: 
         **{name: value for name, value in found.items() if name in _REPORTED}
         | {f"{name}_error": values for name, values in vars(error).items()}
         | ({} if own.state is None else _of_state(own.state, asked.end)),
-        outcome=own.ended.outcome,
-        message=own.ended.message,
+        outcome=own.end_of_all.outcome,
+        message=own.end_of_all.message,
         cycles=counts,
         worn_volume=found["wear_depth"] @ area,
         reference_volume=both.other("wear_depth") @ area,

@@ -60,7 +60,9 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
         "jump_cycle": jump,
         "cycles_to_target": target,
         "cycles_to_target_error": life_error,
-        "error_estimate": last_error(history, known, last),
+        "error_estimate": last_error(
+            history.cycles[known], history.worn_volume_error[known], history.wear_rate[known], last
+        ),
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,

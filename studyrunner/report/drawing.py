@@ -102,12 +102,18 @@ def plotted_values(figure: Figure) -> list[tuple[object, ...]]:
     """
     rows: list[tuple[object, ...]] = []
     for panel in figure.axes:
-        texts = [" ".join(text.split()) for text in (panel.get_title(), panel.get_xlabel(), panel.get_ylabel())]
+        texts = [" ".join(text.split()) for text in (panel.get_title(), _label(panel, "x"), _label(panel, "y"))]
         for series, *columns in _series(panel):
             for x, y, value in zip(*(np.ravel(column) for column in columns), strict=True):
                 numbers = ["" if not np.isfinite(number) else f"{number:.9g}" for number in (x, y, value)]
                 rows.append((texts[0], series, texts[1], numbers[0], texts[2], *numbers[1:]))
     return rows
+
+
+def _label(panel: Axes, axis: str) -> str:
+    """Label of the axis "x" or "y", which may stand at another panel that shares this axis."""
+    sharing = getattr(panel, f"get_shared_{axis}_axes")().get_siblings(panel)
+    return next(filter(None, (getattr(each, f"get_{axis}label")() for each in (panel, *sharing))), "")
 
 
 def _series(panel: Axes) -> Iterator[tuple[str, Any, Any, Any]]:

@@ -4,12 +4,10 @@
 """
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from solver.contact.coulomb import SEPARATED
 from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
@@ -23,6 +21,8 @@ from tests.solver.exact_scenes import drawn
 from tests.solver.models import march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
 
+SETTINGS = SolverSettings()
+
 
 @pytest.fixture
 def presented(monkeypatch):
@@ -30,31 +30,9 @@ def presented(monkeypatch):
     monkeypatch.setattr(frequency_sweep, "find_instability", lambda *_: None)
 
 
-def start_of(model, friction, excitation, frequency, settings):
-    ((_, start),) = follow_branch(model, friction, excitation, np.array([frequency]), "up", settings)
+def start_of(model, friction, excitation, frequency):
+    ((_, start),) = follow_branch(model, friction, excitation, np.array([frequency]), "up", SETTINGS)
     return start
-
-
-def state_at(model, friction, excitation, frequency, settings=None):
-    """The state that a sweep up comes to."""
-    settings = settings or SolverSettings()
-    start = start_of(model, friction, excitation, frequency, settings)
-    case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
-    joint = case.joint(2.0 * np.pi * frequency, excitation)
-    return case, joint, evaluated(joint, start.state)[1]
-
-
-@lru_cache
-def state_of(kind, seed, damping=1.0):
-    """A drawn scene, its damping times a factor, and its state."""
-    scene = drawn(kind, seed)
-    scene = replace(scene, damping=damping * scene.damping)
-    case, joint, at = state_at(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
-    return scene, case, joint, at
-
-
-def marched(joint, at, n_samples):
-    return multipliers_of(build_monodromy(joint, at, n_samples), every=True)
 
 
 def largest(multipliers):
@@ -78,52 +56,14 @@ def largest(multipliers):
     ],
 )
 def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed):
-    scene, _, joint, at = state_of(kind, seed)
-    exact = scene.orbit_next_to(joint, at.displacement_h).multipliers()
-    assert largest(marched(joint, at, 512)) == pytest.approx(largest(exact), abs=allowed)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize(("kind", "damping"), [("slider", -3.0), ("two masses", -0.3), ("jenkins", -3.0)])
-def test_with_negative_damping_as_well(kind, damping):
-    """Friction holds some of these vibrations, and some not."""
-    seen = 0
-    for seed in (1, 4, 6):
-        try:
-            scene, case, joint, at = state_of(kind, seed, damping)
-            exact = largest(scene.orbit_next_to(joint, at.displacement_h).multipliers())
-        except (AssertionError, RuntimeError):
-            # no state, or none that is a motion of the exact scene
-            continue
-        if abs(exact - 1.0) > 0.05:
-            seen += 1
-            unstable = find_instability(case, joint, at, Run(case.settings.tolerance))
-            assert (unstable is not None) == (exact > 1.0), (seed, exact)
-    assert seen > 0
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize("seed", [1, 17, 29])
-def test_a_multiplier_beyond_minus_one_doubles_the_period(seed):
-    scene, case, joint, at = state_of("impact", seed)
-    exact = scene.orbit_next_to(joint, at.displacement_h).multipliers()
-    beyond = bool(((np.abs(exact.imag) < 1e-9) & (exact.real < -1.0)).any())
-    unstable = find_instability(case, joint, at, Run(case.settings.tolerance))
-    assert (unstable is not None and unstable.outcome is Outcome.PERIOD_DOUBLED) == beyond
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("omega", "n_harmonics", "n_samples"), [(1.0, 3, 128), (1.5, 9, 128)])
-def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(omega, n_harmonics, n_samples):
-    """Its multipliers lie within the unit circle: the mass comes to this motion by itself, see `tests.event_driven`."""
-    case, joint, at = state_at(
-        bundled("vibro_impact"), 0.0, 0.02, omega / (2.0 * np.pi), SolverSettings(n_harmonics, n_samples)
-    )
-    assert (at.status_t == SEPARATED).any()
-    assert not (at.status_t == SEPARATED).all()
-    assert find_instability(case, joint, at, Run(case.settings.tolerance)) is None
+    scene = drawn(kind, seed)
+    start = start_of(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
+    case = build_case(scene.model, scene.friction, start.penalty_omega, SETTINGS, start.resolution)
+    joint = case.joint(scene.omega, scene.excitation)
+    at = evaluated(joint, start.state)[1]
+    exact = largest(scene.orbit_next_to(joint, at.displacement_h).multipliers())
+    assert largest(multipliers_of(build_monodromy(joint, at, 512), every=True)) == pytest.approx(exact, abs=allowed)
+    assert (find_instability(case, joint, at, Run(SETTINGS.tolerance)) is not None) == (exact > 1.0)
 
 
 def with_matrices(name, **matrices):
@@ -148,16 +88,16 @@ DRIVEN = np.array([[-0.5, -0.02], [-0.02, 0.02]])
 )
 def test_a_growing_vibration_is_no_result(name, matrices, asked):
     model, (friction, excitation, frequency) = with_matrices(name, **matrices), asked
-    start = start_of(model, friction, excitation, frequency, SolverSettings())
+    start = start_of(model, friction, excitation, frequency)
     assert start.outcome is Outcome.UNSTABLE
     assert start.state is None
-    history = march_wear(model, friction, start, 1e-9, 1.0, "implicit", np.zeros(1), SolverSettings())
+    history = march_wear(model, friction, start, 1e-9, 1.0, "implicit", np.zeros(1), SETTINGS)
     assert (history.outcome, history.message) == (start.outcome, start.message)
     assert np.isnan(history.response).all()
 
 
 def test_a_state_that_sticks_all_over_is_that_of_its_structure():
-    start = start_of(with_matrices("two_masses", damping=DRIVEN), 50.0, 20.0, 0.05, SolverSettings())
+    start = start_of(with_matrices("two_masses", damping=DRIVEN), 50.0, 20.0, 0.05)
     assert start.outcome is Outcome.UNSTABLE
     # for 20 s
     assert f"{np.exp(0.25 * 20.0):.3g}" in start.message

@@ -20,33 +20,11 @@ from tests.studyrunner.small_studies import MISSIONS, compute
 
 LINE = ("axes.frequency=160", "axes.sweep=up")
 ONE = (*LINE, "axes.wear_coefficient=1e-11")
-ENGINE = """
-[study]
-name = "engine"
-[scene]
-model = "dovetail_sector"
-mesh = 1
-[slow_time]
-missions = 10
-[axes]
-rotation_speed = [3000, 3100]
-excitation_amplitude = 0.5
-[[mission]]
-name = "own speed"
-rotation_speed = 2700
-engine_order = 4
-cycles = 100
-[[mission]]
-name = "speed of the axis"
-engine_order = 4
-seconds = 10
-"""
 
 
 @pytest.fixture(autouse=True)
 def studies(folder):
-    for name, text in (("missions", MISSIONS), ("engine", ENGINE)):
-        Path(f"{name}.toml").write_text(text, encoding="utf-8")
+    Path("missions.toml").write_text(MISSIONS, encoding="utf-8")
 
 
 @pytest.fixture
@@ -144,6 +122,11 @@ def test_a_target_ends_the_missions(blocks):
     assert (result.missions_to_target_error > 0.0).all()
     assert all("later missions are not computed" in message for message in result.message.values.ravel())
     assert summary(result).values["life"]["count"] == fast
+    # no number is stored of what has worn then
+    early = run(*LINE, f"slow_time.until={{worn_volume={1e-3 * goal!r}}}")
+    assert (early.missions_to_target < early.mission[1]).all()
+    assert np.isnan(early.error_estimate).all()
+    assert "nothing wore" not in str(summary(early))
 
 
 @pytest.mark.slow
@@ -172,7 +155,10 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
 
 
 def test_an_engine_order_is_a_frequency_by_the_speed_of_the_block():
-    study = read_study("engine.toml")
+    blocks = "{name = 'own speed', rotation_speed = 2700, engine_order = 4, cycles = 100}, "
+    blocks += "{name = 'speed of the axis', engine_order = 4, seconds = 10}"
+    axes = ("axes.rotation_speed=[3000, 3100]", "axes.excitation_amplitude=0.5")
+    study = read_study("mission", [*axes, f"mission=[{blocks}]"])
     assert tuple(study.dimensions) == ("wear_coefficient", "excitation_amplitude", "sweep", "rotation_speed")
     tasks = plan_of(study, 10).results
     assert [[block.frequency for block in task.blocks] for task in tasks] == [[180.0, 200.0], [180.0, 4 * 3100 / 60]]

@@ -182,23 +182,6 @@ def test_the_shortest_life():
     assert at_once.values["life"]["count"] == 0.0
 
 
-def test_a_target_before_the_second_count_and_one_without_a_unit():
-    volume = np.where(np.arange(21) > 0, math.nan, 0.0)
-    made = wearing(
-        "axes.frequency=1",
-        "axes.scheme=adaptive",
-        "slow_time.until={frequency_shift=0.01}",
-        volume=lambda _: volume,
-        cycles_to_target=lambda _: 300.0,
-        cycles_to_target_error=lambda _: 3.0,
-        error_estimate=lambda _: math.nan,
-    )
-    lines = summary(made).lines
-    assert any("slow_time.outputs: give more" in line for line in lines)
-    assert any("to frequency shift 0.01 " in line for line in lines)
-    assert "doubt" not in summary(made.assign(worn_volume=made["worn_volume"].fillna(0.0))).values
-
-
 # --- certainty and failures ---
 
 

@@ -11,7 +11,7 @@ from studyrunner.accessor import join_results
 from studyrunner.api import run_study
 from studyrunner.report.cli import main
 from studyrunner.report.contents import draw_report
-from studyrunner.report.drawing import Drawing
+from studyrunner.report.drawing import Drawing, plotted_values
 from studyrunner.report.page.page import build_page_data
 from studyrunner.result.view import open_for_report
 from tests.studyrunner.faked_runs import FakedBlocks
@@ -67,6 +67,7 @@ def test_figures_of_blocks_have_the_numbers_of_the_file(results):
         one = dataset.squeeze().load()
     variables = ("block_share", "block_worn_volume"), ("response_amplitude_begin", "response_amplitude")
     for figure, names in zip(("block_shares", "block_responses"), variables, strict=True):
+        assert {row[2] for row in plotted_values(found[figure].figure)} == {"missions"}
         for panel, name in zip(found[figure].figure.axes, names, strict=True):
             wrong = {"block_share": None, "block_worn_volume": "block_worn_volume_error"}.get(name, "response_error")
             factor = {"block_share": 100.0, "block_worn_volume": 1e9}.get(name, 1e6)
