@@ -160,13 +160,6 @@ def test_bad_input_is_one_line(draw, tmp_path, capsys, arguments, key):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results", "text.nc"]
 
 
-def test_a_full_disk_is_one_line(draw, capsys):
-    draw(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
-    assert main(["results/worn.x.nc", "-o", "out", "--no-compute"]) == BAD_INPUT
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith('study-report: command line: -o = "out": ')
-
-
 @pytest.mark.processes
 def test_a_full_disk_is_one_line(draw, capsys):
     draw(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
@@ -175,6 +168,7 @@ def test_a_full_disk_is_one_line(draw, capsys):
     assert line.startswith('study-report: command line: -o = "out": ')
 
 
+@pytest.mark.processes
 def test_failures_have_a_traceback_and_signals_have_none(draw, capsys):
     draw(ZeroDivisionError("broken"))
     assert main(["results/worn.x.nc"]) == UNEXPECTED
