@@ -190,7 +190,7 @@ def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
 
     stiffness, mass, response = matrix("stiffness"), matrix("mass"), matrix("response/dofs")
     key, n = f"{prefix}response/dofs", len(stiffness)
-    if response.ndim == 1:
+    if response.ndim == 1 and stiffness.shape == (n, n):  # of another shape that is said first
         indices = as_whole(key, response)
         _check_indices(key, indices, n)
         response = np.eye(n)[indices]

@@ -91,7 +91,8 @@ def _of_study(study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan) -> 
     yield "scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"
     if len(of_scenes) > 1:
         fewest = min(len(each.area) for each in of_scenes)
-        yield "scenes", f"{len(of_scenes)}, built once each, with {fewest} to {len(facts.area)} contact pairs"
+        pairs = f"{fewest} to " * (fewest < len(facts.area)) + count(len(facts.area), "contact pair")
+        yield "scenes", f"{len(of_scenes)}, built once each, with {pairs}"
     yield "points", f"{plan.n_points}" + (f" = {shape}" if shape else "")
     if study.follow is not None:
         what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"

@@ -220,6 +220,8 @@ class _Search:
     def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
         unknowns, most = here.unknowns(resolution), here.limit(NODE_UNKNOWNS if self.node else MOST_UNKNOWNS)
+        if 2 * resolution.highest >= resolution.samples:  # which are given
+            return False
         # the contact law costs unknowns times samples
         if unknowns * resolution.samples > SAMPLES_OF_UNKNOWNS * most:
             return False

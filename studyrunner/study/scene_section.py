@@ -243,6 +243,8 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
     if "wear_depth" not in dataset:
         raise UserError(source, "scene.worn.result", None, "give a result with wear_depth among its variables")
     depths = dataset["wear_depth"]
+    if "cycle" not in depths.dims:
+        raise UserError(source, "scene.worn.result", None, "give a result of wear histories: missions have no cycles")
     axes = [str(name) for name in depths.dims[:-2]]
     remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
     raise_wrong(source, (Wrong(f"scene.worn.{name}", point[name], remedy) for name in point.keys() - set(axes)))

@@ -176,6 +176,12 @@ def test_a_state_that_is_not_allowed_what_it_needs_says_so(name, most, monkeypat
     assert found.case.resolution.samples <= 64 if name == "MOST_SAMPLES" else unknowns <= 7
 
 
+def test_given_samples_limit_the_harmonics():
+    found = refined_of(slider(SolverSettings(samples=32, rtol=1e-4)))
+    assert found.case.resolution.samples == 32 > 2 * found.case.resolution.highest
+    assert not found.accurate
+
+
 def test_a_state_far_better_than_needed_goes_down_to_fewer():
     rich = slider(SolverSettings(rtol=0.05), Resolution((1, 3, 5, 7, 9), 256))
     found = refined_of(rich)

@@ -148,6 +148,11 @@ def rank_deficient(file):
         file[key][...] = (matrix + matrix.T) / 2
 
 
+def short(file):
+    put("response/dofs", np.array([0, 6]))(file)
+    put("stiffness", np.eye(7)[:1])(file)
+
+
 def soft(file):
     del file["mass"]
     file["mass"] = h5py.SoftLink("/stiffness")
@@ -178,6 +183,7 @@ WRONG = [
     (plain, put("contact/surface", np.array([b"\xff\xfe", b"a", b"b"])), "contact/surface"),
     (plain, put("response/names", ["a", "b", "c"]), "response/dofs"),
     (plain, put("response/dofs", np.array([0, 7])), "response/dofs"),
+    (plain, short, "stiffness"),
     (plain, soft, "mass"),
     (plain, attribute("nodal_diameter", 1), "nodal_diameter"),
     (sector, not_hermitian, "nd/2/stiffness"),

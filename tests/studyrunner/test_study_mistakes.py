@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from studies.scene_file import write_scene
 from studyrunner.cli import main
@@ -89,6 +90,7 @@ WRONG = {
         scene.worn={{result='worn.nc', cycle=[0], frequency=151}} -> scene.worn.frequency = 151
         scene.worn={{result='worn.nc', cycle=[0], scheme='explicit'}} -> scene.worn.scheme
         scene.worn={{result='none.nc', cycle=[0]}} -> none.nc: the file
+        scene.worn={{result='missions.nc', cycle=[0]}} -> scene.worn.result
         axes.scheme=final ; solver.samples=8 -> solver.samples, slow_time.cycles
     """,
     SLIDER.replace("[study]\nname", "[other]\nname"): "-> other",
@@ -255,6 +257,8 @@ def files(tmp_path_factory):
     }.items():
         write_scene(model, folder / f"{name}.h5")
     write_depths(folder / "worn.nc", 150.0, [0.0, 1000.0], 1)
+    with xr.open_dataset(folder / "worn.nc") as worn:
+        worn.rename(cycle="mission").to_netcdf(folder / "missions.nc")
     (folder / "part.nc").write_bytes((folder / "worn.nc").read_bytes()[:1000])
     for number, content in enumerate(NO_TOML):
         (folder / f"{number}.toml").write_bytes(content)

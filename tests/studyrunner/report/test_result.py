@@ -160,6 +160,7 @@ def test_bad_input_is_one_line(draw, tmp_path, capsys, arguments, key):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results", "text.nc"]
 
 
+@pytest.mark.processes
 def test_a_full_disk_is_one_line(draw, capsys):
     draw(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     assert main(["results/worn.x.nc", "-o", "out", "--no-compute"]) == BAD_INPUT
