@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from solver.histories import march_wear as march_wear
     from solver.missions.mission import Block as Block
     from solver.missions.mission import MissionHistory as MissionHistory
-    from solver.missions.mission import Passage as Passage
     from solver.model import ReducedModel as ReducedModel
     from solver.model_from_matrices import build_model as build_model
     from solver.nonlinear_modes import Backbone as Backbone
@@ -44,6 +43,7 @@ if TYPE_CHECKING:
     from solver.outcome import Outcome as Outcome
     from solver.results.history import WearHistory as WearHistory
     from solver.results.state_report import PeriodicMotion as PeriodicMotion
+    from solver.settings import Passage as Passage
     from solver.settings import SolverSettings as SolverSettings
     from solver.whole_response import ResponseCurve as ResponseCurve
     from solver.whole_response import response_curve as response_curve
@@ -53,14 +53,14 @@ _NAMES = {
     "compliant_contact": "with_contact_stiffness",
     "forced_response": "FrequencyResponse HarmonicBalance balance_of frequency_response",
     "histories": "integrate_mission march_wear",
-    "missions.mission": "Block MissionHistory Passage",
+    "missions.mission": "Block MissionHistory",
     "model": "ReducedModel",
     "model_from_matrices": "build_model",
     "nonlinear_modes": "Backbone ModalResponse backbone modal_response",
     "outcome": "Outcome",
     "results.history": "WearHistory",
     "results.state_report": "PeriodicMotion",
-    "settings": "SolverSettings",
+    "settings": "Passage SolverSettings",
     "whole_response": "ResponseCurve response_curve",
 }
 _PLACES = {name: place for place, names in _NAMES.items() for name in names.split()}

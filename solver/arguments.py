@@ -31,8 +31,7 @@ def check_case(
 
 def check_settings(model: ReducedModel, settings: SolverSettings) -> None:
     """Whether settings are allowed, and fit to the model and to each other."""
-    if not isinstance(settings, SolverSettings):
-        raise ValueError("settings: give SolverSettings(...)")
+    check_kind("settings", settings, SolverSettings)
     for name in ("harmonics", "samples"):
         given = getattr(settings, name)
         if given != "auto" and (not isinstance(given, int | np.integer) or given < 1):
@@ -67,6 +66,12 @@ def check_friction(model: ReducedModel, given: ArrayLike | None) -> float | Floa
         friction = numbers if numbers.size > 1 else float(numbers[0])
     friction_of_pairs(model, friction)
     return friction
+
+
+def check_kind(name: str, given: object, kind: type) -> None:
+    """Whether a value is of a class."""
+    if not isinstance(given, kind):
+        raise ValueError(f"{name}: give {kind.__name__}(...)")
 
 
 def check_word(name: str, given: str, known: tuple[str, ...]) -> None:

@@ -10,11 +10,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.arguments import check_case, check_number, check_numbers, check_word, worn_model
+from solver.arguments import check_case, check_kind, check_number, check_numbers, check_word, worn_model
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.loading_history.start_states import follow_branch
 from solver.missions.history import integrate_missions
-from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest, Passage
+from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import (
@@ -23,6 +23,7 @@ from solver.settings import (
     Direction,
     Followed,
     FollowedFrequency,
+    Passage,
     Scheme,
     SolverSettings,
     ToTheEnd,
@@ -105,6 +106,7 @@ def march_wear(
         raise ValueError(f"outputs = {outputs}: give at least 2, the unworn and the final state")
     check_number("final_share", final_share, above=0.0)
     _check_target(until, TARGETS)
+    check_kind("law", law, WearLaw)
     if wear_depth is not None and law.name == "table":
         raise ValueError('wear_depth: give another law: the factors of a "table" depend on depths that count from 0')
     model = worn_model(model, wear_depth)
@@ -139,6 +141,7 @@ def _check_frequency(
 def _check_target(until: WearTarget | None, known: tuple[str, ...]) -> None:
     """Raises ValueError where a target is not one of the known quantities, or not above 0."""
     if until is not None:
+        check_kind("until", until, WearTarget)
         check_word("until.quantity", until.quantity, known)
         check_number("until.value", until.value, above=0.0)
 
@@ -174,8 +177,11 @@ def integrate_mission(
     """
     settings = SolverSettings() if settings is None else settings
     check_word("sweep", sweep, get_args(Direction))
-    if not blocks:
-        raise ValueError("blocks: give at least one block")
+    if isinstance(blocks, Block) or not blocks:
+        raise ValueError("blocks: give a list with at least one block")
+    check_kind("law", law, WearLaw)
+    for place, block in enumerate(blocks):
+        check_kind(f"blocks[{place}]", block, Block)
     checked = tuple(_checked(block, place, settings, law) for place, block in enumerate(blocks))
     for place, block in enumerate(checked):
         _check_neighbours(checked[place - 1], block, place)

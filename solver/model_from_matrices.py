@@ -107,6 +107,7 @@ def _linear(
     # matrix (n_response, n) of the responses, from a matrix or from indices
     response = np.eye(n) if given["response"] is None else _array("response", given["response"], None, real=real)
     response = np.eye(n)[_indices("response", response, 0, n)] if response.ndim == 1 else response
+    _check("response", len(response) > 0, "give at least one displacement")
     static, harmonic = (nothing if load is None else load for load in (load_static, load_harmonic))
     return LinearModel(
         **matrices,

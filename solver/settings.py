@@ -96,6 +96,25 @@ class FollowedFrequency:
 
 
 @dataclass(frozen=True)
+class Passage:
+    """Frequencies that a machine passes: start and stop, Hz, not equal, and the rate, Hz/s, above 0 up or down."""
+
+    start: float
+    stop: float
+    rate: float
+
+    @property
+    def cycles(self) -> float:
+        """Cycles of one passage."""
+        return abs(self.stop**2 - self.start**2) / (2.0 * self.rate)
+
+    @property
+    def sweep(self) -> Direction:
+        """The direction."""
+        return "up" if self.stop > self.start else "down"
+
+
+@dataclass(frozen=True)
 class SolverSettings:
     """Resolution and accuracy of a computation.
 

@@ -46,10 +46,15 @@ class FretwearAccessor:
     def summary(self) -> Summary:
         """What came out: where the joint wears most, how much, how deep, how well that is known, what failed.
 
-        `print` shows it as the last lines of a run do, `.values` has the numbers. ValueError: no result of a study.
+        `print` shows it as the last lines of a run do, `.values` has the numbers. ValueError: no result of a study,
+        or one without a dimension of its variables.
         """
-        if "study" not in self._dataset.attrs:
+        dataset = self._dataset
+        if "study" not in dataset.attrs or "outcome" not in dataset:
             raise ValueError("this dataset is no result of a study: give one of open_result or run_study")
+        for name in ("cycle", "mission", "contact", "response"):
+            if name in dataset.coords and name not in dataset.dims:
+                raise ValueError(f"{name} is no dimension of this dataset: select with a list, as isel({name}=[0])")
         return summary(self._dataset)
 
     @property

@@ -199,8 +199,8 @@ def _frequencies(study: Study, parts: Sequence[Study]) -> list[float]:
     if not study.kind.counted or study.axes.frequency_ratio:
         return []
     own = [value for part in parts if not (study.mission and part.mission) for value in part.axes.frequency]
-    passages = [block.frequency for block in study.mission if isinstance(block.frequency, dict)]
-    return own + [passage[end] for passage in passages for end in ("start", "stop")]
+    passages = [block.passage for block in study.mission if block.passage is not None]
+    return own + [end for passage in passages for end in (passage.start, passage.stop)]
 
 
 def _numbers(parts: Sequence[Study], name: str) -> list[float]:

@@ -31,6 +31,15 @@ _CELLS = 32  # of the grid for events, of which a piece of an integral takes at 
 
 
 @dataclass(frozen=True)
+class PairPhase(Phase):
+    """Rows (m,) that give normal force, N, slip velocity, m/s, and the place, m, of an elastic slider that moves."""
+
+    normal: FloatArray
+    slip: FloatArray
+    place: FloatArray | None
+
+
+@dataclass(frozen=True)
 class ContactPair(PiecewiseLinear):
     """`M x'' + C x' + K x + lambda = static + Re(harmonic exp(i omega t))`, n displacements.
 
@@ -118,15 +127,13 @@ class ContactPair(PiecewiseLinear):
         return flow, (forces - mass @ acceleration)[self._place] if held else self._one(0) * 0.0
 
     @cached_property
-    def _parts(self) -> dict[str, tuple[Phase, FloatArray, FloatArray, FloatArray | None]]:
-        """By phase: itself, its normal force, its slip velocity, and where an elastic slider is that does not stick."""
-        nothing = np.zeros(2 * self.n + 3)
-        parts = {}
-        closed = self._masses()
+    def phases(self) -> dict[str, PairPhase]:
+        """Of these "forward", "backward" and "stick" where there is a tangent, else "closed"; "open"."""
+        phases, closed = {}, self._masses()
         if self.normal is not None:
             closed[self.normal] = self.gap * self._one(-1)
         for name, sign in ({"stick": 0.0} | SLIDING if self.tangent is not None else {"closed": 0.0}).items():
-            rows, place, slip = closed.copy(), None, nothing
+            rows, place, slip = closed.copy(), None, 0.0 * self._one(0)
             if self.elastic:
                 place = self._one(self._place) if name == "stick" else self._slid(closed, sign)
                 rows[self.tangent] = place
@@ -144,10 +151,10 @@ class ContactPair(PiecewiseLinear):
             if self.elastic:
                 flow[self._place] = slip
             guards += [] if self.normal is None else [normal]
-            parts[name] = Phase(flow, np.array(guards)), normal, slip, None if name == "stick" else place
+            phases[name] = PairPhase(flow, np.array(guards), normal, slip, None if name == "stick" else place)
         if self.normal is not None:
-            parts["open"] = self._open()
-        return parts
+            phases["open"] = self._open()
+        return phases
 
     def _slid(self, closed: FloatArray, sign: float) -> FloatArray:
         """Where an elastic slider is that slips: `lambda_T = sign mu lambda_N`, both from the springs."""
@@ -157,7 +164,7 @@ class ContactPair(PiecewiseLinear):
         force = self._left(t, closed) - sign * self.friction * self._left(n, closed)
         return force / (self._k[t, t] - sign * self.friction * self._k[n, t])
 
-    def _open(self) -> tuple[Phase, FloatArray, FloatArray, FloatArray | None]:
+    def _open(self) -> PairPhase:
         nothing, rows = np.zeros(2 * self.n + 3), self._masses()
         free = [self.normal, self.tangent] if self.elastic else [self.normal]
         rows[free] = np.linalg.solve(self._k[np.ix_(free, free)], [self._left(index, rows) for index in free])
@@ -165,20 +172,16 @@ class ContactPair(PiecewiseLinear):
         place = rows[self.tangent] if self.elastic else None
         if place is not None:
             flow[self._place] = place @ flow
-        return Phase(flow, (self.gap * self._one(-1) - rows[self.normal])[np.newaxis]), nothing, nothing, place
-
-    @cached_property
-    def phases(self) -> dict[str, Phase]:
-        """Of these "forward", "backward" and "stick" where there is a tangent, else "closed"; "open"."""
-        return {name: part[0] for name, part in self._parts.items()}
+        guards = (self.gap * self._one(-1) - rows[self.normal])[np.newaxis]
+        return PairPhase(flow, guards, nothing, nothing, place)
 
     def next_phase(self, name: str, y: FloatArray) -> tuple[str, FloatArray]:
         """The first other phase whose guards are positive at once; which ones there are says the event."""
-        phase, normal, _, place = self._parts[name]
-        y, others = y.copy(), [other for other in self._parts if other != name]
+        phase = self.phases[name]
+        y, others = y.copy(), [other for other in self.phases if other != name]
         values = np.abs(phase.guards @ y)
-        if place is not None:
-            y[self._place] = place @ y
+        if phase.place is not None:
+            y[self._place] = phase.place @ y
         if name in SLIDING and self.elastic:
             # from one way to the other a slider behind a spring always sticks
             others.remove("backward" if name == "forward" else "forward")
@@ -187,7 +190,7 @@ class ContactPair(PiecewiseLinear):
         elif self.tangent is not None and not self.elastic:
             velocity = self.n + self._place
             fast = np.abs(y[self.n : 2 * self.n]).max() + self.omega * np.abs(y[: self.n]).max()
-            sizes = [fast, max(float(np.abs(normal * y).max()), 1e-300)][: len(values)]
+            sizes = [fast, max(float(np.abs(phase.normal * y).max()), 1e-300)][: len(values)]
             if name in SLIDING and np.argmin(values / sizes) == 0:
                 y[velocity] = 0.0
             else:
@@ -199,7 +202,7 @@ class ContactPair(PiecewiseLinear):
 
     def _begins(self, name: str, y: FloatArray) -> bool:
         """Whether the first derivative of each guard that is not zero, the guard itself included, is positive."""
-        phase, width = self._parts[name][0], self.cell
+        phase, width = self.phases[name], self.cell
         derivatives = [y]
         for order in range(1, 5):
             derivatives.append(phase.flow @ derivatives[-1] * width / order)
@@ -246,18 +249,18 @@ class ContactPair(PiecewiseLinear):
 
     def _likely_phase(self, y: FloatArray) -> str:
         """Phase of a state that need not be exact."""
-        if "open" in self._parts and (self._parts["open"][0].guards @ y).min() > 0.0:
+        if "open" in self.phases and (self.phases["open"].guards @ y).min() > 0.0:
             return "open"
         if self.tangent is None:
             return "closed"
         if self.elastic:
-            low, high = self._parts["stick"][0].guards[:2] @ y
+            low, high = self.phases["stick"].guards[:2] @ y
             name = "forward" if low < high else "backward"
-            slips = min(low, high) <= 0.0 and (self._parts[name][0].guards[0] @ y) > 0.0
+            slips = min(low, high) <= 0.0 and (self.phases[name].guards[0] @ y) > 0.0
             return name if slips else "stick"
         velocity = y[self.n + self._place]
         if velocity == 0.0:
-            low, high = self._parts["stick"][0].guards[:2] @ y
+            low, high = self.phases["stick"].guards[:2] @ y
             if min(low, high) > 0.0:
                 return "stick"
             velocity = high - low
@@ -271,7 +274,7 @@ class ContactPair(PiecewiseLinear):
         """Integral of normal force times slip over a period, N m."""
         total = 0.0
         for segment in orbit.segments:
-            phase, normal, slip, _ = self._parts[segment.phase]
+            phase = self.phases[segment.phase]
             if segment.phase not in SLIDING:
                 continue
             pieces = int(np.ceil(segment.duration / (_CELLS * self.cell)))
@@ -279,6 +282,6 @@ class ContactPair(PiecewiseLinear):
             within = np.array([expm(phase.flow * length * (node + 1.0) / 2.0) for node in _NODES])
             for _ in range(pieces):
                 states = within @ y
-                total += length / 2.0 * float(_WEIGHTS @ np.abs((states @ normal) * (states @ slip)))
+                total += length / 2.0 * float(_WEIGHTS @ np.abs((states @ phase.normal) * (states @ phase.slip)))
                 y = expm(phase.flow * length) @ y
         return total

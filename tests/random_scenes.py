@@ -62,25 +62,28 @@ class RandomScene:
 
 @dataclass(frozen=True)
 class _Pairs:
-    """What was drawn for the pairs: kind, mount ("massless", "light", "direct") and fit of each.
+    """What was drawn for the pairs: kind, mount ("massless", "light", "direct") and fit of each (n_contact,).
 
     fit: "pressed", "touching" (no preload), "near" (open, within reach), "far" (never reached).
-    preload (n_contact,): N, that the contact takes up with all pressed pairs held.
+    preload (n_contact,): N, that the contact takes up with all pressed pairs held. dofs (n_contact, 3).
     """
 
-    kinds: tuple[str, ...]
-    mounts: tuple[str, ...]
-    fits: tuple[str, ...]
+    kinds: np.ndarray
+    mounts: np.ndarray
+    fits: np.ndarray
     preload: FloatArray
+    dofs: np.ndarray
 
-    def dofs(self, places: np.ndarray) -> np.ndarray:
-        """Indices (n_contact, 3) of the displacements; `places` are those that are still free, in random order."""
-        dofs, taken = np.full((len(self.kinds), 3), -1, np.int64), 0
-        for pair, kind in enumerate(self.kinds):
-            for component in COMPONENTS[kind]:
-                dofs[pair, component] = places[taken]
-                taken += 1
-        return dofs
+    @property
+    def closing(self) -> np.ndarray:
+        """Whether each has a closing displacement."""
+        return self.dofs[:, 0] >= 0
+
+    @property
+    def pressed(self) -> np.ndarray:
+        """Displacements of the pressed pairs."""
+        chosen = self.dofs[self.fits == "pressed"]
+        return chosen[chosen >= 0]
 
 
 def log_uniform(random: np.random.Generator, low: float, high: float) -> float:
@@ -96,44 +99,30 @@ def random_scene(seed: int) -> RandomScene:
     n_inner = int(random.choice([0, 1, 2, 3, 4, 6], p=[0.2, 0.15, 0.2, 0.2, 0.15, 0.1]))
     friction = 0.0 if random.random() < 0.08 else log_uniform(random, 0.01, 2.0)
     pairs = _draw_pairs(random, n_inner, k0 * log_uniform(random, 1e-6, 1e-4))
-    n = sum(len(COMPONENTS[kind]) for kind in pairs.kinds) + n_inner
-    dofs = pairs.dofs(random.permutation(n))
-    mass, stiffness = _matrices(random, pairs, dofs, n, k0, k0 / omega_0**2)
-    friction = min(friction, 0.9 * _snapping_friction(stiffness, dofs))
-    lifts = any(fit in ("near", "touching") for fit in pairs.fits)
+    n, n_contact = int((pairs.dofs >= 0).sum()) + n_inner, len(pairs.kinds)
+    mass, stiffness = _matrices(random, pairs, n, k0, k0 / omega_0**2)
+    friction = min(friction, 0.9 * _snapping_friction(stiffness, pairs.dofs))
     severity = log_uniform(random, 0.03, 10.0)
+    lifts = np.isin(pairs.fits, ("near", "touching")).any()
     ratio = log_uniform(random, 1e-2 if lifts or severity > 0.5 else 3e-4, 0.2)
     share = random.uniform()
     damping = 2.0 * ratio * (share / omega_0 * stiffness + (1.0 - share) * omega_0 * mass)
-    load = _harmonic_load(random, dofs, n, n_inner)
-    omega = _draw_frequency(random, mass, stiffness, _indices(dofs, pairs, "pressed"), 5.0 * omega_0)
+    load = _harmonic_load(random, pairs.dofs, n, n_inner)
+    omega = _draw_frequency(random, mass, stiffness, pairs.pressed, 5.0 * omega_0)
     full = stiffness + 1j * omega * damping - omega**2 * mass
-    amplitude = _amplitude(pairs, dofs, full, load, max(friction, 0.05), severity)
+    amplitude = _amplitude(pairs, full, load, max(friction, 0.05), severity)
     # see the module: a rigid mass must not be lifted by wear either, which goes with 1 / area
-    rigid = np.array([mount == "direct" for mount in pairs.mounts]) & (dofs[:, 0] >= 0)
-    contact = ContactInterface(
-        dofs=dofs,
-        area=np.where(rigid, 1e4, 1.0) * 1e-4 * np.array([log_uniform(random, 1e-2, 1e2) for _ in pairs.kinds]),
-        gap=_gaps(random, pairs, dofs, full, amplitude * load),
-        normal_load=np.where(dofs[:, 0] < 0, pairs.preload, 0.0),
-        position=np.full((len(pairs.kinds), 3), np.nan),
-        surface=("random",) * len(pairs.kinds),
-    )
-    linear = LinearModel(
-        mass=mass,
-        damping=damping,
-        stiffness=stiffness,
-        load_static=_static_load(random, pairs, dofs, n, friction),
-        load_harmonic=load,
-        response=random.normal(size=(2, n)) / np.sqrt(n),
-    )
+    rigid = (pairs.mounts == "direct") & pairs.closing
+    area = np.where(rigid, 1e4, 1.0) * 1e-4 * np.array([log_uniform(random, 1e-2, 1e2) for _ in pairs.kinds])
+    gap, normal_load = _gaps(random, pairs, full, amplitude * load), np.where(pairs.closing, 0.0, pairs.preload)
+    nowhere = np.full((n_contact, 3), np.nan)
+    contact = ContactInterface(pairs.dofs, area, gap, normal_load, nowhere, ("random",) * n_contact)
+    load_static = _static_load(random, pairs, n, friction)
+    linear = LinearModel(mass, damping, stiffness, load_static, load, random.normal(size=(2, n)) / np.sqrt(n))
     cycles = log_uniform(random, 1e3, 1e6)
-    wear = _wear_coefficient(random, contact, pairs, full, amplitude * load, cycles)
+    wear = _wear_coefficient(random, area, pairs, full, amplitude * load, cycles)
     kinds = ", ".join("/".join(three) for three in zip(pairs.kinds, pairs.mounts, pairs.fits, strict=True))
-    facts = (
-        f"{n_inner} inner; {kinds}; mu {friction:.3g}, damping {ratio:.2g}, severity {severity:.2g},"
-        f" rate {omega / omega_0:.3g}"
-    )
+    facts = f"{n_inner} inner; {kinds}; mu {friction:.3g}, damping {ratio:.2g}, severity {severity:.2g}"
     return RandomScene(
         seed=seed,
         model=ReducedModel({0: linear}, contact, ("first", "second")),
@@ -144,39 +133,39 @@ def random_scene(seed: int) -> RandomScene:
         step=cycles / N_STEPS,
         cycles=cycles,
         scheme="implicit" if random.random() < 0.7 else "explicit",
-        facts=facts,
+        facts=f"{facts}, rate {omega / omega_0:.3g}",
     )
 
 
 def _draw_pairs(random: np.random.Generator, n_inner: int, preload: float) -> _Pairs:
     """preload: N, typical of the scene."""
-    n_contact = int(random.integers(1, 9))
-    kinds = [str(kind) for kind in random.choice(list(COMPONENTS), n_contact)]
+    n = int(random.integers(1, 9))
+    kinds = random.choice(list(COMPONENTS), n)
     if random.random() < 0.4:
-        kinds = [kinds[0]] * n_contact
+        kinds[:] = kinds[0]
     # without inner displacements the pairs carry the mass; one at least has to
     shares = [0.45, 0.35, 0.2] if n_inner else [0.3, 0.2, 0.5]
-    mounts = [str(mount) for mount in random.choice(["massless", "light", "direct"], n_contact, p=shares)]
+    mounts = random.choice(["massless", "light", "direct"], n, p=shares)
     if not n_inner and "direct" not in mounts:
         mounts[0] = "direct"
     shares = [1.0, 0.0, 0.0, 0.0] if random.random() < 0.55 else [0.5, 0.15, 0.2, 0.15]
-    fits = [str(fit) for fit in random.choice(["pressed", "touching", "near", "far"], n_contact, p=shares)]
-    for pair, kind in enumerate(kinds):
-        if 0 not in COMPONENTS[kind]:
-            fits[pair] = "pressed"
-        elif mounts[pair] == "direct" and fits[pair] in ("touching", "near"):
-            fits[pair] = "far" if fits[pair] == "near" else "pressed"
+    fits = random.choice(["pressed", "touching", "near", "far"], n, p=shares)
+    fits[(mounts == "direct") & (fits == "touching")] = "pressed"
+    fits[(mounts == "direct") & (fits == "near")] = "far"
+    fits[[0 not in COMPONENTS[kind] for kind in kinds]] = "pressed"
     large = 100.0 if random.random() < 0.15 else 1.0
-    sizes = large * preload * random.uniform(0.3, 1.7, n_contact)
-    return _Pairs(tuple(kinds), tuple(mounts), tuple(fits), np.where([fit == "pressed" for fit in fits], sizes, 0.0))
+    sizes = np.where(fits == "pressed", large * preload * random.uniform(0.3, 1.7, n), 0.0)
+    places = [(pair, component) for pair, kind in enumerate(kinds) for component in COMPONENTS[kind]]
+    dofs = np.full((n, 3), -1, np.int64)
+    dofs[tuple(np.transpose(places))] = random.permutation(len(places) + n_inner)[: len(places)]
+    return _Pairs(kinds, mounts, fits, sizes, dofs)
 
 
 def _matrices(
-    random: np.random.Generator, pairs: _Pairs, dofs: np.ndarray, n: int, k0: float, m0: float
+    random: np.random.Generator, pairs: _Pairs, n: int, k0: float, m0: float
 ) -> tuple[FloatArray, FloatArray]:
     """Mass and stiffness: an inner body on springs, the pairs on it by springs, to ground and to each other."""
-    inner = np.setdiff1d(np.arange(n), dofs)
-    relative = dofs[dofs >= 0]
+    inner, relative = np.setdiff1d(np.arange(n), pairs.dofs), pairs.dofs[pairs.dofs >= 0]
     mass, stiffness = np.zeros((n, n)), np.zeros((n, n))
     if inner.size:
         mass[np.ix_(inner, inner)] = m0 * _definite(random, inner.size)
@@ -184,7 +173,7 @@ def _matrices(
     if random.random() < 0.5:
         # neighbours on one elastic body: closing and sliding are coupled
         stiffness[np.ix_(relative, relative)] += 0.3 * k0 * _definite(random, relative.size)
-    for row, mount in zip(dofs, pairs.mounts, strict=True):
+    for row, mount in zip(pairs.dofs, pairs.mounts, strict=True):
         joint = k0 * log_uniform(random, 0.3, 30.0)
         ground = k0 * log_uniform(random, 0.01, 1.0)
         own = m0 * {"massless": 0.0, "light": 1e-3 * joint / k0, "direct": log_uniform(random, 0.1, 2.0)}[mount]
@@ -205,10 +194,11 @@ def _definite(random: np.random.Generator, size: int) -> FloatArray:
     return root @ root.T + 0.5 * np.eye(size)
 
 
-def _indices(dofs: np.ndarray, pairs: _Pairs, *fits: str) -> np.ndarray:
-    """Displacements of the pairs that fit so."""
-    chosen = dofs[[fit in fits for fit in pairs.fits]]
-    return chosen[chosen >= 0]
+def _motion(full: np.ndarray, load: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Complex displacements (n,), m, of the structure with some held."""
+    free, motion = np.setdiff1d(np.arange(len(load)), held), np.zeros(len(load), complex)
+    motion[free] = np.linalg.solve(full[np.ix_(free, free)], load[free])
+    return motion
 
 
 def _snapping_friction(stiffness: FloatArray, dofs: np.ndarray) -> float:
@@ -263,60 +253,48 @@ def _natural_frequencies(mass: FloatArray, stiffness: FloatArray, free: np.ndarr
     return np.sort(1.0 / np.sqrt(compliance[compliance > 1e-9 * compliance[-1]]))
 
 
-def _amplitude(
-    pairs: _Pairs, dofs: np.ndarray, full: np.ndarray, load: np.ndarray, friction: float, severity: float
-) -> float:
+def _amplitude(pairs: _Pairs, full: np.ndarray, load: np.ndarray, friction: float, severity: float) -> float:
     """Amplitude, N, at which the worst pair, if it stuck, would reach `severity` times its friction limit (if none has
     a tangent: its preload); less where normal forces would vary too much: see the module.
     """
-    reference = np.where(pairs.preload > 0.0, pairs.preload, 0.3 * max(pairs.preload.max(), 1e-6 * abs(full).max()))
-    pressed = np.array([fit == "pressed" for fit in pairs.fits])
+    dofs, preload = pairs.dofs, pairs.preload
+    reference = np.where(preload > 0.0, preload, 0.3 * max(preload.max(), 1e-6 * abs(full).max()))
+    pressed = pairs.fits == "pressed"
     if not pressed.any():
         pressed[:] = True
-    held = dofs[pressed][dofs[pressed] >= 0]
-    stuck = np.zeros(len(load), complex)
-    stuck[held] = condense(full, held, load).force
-    normal, tangent = (np.zeros(len(pressed)) for _ in range(2))
-    for pair in np.flatnonzero(pressed):
-        closing, sliding = dofs[pair, 0], dofs[pair, 1:][dofs[pair, 1:] >= 0]
-        normal[pair] = abs(stuck[closing]) if closing >= 0 else 0.0
-        tangent[pair] = np.linalg.norm(stuck[sliding])
-    share = tangent / (friction * reference) if tangent.any() else normal / reference
+
+    def forces_on(held: np.ndarray) -> np.ndarray:
+        """Amplitudes (n_contact, 3), N, of what holds the displacements (n_contact, 3) of the pressed pairs."""
+        held = held & (dofs >= 0) & pressed[:, None]
+        forces = np.zeros(dofs.shape)
+        forces[held] = abs(condense(full, dofs[held], load).force)
+        return forces
+
+    stuck = forces_on(dofs >= 0)
+    tangent = np.linalg.norm(stuck[:, 1:], axis=1)
+    share = tangent / (friction * reference) if tangent.any() else stuck[:, 0] / reference
     amplitude = severity / share.max()
-    closed = dofs[pressed, 0][dofs[pressed, 0] >= 0]
-    if closed.size:
-        sliding_free = np.zeros(len(load), complex)
-        sliding_free[closed] = condense(full, closed, load).force
-        for pair in np.flatnonzero(pressed & (dofs[:, 0] >= 0)):
-            largest = max(normal[pair], abs(sliding_free[dofs[pair, 0]]))
-            allowed = 0.5 if pairs.mounts[pair] == "direct" else 3.0
-            if largest > 0.0:
-                amplitude = min(amplitude, allowed * reference[pair] / largest)
+    if (pressed & pairs.closing).any():
+        largest = np.maximum(stuck, forces_on(np.array([True, False, False])))[:, 0]
+        allowed = np.where(pairs.mounts == "direct", 0.5, 3.0) * reference
+        varies = largest > 0.0
+        amplitude = min(amplitude, *(allowed[varies] / largest[varies]))
     return float(amplitude)
 
 
-def _gaps(
-    random: np.random.Generator, pairs: _Pairs, dofs: np.ndarray, full: np.ndarray, load: np.ndarray
-) -> FloatArray:
+def _gaps(random: np.random.Generator, pairs: _Pairs, full: np.ndarray, load: np.ndarray) -> FloatArray:
     """Gaps, m: "near" ones within the motion that the structure would have with its pressed pairs held."""
-    free = np.setdiff1d(np.arange(len(load)), _indices(dofs, pairs, "pressed"))
-    motion = np.zeros(len(load), complex)
-    if free.size:
-        motion[free] = np.linalg.solve(full[np.ix_(free, free)], load[free])
-    gaps = np.zeros(len(pairs.fits))
-    for pair, fit in enumerate(pairs.fits):
-        if fit == "near":
-            gaps[pair] = random.uniform(0.2, 1.2) * abs(motion[dofs[pair, 0]])
-        elif fit == "far":
-            gaps[pair] = 1.0
+    gaps, motion = np.where(pairs.fits == "far", 1.0, 0.0), _motion(full, load, pairs.pressed)
+    for pair in np.flatnonzero(pairs.fits == "near"):
+        gaps[pair] = random.uniform(0.2, 1.2) * abs(motion[pairs.dofs[pair, 0]])
     return gaps
 
 
-def _static_load(random: np.random.Generator, pairs: _Pairs, dofs: np.ndarray, n: int, friction: float) -> FloatArray:
+def _static_load(random: np.random.Generator, pairs: _Pairs, n: int, friction: float) -> FloatArray:
     """Presses the pairs on, with a little shear, or so much that some slip before anything vibrates."""
     load = np.zeros(n)
     shear = 1.5 if random.random() < 0.3 else 0.3
-    for row, preload in zip(dofs, pairs.preload, strict=True):
+    for row, preload in zip(pairs.dofs, pairs.preload, strict=True):
         if row[0] >= 0:
             load[row[0]] = preload
         for dof in row[1:][row[1:] >= 0]:
@@ -325,25 +303,15 @@ def _static_load(random: np.random.Generator, pairs: _Pairs, dofs: np.ndarray, n
 
 
 def _wear_coefficient(
-    random: np.random.Generator,
-    contact: ContactInterface,
-    pairs: _Pairs,
-    full: np.ndarray,
-    load: np.ndarray,
-    cycles: float,
+    random: np.random.Generator, area: FloatArray, pairs: _Pairs, full: np.ndarray, load: np.ndarray, cycles: float
 ) -> float:
     """Wear coefficient, 1/Pa, that takes between a hundredth and half of the preload of a typical sliding pair away."""
-    dofs = contact.dofs
-    closed = dofs[:, 0][(dofs[:, 0] >= 0) & (pairs.preload > 0.0)]
-    free = np.setdiff1d(np.arange(len(load)), closed)
-    motion = np.zeros(len(load), complex)
-    if free.size:
-        motion[free] = np.linalg.solve(full[np.ix_(free, free)], load[free])
+    dofs, needed = pairs.dofs, []
+    motion = _motion(full, load, dofs[pairs.closing & (pairs.preload > 0.0), 0])
     worn = log_uniform(random, 0.01, 0.5)
-    needed = []
     for pair, row in enumerate(dofs):
         slip = np.linalg.norm(motion[row[1:][row[1:] >= 0]])
         if pairs.preload[pair] > 0.0 and slip > 0.0:
             depth = worn * pairs.preload[pair] / (abs(full[row[0], row[0]]) if row[0] >= 0 else abs(full).max())
-            needed.append(depth * contact.area[pair] / (pairs.preload[pair] * 4.0 * slip * cycles))
+            needed.append(depth * area[pair] / (pairs.preload[pair] * 4.0 * slip * cycles))
     return float(np.median(needed)) if needed else 1e-11

@@ -108,34 +108,25 @@ def slider_amplitude(
 
 
 def slider_wear_depth(
-    cycles: ArrayLike,
-    *,
-    wear_coefficient: float,
-    area: float,
-    friction_coefficient: float,
-    normal_load: float,
-    normal_stiffness: float,
-    amplitude: Callable[[float], float],
-) -> FloatArray:
+    cycles: ArrayLike, amplitude: Callable[[float], float], *, wear: float = 1.1e-11, friction: float = 0.5,
+    area: float = 1e-4, load: float = 10.0, stiffness: float = 1e5,
+) -> FloatArray:  # fmt: skip
     """Wear depth W, m, at cycle counts (ascending, the first 0) of a slider that a spring presses.
 
     Integrates `dW/dcycle = (k_w / alpha) N 4 X(mu N)`, `N = N_0 - k_N W`, where `amplitude(friction_force)` is X, m.
+    wear: 1/Pa; area: m2; load, stiffness: N_0, N, and k_N, N/m, of the spring. Defaults are those of `sdof_slider`.
     """
 
     def rate(_: float, depth: FloatArray) -> FloatArray:
-        normal = max(normal_load - normal_stiffness * float(depth[0]), 0.0)
-        if normal == 0.0:
-            return np.zeros(1)
-        return np.array([wear_coefficient / area * normal * 4 * amplitude(friction_coefficient * normal)])
+        normal = max(load - stiffness * float(depth[0]), 0.0)
+        return np.array([wear / area * normal * 4.0 * amplitude(friction * normal) if normal else 0.0])
 
     counts = np.asarray(cycles, dtype=np.float64)
-    depth_scale = rate(0.0, np.zeros(1))[0] * counts[-1]
-    solution = solve_ivp(
-        rate, (counts[0], counts[-1]), [0.0], method="DOP853", t_eval=counts, rtol=1e-11, atol=1e-13 * depth_scale
-    )
-    if not solution.success:
-        raise RuntimeError(solution.message)
-    depths: FloatArray = solution.y[0]
+    atol = 1e-13 * rate(0.0, np.zeros(1))[0] * counts[-1]
+    found = solve_ivp(rate, (counts[0], counts[-1]), [0.0], method="DOP853", t_eval=counts, rtol=1e-11, atol=atol)
+    if not found.success:
+        raise RuntimeError(found.message)
+    depths: FloatArray = found.y[0]
     return depths
 
 

@@ -112,14 +112,6 @@ def test_wear_with_den_hartog_has_its_closed_solution():
     full = force / stiffness / (1 - ratio**2)
     b = friction / force * np.tan(np.pi / (2 * ratio)) / ratio * (1 - ratio**2)
     cycles = np.linspace(0, 1e5, 6)
-    depth = slider_wear_depth(
-        cycles,
-        wear_coefficient=1.1e-11,
-        area=1e-4,
-        friction_coefficient=friction,
-        normal_load=10.0,
-        normal_stiffness=1e5,
-        amplitude=lambda friction_force: slider_amplitude(mass, 0.0, stiffness, force, friction_force, omega),
-    )
+    depth = slider_wear_depth(cycles, lambda limit: slider_amplitude(mass, 0.0, stiffness, force, limit, omega))
     grown = np.arctanh(np.sqrt(1 - (10 * b) ** 2)) + 1.1e-11 / 1e-4 * 1e5 * 4 * full * cycles
     assert depth == pytest.approx((10 - np.sqrt(1 - np.tanh(grown) ** 2) / abs(b)) / 1e5, rel=1e-9, abs=1e-18)

@@ -63,15 +63,7 @@ def test_wear_of_a_slider_follows_its_differential_equation():
     for part in (np.full(1, 0.0), np.full(1, 1e-9)):
         assert at_rest(model, structure, part).force[0] == pytest.approx(10.0 - 1e5 * part[0], rel=1e-6)
     *_, (cycle, depth, _) = wear(model, structure, motion, 1.1e-11, 600.0, 1e5)
-    exact = slider_wear_depth(
-        np.array([0.0, 1e5]),
-        wear_coefficient=1.1e-11,
-        area=1e-4,
-        friction_coefficient=0.5,
-        normal_load=10.0,
-        normal_stiffness=1e5,
-        amplitude=lambda limit: slider_amplitude(MASS, 8.0, STIFFNESS, FORCE, limit, OMEGA),
-    )
+    exact = slider_wear_depth([0.0, 1e5], lambda limit: slider_amplitude(MASS, 8.0, STIFFNESS, FORCE, limit, OMEGA))
     assert cycle == pytest.approx(1e5)
     assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
 

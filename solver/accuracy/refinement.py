@@ -42,7 +42,7 @@ ONE_LEVEL_SAFETY = 2.5
 TRIPLE_SAMPLES_SAFETY = 2.0
 """Error over the difference to three times the samples: 1.5 to 1.1, but the errors of single events scatter."""
 
-KEPT_FRACTION = 0.5
+RELAXED_FRACTION = 0.5
 """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once; and of
 this error, below which fewer are tried."""
 
@@ -235,8 +235,8 @@ class _Search:
     def _relaxed(self, here: ResolvedState, estimate: Estimate) -> Refined:
         """An accurate state with as few harmonics and samples as it needs for a fraction of rtol."""
         settings = here.case.settings
-        enough, lowest = KEPT_FRACTION * settings.rtol, first_resolution(settings).highest if self.node else 1
-        while estimate.largest <= KEPT_FRACTION * enough:
+        enough, lowest = RELAXED_FRACTION * settings.rtol, first_resolution(settings).highest if self.node else 1
+        while estimate.largest <= RELAXED_FRACTION * enough:
             lower = fewer(here.case.resolution, settings)
             if lower == here.case.resolution or lower.highest < lowest:
                 break

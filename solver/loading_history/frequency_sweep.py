@@ -53,7 +53,7 @@ START_CANDIDATES = 8
 class FrequencySweep:
     """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
-    every: for which states stability is tested, as in `find_instability`.
+    with_switching: for which states stability is tested, as in `find_instability`.
     known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
         is not estimated, and there is no reference sweep.
     keep: called with the saved state, and with the position in words.
@@ -66,7 +66,7 @@ class FrequencySweep:
     excitation_amplitude: float
     direction: Direction
     settings: SolverSettings
-    every: bool = True
+    with_switching: bool = True
     known: tuple[tuple[float, Resolution], ...] = ()
     keep: Callable[[Packed | str], None] = lambda _: None
     present: Sweep[State] | None = None
@@ -206,7 +206,7 @@ class FrequencySweep:
         joint, at, estimate = found.joint, found.point.evaluation, found.estimate
         if not certify(joint, at).holds(self.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED)
-        if unstable := find_instability(found.case, joint, at, self.run, self.every):
+        if unstable := find_instability(found.case, joint, at, self.run, self.with_switching):
             return unstable
         reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
         if reference is not None:

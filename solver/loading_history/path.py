@@ -8,7 +8,7 @@ from typing import ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
+from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine
 from solver.accuracy.resolved_state import Estimate, left_out, nothing_happens
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
@@ -268,7 +268,7 @@ class LoadingPath(Path[State]):
         if self.rests(state) or not (0.0 < error < np.inf and before > 0.0):
             return False
         foreseen = error * now / before
-        enough = fewest or foreseen >= KEPT_FRACTION**2 * settings.rtol
+        enough = fewest or foreseen >= RELAXED_FRACTION**2 * settings.rtol
         # where the error is above rtol already, there are no more harmonics
         return enough and (foreseen <= settings.rtol or error > settings.rtol)
 

@@ -27,9 +27,9 @@ from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
 from solver.settings import Resolution
 
-KEPT_NODES = 3
-"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them. With a straight line the nodes
-of the slider take 7 % more iterations."""
+LAST_NODES = 3
+"""Last nodes of a sweep: the next one is predicted on the parabola through them. With a straight line the nodes of the
+slider take 7 % more iterations."""
 
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
@@ -58,7 +58,7 @@ class Nodes:
 
     def then(self, state: Any) -> Nodes:
         """With one node more."""
-        return replace(self, states=(*self.states, state)[-KEPT_NODES:])
+        return replace(self, states=(*self.states, state)[-LAST_NODES:])
 
 
 _SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
@@ -236,7 +236,7 @@ class Sweep(Generic[S]):
         run = self._reference_run.with_tolerance(path.case.settings.rough_tolerance)
         for target in targets:
             found = path.solve(states, target, run) if states else None
-            states = () if found is None else (*states, found)[-KEPT_NODES:]
+            states = () if found is None else (*states, found)[-LAST_NODES:]
         return Nodes(path.case.resolution, states) if states else None
 
     def _choose_resolution(self) -> float:

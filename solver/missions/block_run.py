@@ -17,15 +17,15 @@ from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import states_of_sweeps
-from solver.loading_history.sweep import KEPT_NODES, STEPS_OF_REFERENCE
-from solver.missions.mission import Block, MissionRequest, Passage
+from solver.loading_history.sweep import LAST_NODES, STEPS_OF_REFERENCE
+from solver.missions.mission import Block, MissionRequest
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import periodic_state
-from solver.settings import Direction, Resolution
+from solver.settings import Direction, Passage, Resolution
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
 from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of
@@ -58,7 +58,7 @@ class Begun:
 
 @packable
 @dataclass(frozen=True)
-class BlockRun:
+class BlockResult:
     """A block that was computed once.
 
     growth (n_contact,): depth worn in the block, m.
@@ -90,7 +90,7 @@ class BlockRun:
 
 
 @dataclass(frozen=True)
-class BlockCase:
+class BlockInput:
     """What a block is computed with.
 
     mission, place: the mission, and the place of the block in it. depth (n_contact,): m, worn before the block.
@@ -98,7 +98,7 @@ class BlockCase:
     carried: state that the block continues; None for a block that begins anew.
     begun, guide: of this block in an earlier mission, and in the history for its reference solution; else None.
     with_slope: whether the slope of the growth is asked for.
-    every: whether stability is tested at start and end, also where nothing speaks for a loss of stability.
+    with_switching: whether stability is tested at start and end, also where nothing speaks for a loss of stability.
     """
 
     mission: MissionRequest
@@ -109,7 +109,7 @@ class BlockCase:
     begun: Begun | None = None
     guide: Guide | None = None
     with_slope: bool = False
-    every: bool = True
+    with_switching: bool = True
 
     @property
     def block(self) -> Block:
@@ -153,7 +153,7 @@ class BlockCase:
         load = self.block.excitation_amplitude if amplitude is None else amplitude
         settings = replace(self.mission.settings, time_limit=self.time_left)
         sweeps = FrequencySweep(self.model, self.block.friction_coefficient, load, direction, settings)
-        sweeps.every = self.every
+        sweeps.with_switching = self.with_switching
         sweeps.set_deadline(self.deadline)
         return sweeps
 
@@ -168,31 +168,31 @@ class BlockCase:
         return setup, setup.begin()
 
 
-def run_block(case: BlockCase) -> BlockRun | Failure:
+def run_block(given: BlockInput) -> BlockResult | Failure:
     """Compute a block of steady vibration, or why it does not come to its end. Raises OutOfTimeError, LinAlgError."""
-    start, begun = find_start(case)
+    start, begun = find_start(given)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    counts, steps = np.array([0.0, case.block.cycles]), Adaptive(case.mission.settings.rtol)
-    asked = WearRequest(case.mission.wear_coefficient, steps, counts, law=case.law, ends_at_last=True)
-    if case.guide is None:
-        problem = WearProblem(case.at(start), start, asked, stable_end=case.every)
+    counts, steps = np.array([0.0, given.block.cycles]), Adaptive(given.mission.settings.rtol)
+    asked = WearRequest(given.mission.wear_coefficient, steps, counts, law=given.law, ends_at_last=True)
+    if given.guide is None:
+        problem = WearProblem(given.at(start), start, asked, stable_end=given.with_switching)
     else:
-        problem = reference_of(case.at(start), start, asked, case.guide, counts)
-    ended = Integrator(case.time_left).integrate(problem)
-    state = ended.state
-    if state is None or ended.failure.outcome is not Outcome.CONVERGED:
-        return ended.failure
-    values, slope = ended.course.read(counts), None
+        problem = reference_of(given.at(start), start, asked, given.guide, counts)
+    solution = Integrator(given.time_left).integrate(problem)
+    state = solution.state
+    if state is None or solution.end.outcome is not Outcome.CONVERGED:
+        return solution.end
+    values, slope = solution.course.read(counts), None
     depth = values["wear_depth"]
-    volume = float(depth[-1] @ case.mission.area)
-    if case.with_slope:
+    volume = float(depth[-1] @ given.mission.area)
+    if given.with_slope:
         # the flow of the linearised wear rate
-        rates = rate_slope(problem.setup, state, case.depth + depth[-1] > 0.0)
+        rates = rate_slope(problem.setup, state, given.depth + depth[-1] > 0.0)
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
-    return BlockRun(
+    return BlockResult(
         growth=depth[-1],
         response=values["response"],
         response_peak=values["response_peak"],
@@ -201,11 +201,11 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
         inaccurate=state.worst.largest if state.inaccurate_from <= counts[-1] else 0.0,
         held=state.held_from <= counts[-1],
-        cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
+        cut_off=not math.isnan(first_cut_off(given.model.contact, counts, values["mean_pressure"], depth)),
         guide=Guide(state.resolutions, state.first_length),
-        last=_last(state, start) if case.is_continued else None,
+        last=_last(state, start) if given.is_continued else None,
         begun=begun,
-        iterations=start.newton_iterations + ended.iterations,
+        iterations=start.newton_iterations + solution.iterations,
     )
 
 
@@ -226,15 +226,15 @@ def _last(state: WearState, start: StartState) -> StartState:
     )
 
 
-def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
+def find_start(given: BlockInput) -> tuple[StartState, Begun | None]:
     """The state with which a block begins, or why there is none; and what the block of the next mission takes over."""
-    if case.carried is not None:
-        return _continued(case, case.carried), None
-    if case.begun is not None and (again := _by_earlier_sweep(case, case.begun)) is not None:
-        return again, case.begun
-    way = case.block.way
-    sweeps = case.sweeps(case.mission.first if way == "continue" else way)
-    _, start = next(states_of_sweeps(sweeps, np.array([case.block.ends[0]])))
+    if given.carried is not None:
+        return _continued(given, given.carried), None
+    if given.begun is not None and (again := _by_earlier_sweep(given, given.begun)) is not None:
+        return again, given.begun
+    way = given.block.way
+    sweeps = given.sweeps(given.mission.first if way == "continue" else way)
+    _, start = next(states_of_sweeps(sweeps, np.array([given.block.ends[0]])))
     present = sweeps.present
     if start.state is None or present is None or way == "continue":
         return start, None
@@ -242,29 +242,29 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
     return start, Begun(passed, start, present.path.case.resolution)
 
 
-def _by_earlier_sweep(case: BlockCase, begun: Begun) -> StartState | None:
+def _by_earlier_sweep(given: BlockInput, begun: Begun) -> StartState | None:
     """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None: where the way
     has jumped over a fold, there is no stable state, or the way may lead to another branch.
 
     With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
     Where each pair slips or opens within the period, the state follows from the depths alone.
     """
-    start, run = begun.start, case.run()
+    start, run = begun.start, given.run()
     if start is None or start.state is None or start.branch > 0:
         return None
-    ramp, omega, (setup, earlier) = case.block.way == "ramp", start.state.omega, case.begin(start)
-    path = LoadingPath(setup.case, case.block.excitation_amplitude, omega if ramp else None)
+    ramp, omega, (setup, earlier) = given.block.way == "ramp", start.state.omega, given.begin(start)
+    path = LoadingPath(setup.case, given.block.excitation_amplitude, omega if ramp else None)
     target = 1.0 if ramp else omega
     before = State(earlier.at, start.state.start_history, target)
     try:
         found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if found is None or not path.forgets(found):
-            stride = 1 if case.guide is None else STEPS_OF_REFERENCE
+            stride = 1 if given.guide is None else STEPS_OF_REFERENCE
             found, most = _through_nodes(path, begun, target, stride, run), NEW_SWEEP_CHANGE
         if found is None or vibration_change(earlier.at, found.evaluation) > most:
             return None
         joint = path.joint_at(target)
-        if find_instability(setup.case, joint, found.evaluation, run, case.every):
+        if find_instability(setup.case, joint, found.evaluation, run, given.with_switching):
             return None
     except np.linalg.LinAlgError:
         return None
@@ -286,7 +286,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
     while ahead:
         after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
         if after is not None and coarse.change(states[-1], after) <= LARGEST_CHANGE * stride:
-            states = (*states, after)[-KEPT_NODES:]
+            states = (*states, after)[-LAST_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > ATTEMPTS:
             return None
@@ -296,22 +296,22 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
     return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
 
 
-def _continued(case: BlockCase, carried: StartState) -> StartState:
+def _continued(given: BlockInput, carried: StartState) -> StartState:
     """The state of a block that keeps the tangential history of the block before, or why there is none.
 
     carried: state at the end of the block before, solved first at the depth before the block. Then amplitude and
     frequency change, one after the other, the frequency at the smaller amplitude. Raises OutOfTimeError, LinAlgError.
     """
-    before, run, frequency = carried.state, case.run(), case.block.ends[0]
+    before, run, frequency = carried.state, given.run(), given.block.ends[0]
     assert before is not None
-    setup, last = case.begin(carried)
+    setup, last = given.begin(carried)
     balance = setup.balance_of(last)
     found = run.state(balance, last.at.predicted_h)
     if found is None:
         return replace(carried, state=None, outcome=Outcome.BRANCH_LOST)
     start = replace(carried, state=periodic_state(balance.joint, State(found.evaluation, before.start_history)))
     along: Direction = "up" if 2.0 * np.pi * frequency > before.omega else "down"
-    amplitude, iterations = case.block.excitation_amplitude, run.budget.iterations
+    amplitude, iterations = given.block.excitation_amplitude, run.budget.iterations
     lower = min(amplitude, before.excitation_amplitude)
     legs: tuple[tuple[Direction, float, float], ...] = (
         ("ramp", before.omega / (2.0 * np.pi), lower),
@@ -324,7 +324,7 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
             break
         if here.excitation_amplitude == load if way == "ramp" else here.omega == 2.0 * np.pi * target:
             continue
-        sweeps, (setup, last) = case.sweeps(way, load), case.begin(start)
+        sweeps, (setup, last) = given.sweeps(way, load), given.begin(start)
         parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
         if not sweeps.go_on_from(setup.case, replace(last.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)

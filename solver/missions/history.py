@@ -13,8 +13,8 @@ import numpy as np
 from solver.accuracy.history_error import HistoryError, error_of_target
 from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.missions.block_run import Begun, BlockCase, BlockRun, run_block
-from solver.missions.mission import MissionHistory, MissionRequest, Passage
+from solver.missions.block_run import Begun, BlockInput, BlockResult, run_block
+from solver.missions.mission import MissionHistory, MissionRequest
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
@@ -22,6 +22,7 @@ from solver.newton.run import Budget, guarded
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, packable
 from solver.results.history import describe_cut_off, describe_uncertain, last_error
+from solver.settings import Passage
 from solver.wear.history import compare
 from solver.wear.slow_time import (
     ENDS_ALL,
@@ -45,13 +46,13 @@ Missions of a slider: estimated over true error at least 1.7. With 0.25 two case
 class MissionState:
     """A joint after some missions; the next step depends on it and the last nodes of the course.
 
-    runs, first: blocks of the last and of the first mission, none before. length: missions of the next step.
+    results, first: blocks of the last and of the first mission, none before. length: missions of the next step.
     inaccurate, sweep_rate (n_block,): largest values of the blocks so far.
     held_from, cut_off_from: missions before the first step with such a block, inf if never.
     """
 
-    runs: tuple[BlockRun, ...] = ()
-    first: tuple[BlockRun, ...] = ()
+    results: tuple[BlockResult, ...] = ()
+    first: tuple[BlockResult, ...] = ()
     length: float = 1.0
     inaccurate: FloatArray | float = 0.0
     sweep_rate: FloatArray | float = 0.0
@@ -92,21 +93,21 @@ class MissionProblem:
         longest = min(self.last - done, self.mission.largest_step or self.last)
         # a step over more than one extrapolates from three nodes
         longest = min(longest, self.last if len(course.ends) > 2 else 1)
-        earlier = state.runs if done or self.fine is None else self.fine.state.first
-        self._begun = [run.begun for run in earlier] or [None] * len(self.mission.blocks)
+        earlier = state.results if done or self.fine is None else self.fine.state.first
+        self._begun = [each.begun for each in earlier] or [None] * len(self.mission.blocks)
         taken = take_step(self, (state, course), min(state.length, longest), Lengths(2, shortest=1, rescue=1))
         if isinstance(taken, Failure):
             return taken
         step, length = taken
-        runs = tuple(replace(run, slope=None) for run in step.runs)
+        results = tuple(replace(each, slope=None) for each in step.results)
         after = MissionState(
-            runs,
-            state.first or tuple(replace(run, last=None) for run in runs),
+            results,
+            state.first or tuple(replace(each, last=None) for each in results),
             length,
-            np.maximum([run.inaccurate for run in runs], state.inaccurate),
-            np.maximum([run.sweep_rate for run in runs], state.sweep_rate),
-            min(state.held_from, done if any(run.held for run in runs) else math.inf),
-            min(state.cut_off_from, done if any(run.cut_off for run in runs) else math.inf),
+            np.maximum([each.inaccurate for each in results], state.inaccurate),
+            np.maximum([each.sweep_rate for each in results], state.sweep_rate),
+            min(state.held_from, done if any(each.held for each in results) else math.inf),
+            min(state.cut_off_from, done if any(each.cut_off for each in results) else math.inf),
         )
         if not done:
             # the rate and the values of the unworn joint are those of the first mission
@@ -133,36 +134,37 @@ class MissionProblem:
 
     def _mission(
         self, state: MissionState, number: int, depth: FloatArray, with_slopes: bool
-    ) -> tuple[BlockRun, ...] | Failure:
+    ) -> tuple[BlockResult, ...] | Failure:
         """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
-        mission, carried = self.mission, state.runs[-1].last if state.runs else None
+        mission, carried = self.mission, state.results[-1].last if state.results else None
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.fine is not None:
             guides = self.fine.course.nodes[int(np.searchsorted(self.fine.course.counts, number))].guides
         # as in a wear history: stability is tested at the start and the end
-        every = self.fine is None and number in (1, mission.missions[-1])
-        runs: list[BlockRun] = []
+        with_switching = self.fine is None and number in (1, mission.missions[-1])
+        results: list[BlockResult] = []
         for place, (block, guide, begun) in enumerate(zip(mission.blocks, guides, self._begun, strict=True)):
-            case = BlockCase(mission, place, depth, self.budget.deadline, carried, begun, guide, with_slopes, every)
-            found = guarded(partial(run_passage if isinstance(block.frequency, Passage) else run_block, case))
+            limit, run = self.budget.deadline, run_passage if isinstance(block.frequency, Passage) else run_block
+            given = BlockInput(mission, place, depth, limit, carried, begun, guide, with_slopes, with_switching)
+            found = guarded(partial(run, given))
             if isinstance(found, Failure):
                 said = f"in mission {number}, {mission.called(place)}"
                 return Failure(found.outcome, ": ".join(filter(None, (said, found.message))))
-            runs.append(found)
+            results.append(found)
             self._begun[place] = found.begun or begun
             self.budget.iterations += found.iterations
             depth, carried = depth + found.growth, found.last
-        return tuple(runs)
+        return tuple(results)
 
 
 def unworn_course(mission: MissionRequest) -> Course:
     """The course before the first mission, whose blocks have no values yet."""
     nothing = np.zeros(mission.area.size)
     unknown = np.full((2, len(mission.blocks[0].model.response_names)), np.nan)
-    runs = (BlockRun(nothing, unknown.astype(complex), unknown),) * len(mission.blocks)
+    results = (BlockResult(nothing, unknown.astype(complex), unknown),) * len(mission.blocks)
     course = Course(mission.area, np.array(mission.missions, np.float64), mission.until)
-    row = np.tile(nothing, len(runs))
-    return course.after(Node(0.0, row, row, values_of(runs) | {"local": nothing}))
+    row = np.tile(nothing, len(results))
+    return course.after(Node(0.0, row, row, values_of(results) | {"local": nothing}))
 
 
 def integrate_missions(
@@ -174,13 +176,13 @@ def integrate_missions(
     """
     integrator = Integrator(mission.settings.time_limit, keep, resume)
     fine = integrator.integrate(MissionProblem(mission))
-    if fine.state is not None and fine.failure.outcome not in ENDS_ALL:
+    if fine.state is not None and fine.end.outcome not in ENDS_ALL:
         fine = replace(fine, compared=integrator.integrate(MissionProblem(mission, fine), fine.seconds))
     history = _assembled(mission, fine)
     if history.outcome is not Outcome.CONVERGED:
         return history
-    failure = _judged(mission, fine.state, history)
-    return replace(history, outcome=failure.outcome, message=failure.message)
+    outcome, message = _judged(mission, fine.state, history)
+    return replace(history, outcome=outcome, message=message)
 
 
 def _assembled(mission: MissionRequest, fine: Solution) -> MissionHistory:
@@ -201,8 +203,8 @@ def _assembled(mission: MissionRequest, fine: Solution) -> MissionHistory:
         response_peak_end=values["response_peak"][:, :, 1],
         response_error=np.array([each.response for each in blocks]).T,
         excitation_frequency=np.array([block.ends for block in mission.blocks]),
-        outcome=fine.ended.outcome,
-        message=fine.ended.message,
+        outcome=fine.end_of_all.outcome,
+        message=fine.end_of_all.message,
         missions=counts,
         worn_volume=depth @ area,
         worn_volume_error=whole.worn_volume,
@@ -272,11 +274,11 @@ def _target_error(mission: MissionRequest, at: float, fine: Course, reference: C
     return error_of_target(mission.until, at, of_other, values, last_rate, whole, mission.area)
 
 
-def _judged(mission: MissionRequest, state: MissionState, history: MissionHistory) -> Failure:
+def _judged(mission: MissionRequest, state: MissionState, history: MissionHistory) -> tuple[Outcome, str]:
     """The outcome of a complete history, and its sentence."""
     rtol = mission.settings.rtol
     if state.cut_off_from < math.inf:
-        return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(state.cut_off_from, "mission"))
+        return Outcome.CONTACT_CUT_OFF, describe_cut_off(state.cut_off_from, "mission")
     outcome, said, inaccurate = Outcome.CONVERGED, [], np.asarray(state.inaccurate)
     if history.error_estimate > SENSITIVE_ERROR:
         outcome, last = Outcome.SENSITIVE, np.flatnonzero(np.isfinite(history.worn_volume))[-1]
@@ -293,4 +295,4 @@ def _judged(mission: MissionRequest, state: MissionState, history: MissionHistor
         name, rate = mission.called(int(place)), history.sweep_rate[place]
         passes = f"passes at {rate:.2g} (zeta f)^2" if np.isfinite(rate) else "has no damping where the joint sticks"
         said.append(f"{name} {passes}: it may wear otherwise than its steady states (see the error)")
-    return Failure(outcome, "; ".join(said))
+    return outcome, "; ".join(said)

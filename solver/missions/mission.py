@@ -9,29 +9,10 @@ from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.presentation import Presented
-from solver.settings import Direction, SolverSettings, WearTarget
+from solver.settings import Direction, Passage, SolverSettings, WearTarget
 
 Begin = Literal["ramp", "up", "down", "continue"]
 """How a block begins: from the static state by a ramp of the excitation or by a sweep, or from the last block."""
-
-
-@dataclass(frozen=True)
-class Passage:
-    """Frequencies that a machine passes: start and stop, Hz, not equal, and the rate, Hz/s, above 0 up or down."""
-
-    start: float
-    stop: float
-    rate: float
-
-    @property
-    def cycles(self) -> float:
-        """Cycles of one passage."""
-        return abs(self.stop**2 - self.start**2) / (2.0 * self.rate)
-
-    @property
-    def sweep(self) -> Direction:
-        """The direction."""
-        return "up" if self.stop > self.start else "down"
 
 
 @dataclass(frozen=True)

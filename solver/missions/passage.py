@@ -34,7 +34,7 @@ import numpy as np
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure, largest_responses
 from solver.loading_history.start_states import states_of_sweeps
-from solver.missions.block_run import Begun, BlockCase, BlockRun
+from solver.missions.block_run import Begun, BlockInput, BlockResult
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
 from solver.outcome import Outcome
@@ -93,43 +93,43 @@ class Swept:
     needed: tuple[float, ...]
 
 
-def run_passage(case: BlockCase) -> BlockRun | Failure:
+def run_passage(given: BlockInput) -> BlockResult | Failure:
     """Compute a passage, as `block_run.run_block`."""
-    swept = find_states(case)
+    swept = find_states(given)
     if isinstance(swept, Failure):
         return swept
-    ascending, area = swept.states, case.mission.area
-    states = ascending[:: 1 if case.passage.sweep == "up" else -1]
+    ascending, area = swept.states, given.mission.area
+    states = ascending[:: 1 if given.passage.sweep == "up" else -1]
     starts, parts = [state.start for state in ascending], parts_of(ascending)
     volume = float(parts.sum(axis=0) @ area)
-    growth, slope = wear_in_order(states, (_slope_of(case, state) for state in states))
-    sweep_rate, lag = delay_of(case, ascending)
+    growth, slope = wear_in_order(states, (_slope_of(given, state) for state in states))
+    sweep_rate, lag = delay_of(given, ascending)
     error = swept.error + float((parts @ area) @ [start.wear_rate_error for start in starts])
     error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
     error += min(lag * max(float(state.density @ area) for state in states), volume)
     ends, inaccurate = (states[0], states[-1]), [each for each in starts if each.outcome is Outcome.INACCURATE]
-    return BlockRun(
+    return BlockResult(
         growth=growth,
         response=np.array([state.response for state in ends]),
         response_peak=np.array([state.peak for state in ends]),
-        slope=slope if case.with_slope else None,
+        slope=slope if given.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
         inaccurate=max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
-        last=ends[-1].start if case.is_continued else None,
+        last=ends[-1].start if given.is_continued else None,
         begun=Begun(swept.needed),
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
 
 
-def _slope_of(case: BlockCase, state: SweptState) -> FloatArray:
+def _slope_of(given: BlockInput, state: SweptState) -> FloatArray:
     """Derivative (n_contact, n_contact) of the density of a state with respect to the depths, 1/Hz."""
     if not state.density.any():
         return np.zeros((state.density.size, state.density.size))
-    slope = rate_slope(*case.begin(state.start), (state.density > 0.0) | (case.depth > 0.0))
-    return np.asarray(slope * state.frequency / case.passage.rate)
+    slope = rate_slope(*given.begin(state.start), (state.density > 0.0) | (given.depth > 0.0))
+    return np.asarray(slope * state.frequency / given.passage.rate)
 
 
 def wear_in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -154,17 +154,17 @@ def parts_of(states: Sequence[SweptState]) -> FloatArray:
     return np.asarray(0.5 * (np.append(0.0, width) + np.append(width, 0.0))[:, None] * density)
 
 
-def find_states(case: BlockCase) -> Swept | Failure:
+def find_states(given: BlockInput) -> Swept | Failure:
     """The states of one passage at the depth before it, as many as its wear needs."""
-    passage, area = case.passage, case.mission.area
-    aim = FREQUENCY_ERROR * (1.0 if case.guide is None else RTOL_RATIO) * case.mission.settings.rtol
+    passage, area = given.passage, given.mission.area
+    aim = FREQUENCY_ERROR * (1.0 if given.guide is None else RTOL_RATIO) * given.mission.settings.rtol
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
-    wanted, iterations = list(case.begun.nodes if case.begun else least), 0
+    wanted, iterations = list(given.begun.nodes if given.begun else least), 0
     states: list[SweptState] = []
     while wanted:
-        found = states_at(case, np.array(sorted(wanted)))
+        found = states_at(given, np.array(sorted(wanted)))
         if isinstance(found, Failure):
             return found
         iterations += max(state.start.newton_iterations for state in found)
@@ -172,8 +172,8 @@ def find_states(case: BlockCase) -> Swept | Failure:
         errors, volume = interval_errors(states, area), float((parts_of(states) @ area).sum())
         # wear that is small beside the wear so far, or beside that by all work of the excitation, may be round-off
         size = max(float(np.abs(state.response).max()) for state in states)
-        work = np.pi * case.block.excitation_amplitude * size * passage.cycles
-        least_wear = max(NEGLIGIBLE * float(case.depth @ area), ROUND_OFF * case.mission.wear_coefficient * work)
+        work = np.pi * given.block.excitation_amplitude * size * passage.cycles
+        least_wear = max(NEGLIGIBLE * float(given.depth @ area), ROUND_OFF * given.mission.wear_coefficient * work)
         allowed, error = aim * max(volume, least_wear), float(errors.sum())
         wanted = []
         if error > allowed and len(states) < MOST_FREQUENCIES:
@@ -221,26 +221,26 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
     return np.asarray(errors @ area)
 
 
-def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Failure:
+def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    found, sweeps = [], case.sweeps(case.passage.sweep)
-    if case.guide is not None:
+    found, sweeps = [], given.sweeps(given.passage.sweep)
+    if given.guide is not None:
         # errors of a reference solution are not used
-        sweeps.known = case.guide.resolutions
+        sweeps.known = given.guide.resolutions
     for index, start in states_of_sweeps(sweeps, frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)
-        if computing_time() > case.deadline:
+        if computing_time() > given.deadline:
             return Failure(Outcome.TIME_LIMIT)
-        setup, state = case.begin(start)
+        setup, state = given.begin(start)
         joint, frequency = setup.joint_of(state), float(frequencies[index])
-        density = state.rate * frequency / case.passage.rate
+        density = state.rate * frequency / given.passage.rate
         response = to_complex(joint.structure.response_h(joint.to_relative(state.at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, state.at)))
     return found
 
 
-def delay_of(case: BlockCase, states: Sequence[SweptState]) -> tuple[float, float]:
+def delay_of(given: BlockInput, states: Sequence[SweptState]) -> tuple[float, float]:
     """Sweep rate `|df/dt| / (zeta f)^2` and lag, Hz, of a passage through states; infinite without damping.
 
     With the mode nearest to the largest response, of the joint whose closed pairs stick, or slide or are open where the
@@ -248,12 +248,12 @@ def delay_of(case: BlockCase, states: Sequence[SweptState]) -> tuple[float, floa
     """
     largest = max(states, key=lambda state: float(np.abs(state.response).max())).start.state
     assert largest is not None
-    friction = friction_of_pairs(case.block.model, case.block.friction_coefficient)
+    friction = friction_of_pairs(given.block.model, given.block.friction_coefficient)
     closed = largest.contact_force_h[:, 0, 0] > 0.0
     joints = ((closed, friction), (closed, 0.0 * friction), (np.zeros_like(closed), friction))
-    modes = (linear_mode(case.block.model, *joint, near=largest.omega) for joint in joints)
+    modes = (linear_mode(given.block.model, *joint, near=largest.omega) for joint in joints)
     mode = next((found for found in modes if found is not None), None)
     if mode is None:
         return 0.0, 0.0
-    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), case.passage.rate
+    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), given.passage.rate
     return (rate / width**2, rate / (2.0 * math.pi * width)) if width > 0.0 else (math.inf, math.inf)

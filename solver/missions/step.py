@@ -29,12 +29,12 @@ from typing import Any
 import numpy as np
 
 from solver.harmonic_balance.state import Failure
-from solver.missions.block_run import BlockRun
+from solver.missions.block_run import BlockResult
 from solver.model import FloatArray
 from solver.wear.slow_time import Node
 from solver.wear.step import allowed_error
 
-RunMission = Callable[[FloatArray, bool], tuple[BlockRun, ...] | Failure]
+RunMission = Callable[[FloatArray, bool], tuple[BlockResult, ...] | Failure]
 """Computes the blocks of a mission: depth before (n_contact,), m, and whether slopes are asked for."""
 
 
@@ -43,7 +43,7 @@ class MissionStep:
     """A computed step: its end, the blocks of its last mission, and its estimated local error over the allowed one."""
 
     node: Node
-    runs: tuple[BlockRun, ...]
+    results: tuple[BlockResult, ...]
     ratio: float
 
 
@@ -53,7 +53,7 @@ def attempt_step(
     """A step over missions; over more than one from the third mission on.
 
     nodes: ends of steps so far, of which the last missions were computed, with the depths and rates of all blocks in
-        one row, and with values (n_block, ...) by their names in `BlockRun`, and `local` (n_contact,): sum of the
+        one row, and with values (n_block, ...) by their names in `BlockResult`, and `local` (n_contact,): sum of the
         errors of steps and blocks, m. area (n_contact,): m2. share: as in `allowed_error`.
     """
     now, unit = nodes[-1], np.eye(area.size)
@@ -69,13 +69,13 @@ def attempt_step(
         base = base + (h - 1.0) * h / (2.0 * h - 1.0 + a) * last
         factor = float((h - 1.0) * (h - 1.0 + a) / (2.0 * h - 1.0 + a))
         first, error_factor = np.maximum(first, base.sum(axis=0)), float(factor / (h + a + b))
-    runs = run_mission(first, length > 1)
-    if isinstance(runs, Failure):
-        return runs
-    rates, error = np.array([each.growth for each in runs]), np.zeros(area.size)
+    results = run_mission(first, length > 1)
+    if isinstance(results, Failure):
+        return results
+    rates, error = np.array([each.growth for each in results]), np.zeros(area.size)
     if length > 1:
         whole, rate, least = unit, rates.sum(axis=0), base.sum(axis=0)
-        for each in runs:
+        for each in results:
             assert each.slope is not None
             whole = (unit + each.slope) @ whole
         slope = whole - unit
@@ -88,15 +88,15 @@ def attempt_step(
         error = np.abs(error_factor * (depth + rates.sum(axis=0) - ahead)) + factor * part * missed
     growth = base + (factor + 1.0) * rates
     most = allowed_error(share, float(depth_now @ area), float(growth.sum(axis=0) @ area), now.count, length)
-    values = values_of(runs)
+    values = values_of(results)
     # the error of a block that wears nothing may be unknown
     of_blocks = np.where(rates > 0.0, values["growth_error"][:, None] * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
     values["local"] = now.values["local"] + error + length * of_blocks
-    end = Node(now.count + length, growth.ravel(), rates.ravel(), values, tuple(each.guide for each in runs))
-    return MissionStep(end, runs, float(np.nan_to_num(error @ area / most, nan=np.inf)))
+    end = Node(now.count + length, growth.ravel(), rates.ravel(), values, tuple(each.guide for each in results))
+    return MissionStep(end, results, float(np.nan_to_num(error @ area / most, nan=np.inf)))
 
 
-def values_of(runs: tuple[BlockRun, ...]) -> dict[str, Any]:
+def values_of(results: tuple[BlockResult, ...]) -> dict[str, Any]:
     """Values (n_block, ...) of the blocks, by their names."""
     names = ("response", "response_peak", "response_error", "growth_error")
-    return {name: np.array([getattr(run, name) for run in runs]) for name in names}
+    return {name: np.array([getattr(each, name) for each in results]) for name in names}

@@ -93,14 +93,14 @@ class Multipliers:
         return "fold" if self.values[0].real > 0.0 else "period doubling"
 
 
-def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: bool = True) -> Failure | None:
+def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, with_switching: bool = True) -> Failure | None:
     """Why a state is unstable at a fixed wear depth; None where it is stable, or where stability is not known.
 
-    every: False, within a wear history, leaves out joints that switch, but for small ones that open and close.
+    with_switching: False, within a wear history, leaves out joints that switch, but for small ones that open and close.
     Raises OutOfTimeError.
     """
     switches = bool(switching_pairs(at)[0].any())
-    left_out = switches and not every and not _bounces(joint, at)
+    left_out = switches and not with_switching and not _bounces(joint, at)
     if left_out or (not switches and _is_passive(joint.model.harmonic_structure(1))):
         return None
     found = find_multipliers(case, joint, at, run, growing_only=True)

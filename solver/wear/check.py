@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, Certificate, certify
-from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
+from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine
 from solver.accuracy.resolved_state import UNKNOWN, lacks_even, left_out
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
@@ -106,7 +106,7 @@ def needs_new_choice(setup: WearingJoint, state: WearState) -> bool:
         return now > NEGLIGIBLE
     if now > LEFT_OUT_GROWN * state.left_out:
         return error * now > settings.rtol * state.left_out
-    return now < KEPT_FRACTION**2 * state.left_out
+    return now < RELAXED_FRACTION**2 * state.left_out
 
 
 def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:

@@ -79,7 +79,7 @@ def _solve(integrator: Integrator, case: Case, start: StartState, asked: WearReq
     own = integrator.integrate(WearProblem(case, start, asked, stable_end=True), spent)
     if own.state is None:
         return replace(own, course=unknown_course(case.model, len(asked.loops)))
-    if (len(own.course.ends) == 1 and asked.follow is None) or own.failure.outcome in ENDS_ALL:
+    if (len(own.course.ends) == 1 and asked.follow is None) or own.end.outcome in ENDS_ALL:
         return own
     spent += own.seconds
     if isinstance(asked.steps, Given):
@@ -143,8 +143,8 @@ def _assembled(model: ReducedModel, start: StartState, asked: WearRequest, own: 
         **{name: value for name, value in found.items() if name in _REPORTED}
         | {f"{name}_error": values for name, values in vars(error).items()}
         | ({} if own.state is None else _of_state(own.state, asked.end)),
-        outcome=own.ended.outcome,
-        message=own.ended.message,
+        outcome=own.end_of_all.outcome,
+        message=own.end_of_all.message,
         cycles=counts,
         worn_volume=found["wear_depth"] @ area,
         reference_volume=both.other("wear_depth") @ area,

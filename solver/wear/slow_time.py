@@ -249,13 +249,13 @@ class Guide:
 class Solution:
     """What an integration has found at its end, or when it is saved, with Newton iterations and CPU seconds.
 
-    state: the last one; None where there is no first state. failure: reason of its end.
+    state: the last one; None where there is no first state. end: why it ends, UNFINISHED where it goes on.
     compared: the solution whose difference is the error: of a history with given steps the adaptive one, of an adaptive
         one its reference solution; None where there is none.
     """
 
     state: Any
-    failure: Failure
+    end: Failure
     course: Course
     iterations: int = 0
     seconds: float = 0.0
@@ -267,9 +267,9 @@ class Solution:
         return (self, *(() if self.compared is None else self.compared.all))
 
     @property
-    def ended(self) -> Failure:
+    def end_of_all(self) -> Failure:
         """The end of the whole history."""
-        return next((each.failure for each in self.all if each.failure.outcome in ENDS_ALL), self.failure)
+        return next((each.end for each in self.all if each.end.outcome in ENDS_ALL), self.end)
 
 
 class Integrator:
@@ -288,7 +288,7 @@ class Integrator:
         """Integrate from the first or the saved state to the end. spent: CPU seconds of the time limit so far."""
         name, course, budget = problem.name, problem.course, problem.budget
         state, began, known = None, computing_time(), self._known.get(name)
-        if known is not None and known.failure != UNFINISHED:
+        if known is not None and known.end != UNFINISHED:
             return known
         if known is not None:
             state, course, budget.iterations, began = known.state, known.course, known.iterations, began - known.seconds
@@ -306,4 +306,4 @@ class Integrator:
                 self._known[name] = Solution(state, UNFINISHED, course, saved_at, computing_time() - began)
                 if self._keep is not None:
                     # what its time limit has ended is not complete
-                    self._keep(pack({key: s for key, s in self._known.items() if s.failure.outcome not in ENDS_ALL}))
+                    self._keep(pack({key: s for key, s in self._known.items() if s.end.outcome not in ENDS_ALL}))

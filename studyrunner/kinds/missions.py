@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from solver.contact.wear_law import WearLaw
-from solver.missions import mission as of_solver
-from solver.missions.mission import Begin, Passage
+from solver.missions.mission import Begin, Block, MissionRequest
 from solver.packing import Packed
 from solver.results.history import last_error
-from solver.settings import Direction, WearTarget
+from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
 from studyrunner.kinds.task import (
     Identity,
@@ -62,12 +61,10 @@ class PlannedBlock:
     cycles: float
     begin: Begin
 
-    def as_block(self, model: ReducedModel) -> of_solver.Block:
+    def as_block(self, model: ReducedModel) -> Block:
         """The block as the solver takes it. model: of the joint."""
         cycles, friction = None if isinstance(self.frequency, Passage) else self.cycles, self.joint.friction_coefficient
-        return of_solver.Block(
-            model, self.frequency, self.excitation_amplitude, friction, cycles, self.begin, self.name
-        )
+        return Block(model, self.frequency, self.excitation_amplitude, friction, cycles, self.begin, self.name)
 
     @property
     def octaves(self) -> float:
@@ -121,9 +118,7 @@ class Mission(Task):
         # with those before, for the wear of one
         read = tuple(sorted({0, 1} | wanted | {max(number - 1, 0) for number in wanted}))
         first = cast("Direction", self.first)
-        asked = of_solver.MissionRequest(
-            blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first
-        )
+        asked = MissionRequest(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
         yield PointResult(_values(self, integrate_missions(asked, note, self.resume)))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
@@ -172,11 +167,9 @@ def _blocks(
             for name in ("excitation_amplitude", "frequency")
         )
         begin: str = part.axes.sweep[at["sweep"]] if given.begin == "sweep" else given.begin
-        if isinstance(given.frequency, dict):
-            frequency = Passage(**given.frequency)
-            begin, cycles = frequency.sweep, frequency.cycles
-        else:
-            cycles = given.cycles_at(frequency)
+        cycles = given.cycles_at(frequency)
+        if given.passage is not None:
+            frequency, begin = given.passage, given.passage.sweep
         joint = joint_of(study, scene, contact)
         yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))
 

@@ -8,12 +8,13 @@ import sys
 import time
 import traceback
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from studyrunner.system.process import keep_talking, raise_ending, take_endings
-from studyrunner.user_error import UserError
+from studyrunner.user_error import StorageError, UserError
 
 if TYPE_CHECKING:
     from studyrunner.report.drawing import Item
@@ -90,6 +91,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     except SystemExit:
         return WRITTEN
+    except StorageError as error:
+        print(f"study-report: {error}", file=sys.stderr)
+        return UNEXPECTED
     except KeyboardInterrupt:
         print("study-report: interrupted", file=sys.stderr)
         return INTERRUPTED
@@ -117,8 +121,9 @@ def _report(options: argparse.Namespace) -> int:
         folder = options.folder or Path(f"{options.result.stem}-report")
         _make_folder(folder)
         result, page = _compute(result, folder, options), folder / "index.html"
-        shown = write_page(result, _until_ended(draw_report(result)), page)
-        n_files = write_series(folder) if write_series else 0
+        with _writing_errors(folder):
+            shown = write_page(result, _until_ended(draw_report(result)), page)
+            n_files = write_series(folder) if write_series else 0
     print(f"{page}: {shown}, {format_seconds(time.monotonic() - began)}; open it in a browser")
     if options.vtu:
         print(f"{folder / SERIES}: time series of {count(n_files, 'VTU file')}; open it in ParaView")
@@ -150,12 +155,21 @@ def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Resul
 
 def _make_folder(folder: Path) -> None:
     """The folder, after a try whether files can be written into it. Raises UserError."""
-    try:
+    with _writing_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         trial = folder / f".index.html.{os.getpid()}.partial"
         trial.touch()
         trial.unlink()
+
+
+@contextmanager
+def _writing_errors(folder: Path) -> Iterator[None]:
+    """What the system says of a folder becomes UserError."""
+    try:
+        yield
     except OSError as error:
+        if error.errno is None or error.errno < 0:  # of the library that reads the result
+            raise
         remedy = f"give a folder that can be written: {error.strerror}"
         raise UserError("command line", "-o", str(folder), remedy) from None
 

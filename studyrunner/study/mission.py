@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from solver.settings import Passage
 from studyrunner.study.mistakes import check_tables, nearest_name, raise_wrong
 from studyrunner.study.sections import AxesSection
 from studyrunner.user_error import UserError
@@ -51,7 +52,7 @@ class MissionBlock(Section):
         if self.frequency is not None and self.engine_order is not None:
             yield Wrong("engine_order", self.engine_order, "leave it out, or frequency: give one of both")
         durations = [key for key in ("cycles", "seconds") if getattr(self, key) is not None]
-        if self.is_passage:
+        if self.passage is not None:
             for key in durations:
                 yield Wrong(key, getattr(self, key), "leave it out: a passage takes as long as its rate says")
             if self.begin != "sweep":
@@ -65,9 +66,9 @@ class MissionBlock(Section):
         return self.model_extra or {}
 
     @property
-    def is_passage(self) -> bool:
-        """Whether the frequency runs."""
-        return isinstance(self.frequency, dict)
+    def passage(self) -> Passage | None:
+        """The frequencies that it passes; None where the vibration is steady."""
+        return Passage(**self.frequency) if isinstance(self.frequency, dict) else None
 
     def gives(self, name: str) -> bool:
         """Whether the block gives a value of its own to an axis."""
@@ -76,16 +77,17 @@ class MissionBlock(Section):
 
     def cycles_at(self, frequency: float) -> float:
         """Cycles of the block in one mission. frequency: of steady vibration, Hz."""
-        if isinstance(self.frequency, dict):
-            return abs(self.frequency["stop"] ** 2 - self.frequency["start"] ** 2) / (2.0 * self.frequency["rate"])
+        if self.passage is not None:
+            return self.passage.cycles
         return self.cycles if self.cycles is not None else (self.seconds or 0.0) * frequency
 
     def describe(self, frequency: float) -> str:
         """In words. frequency: of steady vibration, Hz."""
         how = {"ramp": "begins with a ramp", "sweep": "begins with a sweep", "continue": "continues the block before"}
         cycles = f"{self.cycles_at(frequency):.4g} cycles a mission"
-        if isinstance(self.frequency, dict):
-            return "passage from {start:g} to {stop:g} Hz at {rate:g} Hz/s, ".format(**self.frequency) + cycles
+        if self.passage is not None:
+            ends = f"{self.passage.start:g} to {self.passage.stop:g} Hz"
+            return f"passage from {ends} at {self.passage.rate:g} Hz/s, {cycles}"
         return f"{frequency:g} Hz, {cycles}, {how[self.begin]}"
 
 

@@ -59,7 +59,7 @@ def _blocks(study: Study) -> Iterator[Wrong]:
             yield Wrong(
                 f"{key}.begin", "continue", f'give "ramp": {before.name}, the block before, differs in {changed[0]}'
             )
-        if block.begin == "sweep" and not block.is_passage and "ramp" in axes.sweep:
+        if block.begin == "sweep" and block.passage is None and "ramp" in axes.sweep:
             yield Wrong(f"{key}.begin", "sweep", 'give "ramp", or axes.sweep = "up" or "down"')
     for name in (*OWN_AXES, *(axis.name for axis in study.scene_axes)):
         given = name not in OWN_AXES or name in axes.model_fields_set

@@ -68,6 +68,9 @@ def wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
     Hz, NaN where it is not known.
     """
     best, point, wears = result.best_known, result.shown, False
+    if result.has("worn_volume"):
+        # of a selection of cycle counts, or where the target comes before the second of them
+        best = best & np.isfinite(result.worn)
     resonance = f"first resonance {stuck:.4g} Hz when all pairs stick" if math.isfinite(stuck) else ""
     if result.wears and result.has("worn_volume") and best.any():
         worn = np.where(best, result.worn, -1.0)

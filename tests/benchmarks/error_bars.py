@@ -63,30 +63,24 @@ def compare(history: WearHistory, truth: WearHistory) -> list[float]:
     ]
 
 
-class Comparison:
-    """Histories compared with their truth, in a table, and the worst of all."""
+def add_row(
+    table: Table, name: str, truth: WearHistory, model: ReducedModel, friction: float, start: StartState, *asked: object
+) -> None:
+    """A row for a history from a start state; asked: the arguments of `march_wear` from the step on."""
+    found = measure(lambda: march_wear(model, friction, start, WEAR, *asked))
+    table.row(f"{name} {found.result.outcome.meaning}", *compare(found.result, truth), found.seconds)
 
-    def __init__(self, title: str) -> None:
-        self.table = Table(title, *COLUMNS)
 
-    def add(
-        self, name: str, truth: WearHistory, model: ReducedModel, friction: float, start: StartState, *asked: object
-    ) -> None:
-        """A row for a history from a start state; asked: the arguments of `march_wear` from the step on."""
-        found = measure(lambda: march_wear(model, friction, start, WEAR, *asked))
-        row = *compare(found.result, truth), found.seconds
-        self.table.row(f"{name} {found.result.outcome.meaning}", *row)
-
-    def summarise(self) -> None:
-        """Median and worst ratios, and how many are too small, of the histories whose truth is known."""
-        known = [row[1:] for row in self.table.rows[1:] if np.isfinite(float(row[4]))]
-        if known:
-            _, true, ratio, *least, outside, pairs, _ = np.array(known, dtype=float).T
-            at_end = ratio[true > FLOOR]
-            print(f"{len(known)} histories, at the end: median {np.median(at_end):.2f}, least {at_end.min():.2f}")
-            for name, column in zip(COLUMNS[3:6], least, strict=True):
-                print(f"{name}: least {column.min():.2f}, {(column < 0.5).sum()} below 0.5")
-            print(f"{outside.sum():.0f} of {pairs.sum():.0f} depths outside")
+def summarise(table: Table) -> None:
+    """Median and worst ratios, and how many are too small, of the histories whose truth is known."""
+    known = [row[1:] for row in table.rows[1:] if np.isfinite(float(row[4]))]
+    if known:
+        _, true, ratio, *least, outside, pairs, _ = np.array(known, dtype=float).T
+        at_end = ratio[true > FLOOR]
+        print(f"{len(known)} histories, at the end: median {np.median(at_end):.2f}, least {at_end.min():.2f}")
+        for name, column in zip(COLUMNS[3:6], least, strict=True):
+            print(f"{name}: least {column.min():.2f}, {(column < 0.5).sum()} below 0.5")
+        print(f"{outside.sum():.0f} of {pairs.sum():.0f} depths outside")
 
 
 def fine_starts(model: ReducedModel, omegas: list[float], settings: SolverSettings) -> list[StartState]:
@@ -100,7 +94,7 @@ def fine_starts(model: ReducedModel, omegas: list[float], settings: SolverSettin
 
 def dovetail(title: str, model: ReducedModel, steps: list[float], frequencies: FloatArray) -> None:
     """All schemes and steps at some frequencies, Hz."""
-    cycles, comparison, omegas = np.linspace(0.0, 1e5, 101), Comparison(title), list(2.0 * np.pi * frequencies)
+    cycles, table, omegas = np.linspace(0.0, 1e5, 101), Table(title, *COLUMNS), list(2.0 * np.pi * frequencies)
     runs: list[tuple[Scheme, float]] = [("adaptive", 1e-2)]
     runs += [(scheme, step) for scheme in ("implicit", "explicit") for step in steps]
     exact, settings = SolverSettings(harmonics=9, samples=128, rtol=1e-3), SolverSettings()
@@ -108,15 +102,14 @@ def dovetail(title: str, model: ReducedModel, steps: list[float], frequencies: F
     for frequency, fine, start in zip(frequencies, fine_starts(model, omegas, exact), starts, strict=True):
         truth = march_wear(model, 0.5, fine, WEAR, 1000.0, "adaptive", cycles, exact)
         for scheme, step in runs:
-            comparison.add(
-                f"{frequency:.7g} Hz, {scheme} {step:g}", truth, model, 0.5, start, step, scheme, cycles, settings
-            )
-    comparison.summarise()
+            name = f"{frequency:.7g} Hz, {scheme} {step:g}"
+            add_row(table, name, truth, model, 0.5, start, step, scheme, cycles, settings)
+    summarise(table)
 
 
 def random_joints(n: int) -> None:
     """Small joints of random structures, steps from a twentieth of the explicit limit to half of it."""
-    comparison = Comparison("random joints")
+    table = Table("random joints", *COLUMNS)
     settings, exact = SolverSettings(harmonics=5, samples=64), SolverSettings(harmonics=13, samples=256, rtol=3e-4)
     for seed in range(n):
         random, model = np.random.default_rng(seed), random_model(seed, KINDS[seed % len(KINDS)])
@@ -132,8 +125,8 @@ def random_joints(n: int) -> None:
         truth = march_wear(model, 0.4, fine, WEAR, step, "adaptive", cycles, exact)
         for scheme in ("implicit", "explicit", "adaptive"):
             name = f"joint {seed}, {scheme} {step / limit:.2g} of the limit"
-            comparison.add(name, truth, model, 0.4, start, step, scheme, cycles, settings)
-    comparison.summarise()
+            add_row(table, name, truth, model, 0.4, start, step, scheme, cycles, settings)
+    summarise(table)
 
 
 def main() -> None:

@@ -66,13 +66,8 @@ def integrations(
 
 def slider_volume() -> float:
     """Exact worn volume of the slider, m3."""
-    values = {"wear_coefficient": WEAR, "area": 1e-4, "friction_coefficient": FRICTION, "normal_load": 10.0}
-    depth = slider_wear_depth(
-        np.array([0.0, CYCLES]),
-        **values,
-        normal_stiffness=1e5,
-        amplitude=lambda limit: slider_amplitude(0.1, 8.0, 1.6e5, 10.0, limit, 2.0 * np.pi * 160.0),
-    )
+    omega = 2.0 * np.pi * 160.0
+    depth = slider_wear_depth([0.0, CYCLES], lambda limit: slider_amplitude(0.1, 8.0, 1.6e5, 10.0, limit, omega))
     return float(depth[-1]) * 1e-4
 
 

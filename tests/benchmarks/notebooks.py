@@ -15,7 +15,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import nbformat
-from ipykernel.kernelspec import write_kernel_spec
+from jupyter_client import AsyncKernelManager
+from jupyter_client.kernelspec import KernelSpecManager
 from nbclient import NotebookClient
 from nbformat import NotebookNode
 
@@ -28,31 +29,27 @@ LANGUAGE = {"name": "python"}
 RESULTS = ("scatter.nc", "modes.nc", "mission.nc")
 
 
-def execute(path: Path, here: Path, variables: Mapping[str, str]) -> NotebookNode:
-    """A notebook after its cells were run in an empty folder.
+class OwnKernel(AsyncKernelManager):
+    """The kernel of this very interpreter, whatever kernels are installed on the machine."""
 
-    The settings of Jupyter and IPython are beside the folder, those of the user are not read. variables: of the
-    environment, beside those of this process but what names another result. Raises CellExecutionError of nbclient.
+    def _kernel_spec_manager_default(self) -> KernelSpecManager:
+        return KernelSpecManager(kernel_dirs=[])
+
+
+def execute(path: Path, here: Path, variables: Mapping[str, str]) -> NotebookNode:
+    """A notebook after its cells were run in an empty folder, without settings of the user, by this interpreter.
+
+    variables: of the environment, beside those of this process but what names another result. Raises
+    CellExecutionError of nbclient.
     """
-    aside = here.with_name(f"{here.name}-jupyter")
-    # The kernel is this very interpreter, whatever kernels are installed on the machine.
-    write_kernel_spec(str(aside / "kernels" / "python3"))
-    own = dict.fromkeys(("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR", "JUPYTER_PATH"), str(aside))
-    own["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"
-    own["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     notebook = nbformat.read(path, as_version=4)
-    before = dict(os.environ)
-    # what finds the kernel reads the environment of this process
-    for name in ("RESULT", "RESULTS"):
-        os.environ.pop(name, None)
-    os.environ.update(own, **variables)
-    try:
-        resources = {"metadata": {"path": str(here)}}
-        options = {"kernel_name": "python3", "timeout": 300, "record_timing": False}
-        NotebookClient(notebook, resources=resources, **options).execute()
-    finally:
-        os.environ.clear()
-        os.environ.update(before)
+    surroundings = {name: value for name, value in os.environ.items() if name not in ("RESULT", "RESULTS")}
+    surroundings |= dict.fromkeys(("IPYTHONDIR", "JUPYTER_CONFIG_DIR"), str(here.with_name(f"{here.name}-jupyter")))
+    surroundings["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"
+    surroundings["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    options = {"kernel_manager_class": OwnKernel, "kernel_name": "python3", "timeout": 300, "record_timing": False}
+    client = NotebookClient(notebook, resources={"metadata": {"path": str(here)}}, **options)
+    client.execute(env={**surroundings, **variables})
     return notebook
 
 

@@ -52,30 +52,28 @@ _SURROUNDINGS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_ENABL
 Curve = dict[str, Any]
 """Frequency, Hz, and amplitude, m, of the points that converged; iterations, CPU seconds, attempts that failed."""
 Truth = Callable[[FloatArray], FloatArray]
-Program = Callable[[], tuple[list[str], str, dict[str, str]]]
-"""Gives command, script and further input of a program."""
+Program = tuple[Callable[[], list[str]], str, dict[str, str]]
+"""Of a program: its command, script and further input."""
 
 
 def exact(kind: str, frequency: float) -> float:
     """Amplitude of the first harmonic of the exact motion of the slider, m."""
+    omega = 2.0 * np.pi * frequency
     if kind == "rigid":
-        return abs(slider_orbit(MASS, DAMPING, MOUNT, FORCE, FRICTION, 2.0 * np.pi * frequency).harmonic(0))
-    rate = np.sqrt(MOUNT / MASS)
-    limit, damping = FRICTION / FORCE, DAMPING / np.sqrt(MOUNT * MASS)
-    pair = behind_spring(SPRING / MOUNT, damping, limit, 2.0 * np.pi * frequency / rate)
+        return abs(slider_orbit(MASS, DAMPING, MOUNT, FORCE, FRICTION, omega).harmonic(0))
+    damping = DAMPING / np.sqrt(MOUNT * MASS)
+    pair = behind_spring(SPRING / MOUNT, damping, FRICTION / FORCE, omega / np.sqrt(MOUNT / MASS))
     return float(abs(pair.response(pair.orbit_near(np.zeros(2), np.zeros(2)))).item()) * FORCE / MOUNT
 
 
 def show(table: Table, name: str, harmonics: int | str, curve: Curve, truth: Truth) -> None:
     frequencies, amplitudes = np.array(curve["frequency"]), np.array(curve["amplitude"])
-    if not frequencies.size:
-        table.row(name, harmonics, 0, curve.get("failed", 0), *6 * [None])
-        return
-    errors = 100.0 * np.abs(amplitudes / truth(frequencies) - 1.0)
-    largest, effort = int(np.argmax(amplitudes)), (curve["iterations"], curve["seconds"])
-    peak = 1e3 * amplitudes[largest], frequencies[largest]
-    errors = float(errors.max()), float(np.median(errors))
-    table.row(name, harmonics, frequencies.size, curve.get("failed", 0), *effort, *map(float, peak), *errors)
+    numbers: list[float | None] = [None] * 6
+    if frequencies.size:
+        errors, largest = 100.0 * np.abs(amplitudes / truth(frequencies) - 1.0), int(np.argmax(amplitudes))
+        peak = float(1e3 * amplitudes[largest]), float(frequencies[largest])
+        numbers = [curve["iterations"], curve["seconds"], *peak, float(errors.max()), float(np.median(errors))]
+    table.row(name, harmonics, frequencies.size, curve.get("failed", 0), *numbers)
 
 
 def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArray, force: float, truth: Truth) -> None:
@@ -83,11 +81,11 @@ def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArr
         settings = SolverSettings(harmonics=harmonics, samples="auto" if harmonics == "auto" else SAMPLES)
         asked = (model, frequencies, force, MU)
         runs = [measure(lambda: frequency_response(*asked, settings=settings)) for _ in range(2)]  # noqa: B023
-        response = runs[1].result.response[:, 0]
-        there = np.isfinite(response)
-        curve = {"frequency": frequencies[there], "amplitude": np.abs(response[there]), "failed": int((~there).sum())}
-        effort = {"iterations": runs[1].iterations, "seconds": runs[1].seconds}
-        show(table, f"fretwear, {kind}", harmonics, {**curve, **effort}, truth)
+        amplitude = np.abs(runs[1].result.response[:, 0])
+        there = np.isfinite(amplitude)
+        curve = {"frequency": frequencies[there], "amplitude": amplitude[there], "failed": int((~there).sum())}
+        curve |= {"iterations": runs[1].iterations, "seconds": runs[1].seconds}
+        show(table, f"fretwear, {kind}", harmonics, curve, truth)
 
 
 def slider(table: Table, programs: dict[str, Program]) -> None:
@@ -147,24 +145,24 @@ def write_model(file: Path, model: ReducedModel) -> None:
     np.savez(file, **arrays, row=np.real(linear.response[0]), start=guess.ravel())
 
 
-def environment(folder: Path, packages: tuple[str, ...]) -> str:
+def environment(folder: Path, packages: tuple[str, ...]) -> list[str]:
     """Interpreter of an environment with the packages. Raises CalledProcessError."""
     python = folder / "bin" / "python"
     if not python.exists():
         venv.create(folder, with_pip=True)
         subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True, capture_output=True, text=True)
-    return str(python)
+    return [str(python)]
 
 
 def peer_row(table: Table, label: str, program: Program, asked: dict[str, Any], truth: Truth) -> None:
     """A row of another program, from what its script prints last; a sentence where it is not to be had."""
     try:
-        command, script, more = program()
+        command, script, more = program
         given = json.dumps({**asked, "harmonics": HARMONICS, **more})
         with tempfile.TemporaryDirectory() as folder:  # pyHarm writes where it runs
             surroundings = {**os.environ, **_SURROUNDINGS}
-            command = [*command, str(Path(__file__).with_name(script)), given]
-            done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=surroundings)
+            words = [*command(), str(Path(__file__).with_name(script)), given]
+            done = subprocess.run(words, check=True, capture_output=True, text=True, cwd=folder, env=surroundings)
     except (subprocess.CalledProcessError, FileNotFoundError) as error:
         said = (getattr(error, "stderr", None) or str(error)).strip().splitlines() or ["no message"]
         # Octave says first what is wrong, Python last
@@ -175,18 +173,15 @@ def peer_row(table: Table, label: str, program: Program, asked: dict[str, Any], 
 
 
 def main() -> None:
-    home = str(Path.home() / ".cache" / "fretwear_peers")
+    home = Path.home() / ".cache" / "fretwear_peers"
     given = arguments(__doc__, ("slider", "dovetail"), folder=home, tmdsimpy=None, nlvib=None)
-    folder = Path(given.folder).resolve()
+    folder = given.folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
+    tmdsimpy, nlvib = ({"source": str(source)} for source in (given.tmdsimpy, given.nlvib))
     programs: dict[str, Program] = {
-        "pyHarm": lambda: ([environment(folder / "pyharm", PYHARM)], "peer_pyharm.py", {}),
-        "tmdsimpy": lambda: (
-            [environment(folder / "tmdsimpy", JAX)],
-            "peer_tmdsimpy.py",
-            {"source": str(given.tmdsimpy)},
-        ),
-        "NLvib": lambda: (["octave-cli", "-q"], "peer_nlvib.m", {"source": str(given.nlvib)}),
+        "pyHarm": (lambda: environment(folder / "pyharm", PYHARM), "peer_pyharm.py", {}),
+        "tmdsimpy": (lambda: environment(folder / "tmdsimpy", JAX), "peer_tmdsimpy.py", tmdsimpy),
+        "NLvib": (lambda: ["octave-cli", "-q"], "peer_nlvib.m", nlvib),
     }
     columns = ("program", "harmonics", "points", "failed", "iterations", "CPU s", "largest, mm", "at Hz")
     table = Table(*columns, "error, %", "median, %", file=folder / "peers.csv")

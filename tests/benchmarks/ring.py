@@ -17,10 +17,10 @@ import numpy as np
 
 from solver import march_wear
 from tests.benchmarks.frame import Table
-from tests.benchmarks.time_integration import at_rest, build, first_harmonic, one_period, ramp
+from tests.benchmarks.time_integration import driven, first_harmonic, one_period, ramp
 from tests.rings import N, one_sector, whole_ring
 
-FRICTION, WEAR, CYCLES, EACH = 0.3, 1e-10, 300.0, 1.0
+FRICTION, WEAR, CYCLES = 0.3, 1e-10, 300
 CASES = ((0, 138.0, 0.5), (1, 280.0, 3.3), (2, 300.0, 10.0), (3, 320.0, 12.0), (4, 300.0, 10.0), (5, 280.0, 3.3))
 """Nodal diameter, frequency, Hz, excitation amplitude, N."""
 
@@ -31,13 +31,9 @@ _MOST_PERIODS = 20_000
 def ring_in_time(diameter: int, frequency: float, amplitude: float, steps: Sequence[int], cycles: float):
     """First harmonics (n, N) of the unworn tips, m, and worn volumes (n, N), m3, for numbers of steps a period."""
     model, tips, volumes = whole_ring(diameter), [], []
-    rows = np.real(model.linear[0].response)
+    gap, rows = model.contact.gap, np.real(model.linear[0].response)
     for n_steps in steps:
-        gap, motion = model.contact.gap, None
-        for at, load in ramp(frequency, amplitude, 300).tolist():
-            structure = build(model, FRICTION, at, load, n_steps)
-            motion = one_period(structure, motion or at_rest(model, structure, gap), gap)
-        assert motion is not None
+        structure, motion = driven(model, FRICTION, ramp(frequency, amplitude, 300), n_steps)
         for _ in range(_MOST_PERIODS):
             before, motion = motion.x, one_period(structure, motion, gap)
             if np.abs(motion.x - before).max() < _REPEATS * np.abs(motion.x).max():
@@ -46,9 +42,9 @@ def ring_in_time(diameter: int, frequency: float, amplitude: float, steps: Seque
             raise RuntimeError("the motion does not repeat")
         tips.append(first_harmonic(structure, motion, rows))
         depth = np.zeros(N)
-        for _ in range(round(cycles / EACH)):
+        for _ in range(round(cycles)):
             motion = one_period(structure, motion, gap + depth)
-            depth = depth + EACH * WEAR * motion.work / model.contact.area
+            depth = depth + WEAR * motion.work / model.contact.area
         volumes.append(depth * model.contact.area)
     return np.array(tips), np.array(volumes)
 

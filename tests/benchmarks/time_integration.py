@@ -278,15 +278,21 @@ def ramp(frequency: float, amplitude: float, periods: int) -> FloatArray:
     return np.stack([np.full(periods, frequency), amplitude * np.linspace(0.0, 1.0, periods + 1)[1:]], axis=1)
 
 
-def loaded(model: ReducedModel, friction: float, course: FloatArray, n_steps: int) -> tuple[Structure, Motion]:
-    """Unworn settled motion after a course of frequencies, Hz, and amplitudes, N, (n_periods, 2), begun at rest."""
-    gap = model.contact.gap
+def driven(model: ReducedModel, friction: float, course: FloatArray, n_steps: int) -> tuple[Structure, Motion]:
+    """Unworn motion after a course of frequencies, Hz, and amplitudes, N, (n_periods, 2), begun at rest."""
     structure = build(model, friction, *course[0], n_steps)
-    motion = at_rest(model, structure, gap)
-    for frequency, amplitude in (*course.tolist(), *_HELD * [course[-1].tolist()]):
+    motion = at_rest(model, structure, model.contact.gap)
+    for frequency, amplitude in course.tolist():
         structure = build(model, friction, frequency, amplitude, n_steps)
-        motion = one_period(structure, motion, gap)
-    return structure, settle(structure, motion, gap)
+        motion = one_period(structure, motion, model.contact.gap)
+    return structure, motion
+
+
+def loaded(model: ReducedModel, friction: float, course: FloatArray, n_steps: int) -> tuple[Structure, Motion]:
+    """The motion to which that of `driven` settles."""
+    held = np.concatenate([course, course[-1:].repeat(_HELD, axis=0)])
+    structure, motion = driven(model, friction, held, n_steps)
+    return structure, settle(structure, motion, model.contact.gap)
 
 
 def wear(

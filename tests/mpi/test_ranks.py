@@ -23,6 +23,7 @@ from tests.mpi.launching import (
     run_here,
     run_to_end,
 )
+from tests.studyrunner import small_studies
 
 GRID = (
     *(FAKED, *CHEAP),
@@ -78,43 +79,19 @@ JOINT = (
     *options("axes.frequency=212.5", "axes.scheme=['explicit', 'adaptive']", "scene.mesh=1"),
     *options("solver.samples=64", "slow_time.cycles=3000", "outputs.loops=[0, 5]"),
 )
-MODES = """
-[study]
-name = "modes"
-[scene]
-model = "sdof_slider"
-[axes]
-modal_amplitude = {start = 2e-5, stop = 1e-3, num = 10, spacing = "log"}
-sweep = "down"
-friction_coefficient = [0.4, 0.6]
-"""
-MISSIONS = """
-[study]
-name = "missions"
-[scene]
-model = "sdof_slider"
-normal_stiffness = 0.0
-[axes]
-frequency = 160
-wear_coefficient = 1e-11
-damping = [0.0, 0.5]
-[slow_time]
-missions = 1
-outputs = 2
-[solver]
-harmonics = 3
-samples = 64
-rtol = 0.1
-[[mission]]
-name = "hard"
-excitation_amplitude = 14.0
-cycles = 3000
-[[mission]]
-name = "heavy"
-normal_load = 12.0
-excitation_amplitude = 14.0
-cycles = 2000
-"""
+
+
+MODES = (
+    *("modes.toml", *options("axes.modal_amplitude={start = 2e-5, stop = 1e-3, num = 10, spacing = 'log'}")),
+    *options("axes.sweep=down", "axes.friction_coefficient=[0.4, 0.6]"),
+)
+BLOCKS = "{name = 'hard', excitation_amplitude = 14.0, cycles = 3000}, "
+BLOCKS += "{name = 'heavy', normal_load = 12.0, excitation_amplitude = 14.0, cycles = 2000}"
+MISSIONS = (
+    *("missions.toml", *options("scene.normal_stiffness=0", "axes.frequency=160", "axes.wear_coefficient=1e-11")),
+    *options("axes.sweep=up", "axes.damping=[0.0, 0.5]", "slow_time.missions=1", "slow_time.outputs=2"),
+    *options("solver={harmonics = 3, samples = 64, rtol = 0.1}", f"mission=[{BLOCKS}]"),
+)
 
 
 @pytest.mark.parametrize(
@@ -130,9 +107,8 @@ cycles = 2000
 )
 def test_a_study_ends_with_the_result_of_one_process(study, kills, tmp_path):
     """On two ranks; after kills on three, of which one has nothing to do. kills: (kind, entries to wait for, rank)."""
-    if isinstance(study, str):
-        (tmp_path / "study.toml").write_text(study, encoding="utf-8")
-        study = [str(tmp_path / "study.toml")]
+    for name, text in (("modes", small_studies.MODES), ("missions", small_studies.MISSIONS)):
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
     assert run_here([*study, "-o", "alone.nc"], tmp_path) in (0, 3)
     expected = results(tmp_path / "alone.nc")
     command = ["-m", "studyrunner.cli", *study, "-o", "out.nc"]

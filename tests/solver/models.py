@@ -119,12 +119,7 @@ def cyclic_model(
 
 
 def random_balance(
-    model: ReducedModel,
-    settings: SolverSettings,
-    seed: int,
-    *,
-    wear: bool,
-    resolution: Resolution | None = None,
+    model: ReducedModel, settings: SolverSettings, seed: int, *, wear: bool, resolution: Resolution | None = None
 ) -> tuple[Balance, FloatArray]:
     """Balance with a history that is not zero, and a predicted force at which pairs stick, slip and open."""
     random = np.random.default_rng(seed)

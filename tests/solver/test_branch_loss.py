@@ -11,7 +11,7 @@ from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.dlft import Balance
 from solver.histories import march_wear as march_model
 from solver.outcome import Outcome
-from solver.packing import Packed, pack, unpack
+from solver.packing import Packed, unpack
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.jump import creeps, free_slide
@@ -140,20 +140,6 @@ def test_a_root_that_begins_to_slide_all_over_wears_on():
 
 
 # --- interrupted histories ---
-
-
-def test_arrays_come_back_in_rows_and_as_copies():
-    array = np.asfortranarray(np.random.default_rng(0).normal(size=(3, 4)))
-    given = (array, array[:, ::2], np.array([True]), np.array([1j]))
-    packed = pack(given)
-    found = unpack(packed)
-    for one, other in zip(found, given, strict=True):
-        np.testing.assert_array_equal(one, other, strict=True)
-        assert one.flags.c_contiguous
-    array[:] = 0.0
-    found[0][:] = 1.0
-    assert (unpack(packed)[0] != 0.0).all()
-    assert (unpack(packed)[0] != 1.0).any()
 
 
 def from_every_stop(model, friction, start, wear, step, scheme, end, settings):

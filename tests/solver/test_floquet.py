@@ -9,15 +9,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.contact.coulomb import SEPARATED
 from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
-from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.stability.disturbances import build_monodromy, switching_pairs
-from solver.stability.floquet import find_instability, multipliers_of
+from solver.stability.floquet import multipliers_of
 from solver.structure.joint import build_case
 from tests.solver.exact_scenes import drawn
 from tests.solver.models import march_wear, random_balance, random_model
@@ -81,49 +79,6 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed)
     scene, _, joint, at = state_of(kind, seed)
     exact = scene.orbit_next_to(joint, at.displacement_h).multipliers()
     assert largest(marched(joint, at, 512)) == pytest.approx(largest(exact), abs=allowed)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize(("kind", "damping"), [("slider", -3.0), ("two masses", -0.3), ("jenkins", -3.0)])
-def test_with_negative_damping_as_well(kind, damping):
-    """Friction holds some of these vibrations, and some not."""
-    seen = 0
-    for seed in (1, 4, 6):
-        try:
-            scene, case, joint, at = state_of(kind, seed, damping)
-            exact = largest(scene.orbit_next_to(joint, at.displacement_h).multipliers())
-        except (AssertionError, RuntimeError):
-            # no state, or none that is a motion of the exact scene
-            continue
-        if abs(exact - 1.0) > 0.05:
-            seen += 1
-            unstable = find_instability(case, joint, at, Run(case.settings.tolerance))
-            assert (unstable is not None) == (exact > 1.0), (seed, exact)
-    assert seen > 0
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("presented")
-@pytest.mark.parametrize("seed", [1, 17, 29])
-def test_a_multiplier_beyond_minus_one_doubles_the_period(seed):
-    scene, case, joint, at = state_of("impact", seed)
-    exact = scene.orbit_next_to(joint, at.displacement_h).multipliers()
-    beyond = bool(((np.abs(exact.imag) < 1e-9) & (exact.real < -1.0)).any())
-    unstable = find_instability(case, joint, at, Run(case.settings.tolerance))
-    assert (unstable is not None and unstable.outcome is Outcome.PERIOD_DOUBLED) == beyond
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("omega", "n_harmonics", "n_samples"), [(1.0, 3, 128), (1.5, 9, 128)])
-def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(omega, n_harmonics, n_samples):
-    """Its multipliers lie within the unit circle: the mass comes to this motion by itself, see `tests.event_driven`."""
-    case, joint, at = state_at(
-        bundled("vibro_impact"), 0.0, 0.02, omega / (2.0 * np.pi), SolverSettings(n_harmonics, n_samples)
-    )
-    assert (at.status_t == SEPARATED).any()
-    assert not (at.status_t == SEPARATED).all()
-    assert find_instability(case, joint, at, Run(case.settings.tolerance)) is None
 
 
 def with_matrices(name, **matrices):

@@ -13,7 +13,7 @@ from solver import Block, Outcome, Passage, SolverSettings, integrate_mission, m
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import Failure
 from solver.missions import history as integrating
-from solver.missions.block_run import BlockCase, BlockRun, run_block
+from solver.missions.block_run import BlockInput, BlockResult, run_block
 from solver.missions.history import integrate_missions, unworn_course
 from solver.missions.mission import MissionRequest
 from solver.missions.step import MissionStep, attempt_step
@@ -127,8 +127,8 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, mo
 def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
     mission, pairs = MissionRequest((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
-    first, own = (run_block(BlockCase(mission, 0, at * pairs)) for at in (0.0, depth))
-    return own, run_block(BlockCase(mission, 0, depth * pairs, begun=first.begun))
+    first, own = (run_block(BlockInput(mission, 0, at * pairs)) for at in (0.0, depth))
+    return own, run_block(BlockInput(mission, 0, depth * pairs, begun=first.begun))
 
 
 @pytest.mark.slow
@@ -170,7 +170,7 @@ def exact_run(case):
     growth = change[:2] @ np.append(case.depth, 1.0)
     response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
     slope = change[:2, :2] if case.with_slope else None
-    return BlockRun(growth, response, np.abs(response), slope, guide=Guide((), 1.0))
+    return BlockResult(growth, response, np.abs(response), slope, guide=Guide((), 1.0))
 
 
 @pytest.fixture
@@ -230,7 +230,7 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
     def run(depth, with_slope):
         runs = []
         for place in (0, 1):
-            runs.append(exact_run(BlockCase(mission, place, depth, with_slope=with_slope)))
+            runs.append(exact_run(BlockInput(mission, place, depth, with_slope=with_slope)))
             depth = depth + runs[-1].growth
         return tuple(runs)
 

@@ -8,9 +8,7 @@ import pytest
 import scipy.linalg
 
 from solver import Outcome, SolverSettings, backbone, build_model, frequency_response, modal_response
-from solver.modes.mode import find_rest
 from solver.modes.points import follow_mode
-from solver.newton.run import Run
 from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import to_complex
 from tests.friction_beam import SPRING, friction_beam, matrices, plain_mode
@@ -125,16 +123,6 @@ def energies(problem, state):
     contact = float(np.pi * (np.imag(moved.conj() * force) * np.array(joint.basis.orders)).sum())
     assert friction == pytest.approx(contact, rel=1e-2, abs=1e-9 * taken)
     return fed, taken
-
-
-def test_nodes_of_a_mode_are_solved_to_the_tolerance_of_results():
-    run = Run(FIXED.tolerance)
-    rest = find_rest(foot(), 0.5, 1, FIXED, run)
-    amplitudes = np.geomspace(rest.first_amplitude, 2e-5, 20)
-    states = (rest.raised(amplitudes[0], run),)
-    for amplitude in amplitudes[1:]:
-        states = (*states[-1:], rest.mode.solve(states, amplitude, run.with_tolerance(FIXED.rough_tolerance)))
-        assert states[-1].evaluation.scaled_residual() <= FIXED.tolerance
 
 
 @pytest.mark.slow

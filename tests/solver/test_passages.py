@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from solver import Block, Outcome, Passage, SolverSettings
-from solver.missions.block_run import Begun, BlockCase
+from solver.missions.block_run import Begun, BlockInput
 from solver.missions.mission import MissionRequest
 from solver.missions.passage import (
     FIRST_FREQUENCIES,
@@ -76,7 +76,7 @@ def test_a_vibration_is_late_by_its_decay_time():
     def case(rate, damping=6.0):
         # too little wear to change the pressures on the way
         block = Block(scene("sdof_slider", damping=damping), Passage(180.0, 220.0, rate), 10.0, FRICTION)
-        return BlockCase(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), 0, np.zeros(1))
+        return BlockInput(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), 0, np.zeros(1))
 
     fast, slow = run_passage(case(7.0)), run_passage(case(0.07))
     assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
@@ -100,7 +100,7 @@ def swept_with(monkeypatch, density, depth, near=()):
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, FRICTION, begin="up")
     mission, begun = MissionRequest((block,), WEAR, (0, 1), SETTINGS), Begun(near) if near else None
-    swept = find_states(BlockCase(mission, 0, np.array([depth]), begun=begun))
+    swept = find_states(BlockInput(mission, 0, np.array([depth]), begun=begun))
     assert isinstance(swept, Swept)
     return swept
 

@@ -6,15 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.accuracy.history_error import (
-    HISTORY_SAFETY,
-    PAIR_OVER_VOLUME,
-    Compared,
-    HistoryError,
-    error_of_given_steps,
-    history_error,
-    largest_before,
-)
+from solver.accuracy.history_error import HISTORY_SAFETY, Compared, history_error
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome
 from solver.packing import Packed
@@ -115,16 +107,6 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     assert history.outcome is Outcome.SENSITIVE
 
 
-def test_histories_that_cross_are_wrong_by_what_they_differed_before():
-    counts, at = np.linspace(0.0, 10.0, 11), np.arange(0.5, 8.0, 0.5)
-    differences = np.abs(at - 6.0)
-    error = largest_before(at, differences, counts)
-    assert error[[0, 6, 10]].tolist() == [0.0, 3.0, 1.5]
-    # what comes later changes nothing, and where nothing is known there is no difference
-    assert np.array_equal(largest_before(at[:10], differences[:10], counts[:6]), error[:6])
-    assert not largest_before(at, np.full(at.size, np.nan), counts).any()
-
-
 AREA = np.array([1.0, 2.0])
 COUNTS = np.array([0.0, 1.0, 2.0])
 
@@ -189,25 +171,6 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing():
     assert crossing.wear_rate == pytest.approx([0.0, 0.0, safety * 0.25])
 
 
-@pytest.mark.parametrize(("worn", "less"), [([1.0, 0.0, 0.0, 0.0, 0.0], 1.0), ([1.0] * 5, PAIR_OVER_VOLUME)])
-def test_one_pair_is_known_as_the_volume_and_one_of_many_half_as_well(worn, less):
-    depth = np.outer([0.0, 1.0, 2.0], worn)
-    fine = read(depth, local=[0.0, 0.1, 0.2], depth_rate=np.ones((3, 5)))
-    found = error_of(fine, fine, area=np.ones(5))
-    assert found.wear_depth == pytest.approx(less * found.worn_volume[:, None] * depth)
-
-
-def test_given_steps_are_wrong_by_what_they_differ_and_by_what_the_adaptive_history_is_wrong():
-    other = [[0.0, 0.0], [1.2, 0.9], [2.4, np.nan]]
-    known = HistoryError(np.array([0.0, 0.1, 0.1]), 0.1 * np.array(other), *np.full((2, 3), 1e-2), np.zeros(3))
-    found = error_of_given_steps(Compared(COUNTS, read(DEPTH), read(other)), known, AREA)
-    assert found.worn_volume == pytest.approx([0.0, (0.4 + 0.1 * 3.0) / 3.0, np.inf])
-    assert found.wear_depth[1] == pytest.approx([0.2 + 0.12, 0.1 + 0.09])
-    assert np.isinf(found.wear_depth[2]).all()
-    assert found.response == pytest.approx([1e-3, 1e-2, np.inf])
-    assert found.wear_rate == pytest.approx([0.0, 1e-2, np.inf])
-
-
 @pytest.mark.slow
 def test_histories_that_are_integrated_together_are_those_alone(monkeypatch):
     """To the last bit, interrupted or not; the adaptive history, which all of them need, is integrated once."""
@@ -239,13 +202,3 @@ def test_what_nothing_confirms_is_not_known():
     still = error_of(read(np.zeros((3, 2))), read(np.full((3, 2), np.nan)))
     assert not still.worn_volume.any()
     assert not still.wear_depth.any()
-
-
-def test_a_response_is_not_known_better_than_the_worn_volume():
-    # both solutions vibrate alike at each count, with other volumes; the response rises by 0.5 from 3 to 6 m3
-    along = [[1.0], [1.0], [1.5]]
-    fine, other = read(DEPTH, response=along), read([[0.0, 0.0], [0.8, 0.9], [1.6, 1.8]], response=along)
-    found = error_of(fine, other, Compared(COUNTS, fine, other))
-    wrong = found.worn_volume[1:] * [3.0, 6.0]
-    assert wrong[0] > 0.0
-    assert found.response[1:] == pytest.approx(wrong * 0.5 / 3.0 / [1.0, 1.5])

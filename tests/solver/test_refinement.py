@@ -151,13 +151,6 @@ def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics():
     assert whole.response() == pytest.approx(found.response(), rel=1e-6)
 
 
-def test_a_state_with_even_harmonics_keeps_them():
-    found = refined_of(started(random_model(2), 0.4, OMEGA, SLIPPING, SolverSettings()))
-    orders = found.case.resolution.orders
-    assert orders == all_orders(orders[-1])
-    assert 2 in orders
-
-
 def test_a_stuck_state_keeps_the_first_harmonic_alone():
     level = started(random_model(1), 0.4, OMEGA, 1e-2, SolverSettings())
     # the second solve starts from where the first one slipped to: everything sticks

@@ -19,7 +19,7 @@ from studies import build_scene
 from studies.scenes.cylinder_on_flat import line_half_width
 from studies.scenes.half_space import composite_modulus
 from studies.scenes.sphere_on_flat import point_radius
-from tests.solver.models import OMEGA, branch_states, dovetail, first_point, march_wear, random_model, scene
+from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
 from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
 from tests.studyrunner.faked_runs import history
 
@@ -131,32 +131,6 @@ def test_the_loop_of_a_sliding_mass_is_a_rectangle_of_the_energy_that_friction_t
     assert work == pytest.approx(0.5 * history.wear_rate[[0, 2, 4]] / WEAR, rel=3e-3, abs=0.0)
 
 
-@pytest.mark.slow
-def test_loops_of_a_joint_keep_the_laws():
-    model, settings, friction = dovetail(5), SolverSettings(harmonics=5, samples=64), 0.5
-    start = branch_states(model, friction, 0.5, [2 * np.pi * 212.0, 2 * np.pi * 213.0], settings)[1]
-    cycles, asked = np.array([0.0, 500.0, 2000.0]), {"loops": tuple(range(16))}
-    history = march_wear(model, friction, start, WEAR, 1000.0, "explicit", cycles, settings, **asked)
-    assert history.outcome is Outcome.CONVERGED
-    assert history.slip_range.max() > 1e-7
-    normal, tangential = history.loop_force[..., 0], np.linalg.norm(history.loop_force[..., 1:], axis=-1)
-    assert (normal >= 0.0).all()
-    assert (tangential <= friction * normal * (1 + 1e-12) + 1e-12 * normal.max()).all()
-    # a pair that opens does so between two samples
-    mean = history.mean_pressure * model.contact.area
-    always = history.open_fraction == 0.0
-    assert normal.mean(axis=-1)[always] == pytest.approx(mean[always], rel=1e-9, abs=0.0)
-    assert np.abs(normal.mean(axis=-1) - mean).max() < 5e-3 * mean.max()
-    # a closed pair lies on its worn surface
-    lifted = history.loop_displacement[..., 0] - history.wear_depth[..., None]
-    motion = history.loop_displacement[..., 1:]
-    assert np.abs(lifted[always]).max() < 1e-2 * np.abs(motion).max()
-    # where much slips the slip is nearly all of the motion
-    distance = np.linalg.norm(motion[..., :, None, :] - motion[..., None, :, :], axis=-1).max(axis=(-2, -1))
-    slips = history.slip_range > 0.5 * history.slip_range.max()
-    assert distance[slips] == pytest.approx(history.slip_range[slips], rel=0.1, abs=0.0)
-
-
 # --- outcomes ---
 
 ALL = np.arange(3)
@@ -230,26 +204,3 @@ def test_pairs_that_do_not_hold_the_unworn_contact_cut_it_off_at_once(name, valu
     assert found.outcome is Outcome.CONTACT_CUT_OFF
     assert found.cut_off_cycle == 0.0
     assert found.mean_pressure[0].min() > 0.0
-
-
-@pytest.mark.slow
-def test_a_scar_that_grows_out_of_its_pairs_is_no_result():
-    # the same pairs, with and without some farther out
-    asked = {"sweep": "ramp", "settings": EDGE}
-    cut, whole = (
-        march_model(
-            build_scene("cylinder_on_flat", stroke=1e-5, strips=strips, half_width=width * A_LINE),
-            *(20.0, 1.0, 0.6, 5e-14, np.linspace(0.0, 4000.0, 9)),
-            **asked,
-        )
-        for strips, width in ((12, 1.5), (20, 2.5))
-    )
-    assert whole.outcome is Outcome.CONVERGED
-    assert cut.outcome is Outcome.CONTACT_CUT_OFF
-    assert 0.0 < cut.cut_off_cycle < 4000.0
-    before = cut.cycles < cut.cut_off_cycle
-    assert cut.wear_depth[before].max(axis=1) == pytest.approx(whole.wear_depth[before].max(axis=1), rel=0.02)
-    assert cut.wear_depth[-1].max() > 1.02 * whole.wear_depth[-1].max()
-    # it was computed to its end, and is kept
-    assert cut.last_cycle == 4000.0
-    assert np.isfinite(cut.worn_volume).all()

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from solver import build_model
-from solver.accuracy.resolved_state import Estimate, left_out
 from solver.continuation.first_state import solve_static_state
 from solver.continuation.natural import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.harmonic_balance.dlft import Balance
@@ -17,7 +16,7 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear import problem as control
-from solver.wear.check import choose_anew, needs_new_choice
+from solver.wear.check import choose_anew
 from solver.wear.problem import Adaptive, Given
 from solver.wear.step import moved_fraction, rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearState
@@ -136,31 +135,6 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     w, grown = h[1:] / h[:-1], np.diff(depth)
     expected = w**2 / (1 + 2 * w) * grown[:-1] + (1 + w) / (1 + 2 * w) * h[1:] * rate[2:]
     assert grown[1:] == pytest.approx(expected, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("harmonics", "share", "error", "anew"),
-    [
-        ("auto", 1.0, 0.8e-2, False),
-        # so much more is left out that the error may be above rtol
-        ("auto", 0.4, 0.8e-2, True),
-        # so little that fewer harmonics may do
-        ("auto", 100.0, 0.8e-2, True),
-        # chosen for a joint in which nothing slips
-        ("auto", 1.0, 0.0, True),
-        # given ones stay
-        (5, 0.01, 0.8e-2, False),
-    ],
-)
-def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(harmonics, share, error, anew):
-    """share: what was left out of the force when harmonics were chosen, over what is now."""
-    work = problem(Adaptive(1e-2)).setup
-    state = work.begin()
-    work.case = replace(work.case, settings=SolverSettings(harmonics, 64, rtol=1e-2))
-    now = left_out(state.resolution.orders, state.point.evaluation)
-    assert 1e-4 < now < 0.5
-    state = replace(state, left_out=share * now, estimate=Estimate(error, error), accurate=True)
-    assert needs_new_choice(work, state) is anew
 
 
 def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():

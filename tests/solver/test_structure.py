@@ -56,8 +56,7 @@ def test_analysis_undoes_synthesis_for_any_orders(orders, extra, seed):
 
 
 @pytest.mark.parametrize(
-    ("orders", "wanted"),
-    [((1, 2, 3, 4, 5), (1, 3, 5)), ((1, 3, 5), (1, 2, 5, 8)), ((), (1, 3)), ((1, 3), ())],
+    ("orders", "wanted"), [((1, 2, 3, 4, 5), (1, 3, 5)), ((1, 3, 5), (1, 2, 5, 8)), ((), (1, 3)), ((1, 3), ())]
 )
 def test_changed_orders_keep_the_harmonics_that_both_have(orders, wanted):
     values_h = np.random.default_rng(3).normal(size=(2, 3, 2 * len(orders) + 1))
@@ -248,13 +247,11 @@ def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series():
     cycles = np.array([0.0, 100.0, 250.0])
     expected = slider_wear_depth(
         cycles,
-        wear_coefficient=1.1e-14,
-        area=1e-4,
-        friction_coefficient=0.5,
+        lambda friction: den_hartog_amplitude(0.1, 1.6e5, 10.0, friction, 2.0 * np.pi * 160.0),
+        wear=1.1e-14,
         # the far end of the pressing spring stays where it is
-        normal_load=10.0 / (1.0 + 5e10 / 1e11),
-        normal_stiffness=1.0 / (1.0 / 5e10 + 1.0 / 1e11),
-        amplitude=lambda friction: den_hartog_amplitude(0.1, 1.6e5, 10.0, friction, 2.0 * np.pi * 160.0),
+        load=10.0 / (1.0 + 5e10 / 1e11),
+        stiffness=1.0 / (1.0 / 5e10 + 1.0 / 1e11),
     )
     history = march_wear(build_scene("sdof_slider", **springs), 160.0, 10.0, 0.5, 1.1e-14, cycles)
     assert expected[-1] > 0.3 * 10.0 / 5e10

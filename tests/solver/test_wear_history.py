@@ -156,14 +156,6 @@ def steps_and_volume(scene_name: str, start: StartState, settings: SolverSetting
 
 
 @pytest.mark.slow
-def test_a_pair_that_only_just_slips_goes_on_as_in_a_time_integration_of_every_cycle():
-    """With one slide for each step this pair sticks again."""
-    settings, omega = SolverSettings(9, 128), 2.0 * np.pi * 212.5
-    (start,) = branch_states(scene("dovetail_sector", 13, mesh=1), 0.5, 0.5, [omega], settings)
-    assert steps_and_volume("dovetail_sector", start, settings, 1e5)[1] == pytest.approx(2.026e-9, rel=4e-3)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("mesh", "frequency", "volume"), [(1, 212.6, 1.810), (2, 211.5, 2.261)])
 def test_where_pairs_slide_or_stick_again_the_history_is_that_of_a_time_integration(mesh, frequency, volume):
     """At 211.5 Hz the history of the whole way to the extrapolated end leads to another branch, 1.667 mm3."""

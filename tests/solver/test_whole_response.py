@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 
 from solver import Outcome, SolverSettings, balance_of, build_model, frequency_response, march_wear, response_curve
-from solver.continuation.first_state import solve_first_state
-from solver.continuation.transient import relax_to_periodic
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State
-from solver.newton.run import Run
 from solver.stability.floquet import Multipliers
-from solver.structure.joint import build_case
 from tests.benchmarks.ring import FRICTION, WEAR, ring_in_time
 from tests.contact_pair import ContactPair
 from tests.rings import one_sector
-from tests.solver.models import OMEGA, cyclic_model, dovetail, random_model, scene
+from tests.solver.models import OMEGA, cyclic_model, random_model, scene
 from tests.solver.reconstruction import harmonic_structure
 from tests.solver.test_continuation import GRAZING, WALL_OMEGA
 
@@ -37,14 +31,6 @@ def slipping(kind):
         force, model = 40.0, cyclic_model(3, ("3d", "3d"), 7, 5)
     settings = SolverSettings(harmonics=3, samples=64)
     return balance_of(model, OMEGA / (2.0 * np.pi), force, 0.4, settings=settings), model
-
-
-def test_the_jacobian_is_the_derivative_of_the_residual():
-    balance, _ = slipping("random")
-    exact = balance.jacobian(balance.state)
-    step = 1e-5 * np.abs(balance.state).mean() * np.random.default_rng(0).normal(size=balance.size)
-    ahead, back = (balance.residual(balance.state + sign * step) for sign in (1.0, -1.0))
-    assert np.linalg.norm(0.5 * (ahead - back) - exact @ step) < 1e-4 * np.linalg.norm(exact @ step)
 
 
 @pytest.mark.parametrize("kind", ["random", "travelling wave"])
@@ -232,25 +218,3 @@ def test_the_resonance_of_a_blade_with_friction_dampers_is_griffins(harmonics, w
     model, settings = damped_blade(limit, spring, ratio), SolverSettings(harmonics=harmonics, samples=1024)
     found = march_wear(model, "resonance", force, 0.5, 0.0, 1.0, between=(150.0, 200.0), settings=settings)
     assert abs(found.response[0, 0]) == pytest.approx(amplitude, rel=within)
-
-
-@pytest.mark.slow
-def test_the_dovetail_sector_settles_to_the_state_that_the_balance_has():
-    """Steps in time know nothing of the balance of a travelling wave but its matrices: from rest they lead to a state
-    whose motion differs from that raised gradually by the friction history alone.
-    """
-    settings, unworn, omega = SolverSettings(harmonics=3, samples=64), np.zeros(16), 2.0 * np.pi * 214.338
-    case = build_case(dovetail(3, 3), 0.5, omega, settings)
-    point, rest = (solve_first_state(case, omega, size, unworn, Run(settings.tolerance)) for size in (0.5, 1e-6))
-    assert isinstance(point, State)
-    assert point.evaluation.slip_work.sum() > 1e-9
-    assert isinstance(rest, State)
-    joint, quiet = case.joint(omega, 0.5), case.joint(omega, 0.0)
-    settled = relax_to_periodic(joint, unworn, rest, quiet, Run(settings.tolerance))
-    assert isinstance(settled, State)
-    one, other = (
-        joint.structure.response_h(joint.to_relative(at.evaluation.displacement_h))[0, 1:3] for at in (point, settled)
-    )
-    assert np.linalg.norm(one - other) < 0.05 * np.linalg.norm(one)
-    again = Balance(joint, settled.evaluation.history, unworn).evaluate(settled.evaluation.predicted_h)
-    assert again.scaled_residual() < 2.0 * settings.tolerance

@@ -37,13 +37,7 @@ def slider_start() -> tuple[ReducedModel, StartState]:
 
 
 def march(
-    step: float,
-    scheme: Scheme,
-    cycles: FloatArray = CYCLES,
-    *,
-    wear: float = WEAR,
-    rtol: float = 1e-2,
-    **asked: object,
+    step: float, scheme: Scheme, cycles: FloatArray = CYCLES, *, wear: float = WEAR, rtol: float = 1e-2, **asked: object
 ) -> WearHistory:
     """The history of the slider; asked: as of `models.march_wear`."""
     model, start = slider_start()
@@ -59,15 +53,7 @@ def problem(steps: Given | Adaptive, end: float = END, **asked: Any) -> WearProb
 
 def exact_depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray:
     """Depths (n,), m, for the exact motion, by Den Hartog."""
-    return slider_wear_depth(
-        cycles,
-        wear_coefficient=wear,
-        area=AREA,
-        friction_coefficient=FRICTION,
-        normal_load=10.0,
-        normal_stiffness=1e5,
-        amplitude=lambda limit: slider_amplitude(0.1, 0.0, 1.6e5, FORCE, limit, OMEGA),
-    )
+    return slider_wear_depth(cycles, lambda limit: slider_amplitude(0.1, 0.0, 1.6e5, FORCE, limit, OMEGA), wear=wear)
 
 
 @lru_cache

@@ -8,10 +8,10 @@ import pytest
 
 from solver.harmonic_balance.state import Failure
 from solver.missions import history as missions
-from solver.missions.block_run import BlockRun
-from solver.missions.mission import Passage
+from solver.missions.block_run import BlockResult
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
+from solver.settings import Passage
 from solver.wear.slow_time import Guide
 from studyrunner import task_runs
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
@@ -100,7 +100,7 @@ class FakedBlocks:
         for name in ("run_block", "run_passage"):
             monkeypatch.setattr(missions, name, self.run)
 
-    def run(self, case: Any) -> BlockRun | Failure:
+    def run(self, case: Any) -> BlockResult | Failure:
         """Wear with the rate k_w P A (1 - W / _DEPTH); the reference solution wears by 0.1 % more."""
         self.disturb(len(self.computed))
         self.computed.append(case)
@@ -112,7 +112,7 @@ class FakedBlocks:
         if block.name in self.fails:
             return Failure(self.fails[block.name])
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
-        return BlockRun(
+        return BlockResult(
             cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, guide=Guide((), 1.0), iterations=7
         )  # fmt: skip
 

@@ -149,6 +149,8 @@ def test_loop_is_closed(result):
         (lambda result: result.drop_vars("response_phase").fretwear.response(), "no response_phase: ask"),
         (lambda result: result.fretwear.loop(99), r"loops = \[99\]"),
         (lambda _: xr.Dataset().fretwear.summary(), "no result of a study"),
+        (lambda result: result[["wear_depth"]].fretwear.summary(), "no result of a study"),
+        (lambda result: result.isel(cycle=-1).fretwear.summary(), "cycle is no dimension"),
         (lambda _: join_results([]), "no results"),
         (lambda result: join_results([result, result.assign_attrs(scene_sha256="1")]), "name the key .* by dim="),
         (lambda result: join_results([result, result.isel(scheme=0)]), "different axes"),

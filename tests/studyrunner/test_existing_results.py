@@ -66,20 +66,6 @@ def test_what_is_left_of_another_study_stays(leave, other, name, solver, monkeyp
 
 
 @pytest.mark.slow
-def test_the_same_study_with_other_values_goes_on(solver):
-    assert main(SMALL) == 0
-    n_tasks = len(solver.tasks)
-    finer = [*SMALL, "--set", "axes.frequency=[100, 105, 110]"]
-    assert main(finer) == 0
-    assert len(solver.tasks) < 2 * n_tasks
-    with xr.open_dataset("out.nc") as result:
-        assert result.frequency.values.tolist() == [100.0, 105.0, 110.0]
-    # and so does the study that is in a result file
-    assert main(["out.nc", "-o", "again.nc"]) == 0
-    assert main([*finer, "-o", "again.nc"]) == 0
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["broken", "measured", "scene"])
 def test_what_is_no_result_is_not_replaced_at_all(kind, solver, capsys):
     if kind == "broken":

@@ -20,33 +20,11 @@ from tests.studyrunner.small_studies import MISSIONS, compute
 
 LINE = ("axes.frequency=160", "axes.sweep=up")
 ONE = (*LINE, "axes.wear_coefficient=1e-11")
-ENGINE = """
-[study]
-name = "engine"
-[scene]
-model = "dovetail_sector"
-mesh = 1
-[slow_time]
-missions = 10
-[axes]
-rotation_speed = [3000, 3100]
-excitation_amplitude = 0.5
-[[mission]]
-name = "own speed"
-rotation_speed = 2700
-engine_order = 4
-cycles = 100
-[[mission]]
-name = "speed of the axis"
-engine_order = 4
-seconds = 10
-"""
 
 
 @pytest.fixture(autouse=True)
 def studies(folder):
-    for name, text in (("missions", MISSIONS), ("engine", ENGINE)):
-        Path(f"{name}.toml").write_text(text, encoding="utf-8")
+    Path("missions.toml").write_text(MISSIONS, encoding="utf-8")
 
 
 @pytest.fixture
@@ -177,7 +155,10 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(capsys):
 
 
 def test_an_engine_order_is_a_frequency_by_the_speed_of_the_block():
-    study = read_study("engine.toml")
+    blocks = "{name = 'own speed', rotation_speed = 2700, engine_order = 4, cycles = 100}, "
+    blocks += "{name = 'speed of the axis', engine_order = 4, seconds = 10}"
+    axes = ("axes.rotation_speed=[3000, 3100]", "axes.excitation_amplitude=0.5")
+    study = read_study("mission", [*axes, f"mission=[{blocks}]"])
     assert tuple(study.dimensions) == ("wear_coefficient", "excitation_amplitude", "sweep", "rotation_speed")
     tasks = plan_of(study, 10).results
     assert [[block.frequency for block in task.blocks] for task in tasks] == [[180.0, 200.0], [180.0, 4 * 3100 / 60]]

@@ -11,10 +11,8 @@ from studyrunner.cli import main
 from studyrunner.report.contents import draw_report
 from studyrunner.report.page.page import write_page
 from studyrunner.result.view import open_for_report
-from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from tests.mpi.launching import options, results
-from tests.studyrunner.fakes import plan_of, points_of
 from tests.studyrunner.small_studies import compute
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("folder")]
@@ -108,16 +106,6 @@ def test_points_are_the_same_in_another_list(study, result):
         where = {"modal_amplitude": [amplitude], "cycle": [0.0], "mode": [1], "sample": [0]}
         one, other = (each.sel(where).drop_attrs(deep=False) for each in (found, result))
         xr.testing.assert_identical(one, other)
-
-
-def test_points_of_a_line_share_a_task(study):
-    """Lines that are equal are followed once."""
-    lines = read_study(study, ["scene.worn={depth=[[0.0], [0.0]], cycle=[1e4, 0]}", "axes.sweep=['up', 'down']"])
-    plan = plan_of(lines, 2)
-    assert plan.n_points == 2 * 2 * 2 * 3 * 2
-    assert {mode.amplitudes for mode in plan.results} == {(1e-6, 1e-4, 1e-3)}
-    points = [point for mode in plan.results for point in points_of(mode)]
-    assert len(set(points)) == len(points) == plan.n_points
 
 
 def test_the_report_draws_frequency_and_damping(result, path, folder):

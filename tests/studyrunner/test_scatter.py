@@ -46,14 +46,6 @@ def test_designs_fill_the_cube_and_further_columns_change_none(method):
         assert not np.array_equal(unit_design(method, 4, 256, 4), design)
 
 
-def test_a_scrambled_sobol_sequence_is_a_digital_net():
-    """128 points, of the first two columns: one in each cell of 2^-k times 2^-(7-k), as without scrambling."""
-    design = unit_design("sobol", 7, 128, 2)
-    for power in range(8):
-        cells = np.floor(design * [2**power, 2 ** (7 - power)])
-        assert len(np.unique(cells, axis=0)) == 128
-
-
 # --- the drawn values ---
 
 

@@ -1,4 +1,4 @@
-"""The model of a study: computed once, written to scene files, sent to ranks; its harmonics and its pairs."""
+"""The model of a study: computed once, written to scene files; its harmonics and its pairs."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,17 +12,15 @@ from studies import build_scene, read_scene
 from studies.fe_models.from_files import model as from_files
 from studies.scene_file import write_scene
 from studyrunner.cli import main
-from studyrunner.mpi.mapped_file import MappedFile, UnseenFileError, open_mapped
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.answers import write_study_scene
 from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics
-from studyrunner.scene_building import SceneModels, SceneTask, build_scene_task
+from studyrunner.scene_building import SceneTask, build_scene_task
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.mpi.launching import options
 from tests.studies.scene_models import plain, sector
-from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import CHEAP, SLIDER, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -145,60 +143,6 @@ def test_nodal_diameters_in_a_scene_file_bound_automatic_harmonics(n_harmonics, 
     Path("s.toml").write_text(text, encoding="utf-8")
     assert main(["s.toml", "--plan"]) == 0
     assert f"harmonics automatic (at most {n_harmonics}, for which" in capsys.readouterr().out
-
-
-# --- sent to ranks ---
-
-STIFFNESSES = (1.6e5, 1.7e5, 1.8e5)
-
-
-class Sent:
-    """What ranks get with tasks of three scenes."""
-
-    def __init__(self, folder):
-        study = read_study("sdof_slider", [f"axes.stiffness={list(STIFFNESSES)}"])
-        self.sweeps = {sweep.joint.scene: sweep for sweep in plan_of(study, 2).sweeps}
-        self.models = [build_scene("sdof_slider", stiffness=stiffness) for stiffness in STIFFNESSES]
-        self.read: list[int] = []
-        self._handed = SceneModels(self._read, folder / "out.nc.progress")
-
-    def _read(self, scene):
-        self.read.append(scene)
-        return self.models[scene]
-
-    def __call__(self, rank, scene, **given):
-        task = self._handed.with_model(rank, self.sweeps[scene], **given)
-        return task.models[0] if task.models else None
-
-
-def test_ranks_that_see_the_files_get_one_copy_and_others_their_own(folder):
-    sent = Sent(folder)
-    first, second = sent(0, 1), sent(1, 1)
-    assert isinstance(first, MappedFile)
-    assert first == second
-    assert sent.read == [1]
-    assert describe_scene(open_mapped(first)).digest == describe_scene(sent.models[1]).digest
-    assert sent(2, 1) == first
-    assert sent(2, 1, unseen=True) is sent.models[1]
-    assert sent(2, 0) is sent.models[0]
-    # each has it by now
-    assert [sent(rank, 1) for rank in (1, 2)] == [None, None]
-
-
-def test_a_file_goes_once_no_rank_holds_its_model(folder):
-    sent = Sent(folder)
-    given = sent(0, 0)
-    assert sent(1, 0) == given
-    for scene in (1, 2):
-        sent(0, scene)
-    assert open_mapped(given) is not None, "rank 1 may not have opened it yet"
-    for scene in (1, 2):
-        assert isinstance(sent(1, scene), MappedFile)
-    with pytest.raises(UnseenFileError):
-        open_mapped(given)
-    assert sent.read == [0, 1, 2]
-    assert isinstance(sent(0, 0), MappedFile)
-    assert sent.read == [0, 1, 2, 0]
 
 
 # --- pairs at the edge of a surface ---

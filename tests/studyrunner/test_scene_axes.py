@@ -94,13 +94,6 @@ def test_pairs_of_scenes_of_different_size_are_padded():
     assert rest.contact_area.isnull().all()
 
 
-def test_factors_of_a_surface_are_an_axis():
-    varied = read_study("cylinder_on_flat", ("axes.surfaces={flat=[0.5, 1.0]}", "wear.surfaces={cylinder=0.5}"))
-    factors = [dict(variant.wear.surfaces or {}) for variant in varied.variants]
-    assert factors == [{"cylinder": 0.5, "flat": 0.5}, {"cylinder": 0.5, "flat": 1.0}]
-    assert dict(varied.dimensions)["surfaces_flat"] == (0.5, 1.0)
-
-
 @pytest.mark.slow
 def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended():
     slider = ("axes.frequency=150", "axes.wear_coefficient=1e-10", "axes.excitation_amplitude=20", *THREE)

@@ -13,9 +13,7 @@ import pytest
 
 from studyrunner import task_runs
 from studyrunner.cli import main
-from studyrunner.mpi import dispatch
-from studyrunner.mpi.dispatch import CostModel, Dispatcher
-from studyrunner.mpi.mapped_file import UnseenFileError, open_mapped, write_mapped
+from studyrunner.mpi.mapped_file import open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.study.study_file import read_study
@@ -93,27 +91,6 @@ def test_several_processes_without_mpi_are_refused(monkeypatch):
         start_ranks()
 
 
-def test_what_waits_is_bounded(monkeypatch):
-    """A sweep does not go first where more waits than all ranks have use for."""
-    monkeypatch.setattr(dispatch, "_WAITING", 10)
-    monkeypatch.setattr(dispatch, "_WAITING_A_RANK", 0)
-    dispatcher = Dispatcher(1, CostModel(), time.monotonic)
-    dispatcher.add([Job("sweep", 1.0, 4, True)] * 50)
-    most, n_done, waiting = 0, 0, 0
-    while not dispatcher.done:
-        ((rank, number, task),) = dispatcher.assign()
-        for _ in range(task.n_results):
-            dispatcher.deliver(rank, number, 1.0)
-            if task.gives_starts:
-                dispatcher.add([Job("history", 1.0)])
-                waiting += 1
-        if not task.gives_starts:
-            n_done, waiting = n_done + 1, waiting - 1
-        most = max(most, waiting)
-    assert (n_done, waiting) == (200, 0)
-    assert most < 10 + 4
-
-
 # --- arrays in a file that several processes map, and which ranks see it ---
 
 
@@ -130,20 +107,6 @@ def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path
     assert other["c"].flags.aligned
     assert other["f"].flags.f_contiguous
     assert other["n"] is None
-
-
-def test_a_task_is_sent_again_with_what_its_rank_does_not_see():
-    sent, handler = [], TaskHandler()
-    handler.begin, handler.take = lambda: [Job("a", 1.0)], lambda *_: []
-    handler.prepare = lambda _, job, **given: sent.append(given) or job
-
-    def run(*_):
-        if len(sent) == 1:
-            raise UnseenFileError("file")
-        yield 1
-
-    serve_tasks(Ranks(), handler, run)
-    assert sent == [{}, {"unseen": True}]
 
 
 # --- what a user sees ---
@@ -217,12 +180,3 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
             assert progress.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
     assert progress.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
     assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
-
-
-def test_a_sweep_says_where_it_is():
-    """What a sweep sends on its way, by `Keep`, stands behind its name."""
-    progress = TaskProgress(MemoryIndex(tasks_of()))
-    (sweep, *_) = progress.begin()
-    progress.keep(sweep, "at 211.5 Hz, 3 of 48 pairs slip or open")
-    (running,) = progress.look([(sweep, sweep.n_results, 1.0)]).running
-    assert running.endswith("(at 211.5 Hz, 3 of 48 pairs slip or open)")

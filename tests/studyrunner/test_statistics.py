@@ -14,7 +14,6 @@ from studyrunner.statistics.samples import (
     FEWEST,
     SampleValues,
     deciding_pair,
-    density,
     exceedance,
     quantiles,
     rank_correlations,
@@ -169,16 +168,6 @@ def test_the_jump_of_the_dovetail_is_found():
     assert two_groups(known(volume, error=0.2)) is None  # the gap is not longer than the errors beside it
 
 
-def test_the_density_has_both_peaks_and_the_weight_of_one():
-    rng = np.random.default_rng(1)
-    values = known(np.r_[rng.normal(1.55, 0.03, 40), rng.normal(2.25, 0.01, 88)])
-    grid = np.linspace(1.3, 2.5, 1201)
-    found = density(values, two_groups(values), grid)
-    assert np.trapezoid(found, grid) == pytest.approx(1.0, abs=1e-3)
-    assert np.trapezoid(found[grid > 1.9], grid[grid > 1.9]) == pytest.approx(88 / 128, abs=1e-3)
-    assert grid[np.argmax(found)] == pytest.approx(2.25, abs=0.01)
-
-
 def test_samples_without_a_value_are_placed_where_their_bounds_say():
     values = np.r_[np.linspace(1.5, 1.6, 60), np.linspace(2.2, 2.3, 60)]
     assert two_groups(without(values, [3, 100], np.where(np.arange(120) == 100, 2.0, 1.0))).sizes == (59, 60)
@@ -298,15 +287,6 @@ def test_two_hills_are_reported_with_the_pair_that_decides():
     assert f"two groups, {128 - n_above} samples" in said(found)
     weight = np.trapezoid(found["worn_volume_density"][0], found["worn_volume_grid"][0])
     assert weight == pytest.approx(1.0, abs=0.05)
-
-
-def test_samples_of_zero_width_say_one_value():
-    found = worn_volume_statistics(sample_file(SCATTER.replace("0.03", "0").replace("1.5", "1").replace("1e-7", "0")))
-    last = found["worn_volume_quantile"].isel(cycle=-1)
-    np.testing.assert_array_equal(last, last.isel(quantile=0).broadcast_like(last))
-    assert found["rank_correlation"].isnull().all()
-    assert (found["group_size"].isel(group=1) == 0).all()
-    assert "decides" not in said(found)
 
 
 def test_what_has_no_samples_is_refused():

@@ -4,7 +4,6 @@ import shutil
 from pathlib import Path
 
 import h5py
-import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -95,22 +94,6 @@ def test_a_written_scene_gives_the_same_result():
 
 
 # --- of a bundled scene that is kept in the result ---
-
-
-def test_the_result_is_enough(not_built):
-    assert main([*SLIDER, "-o", "plain.nc"]) == 0
-    assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
-    plain, kept = results("plain.nc"), results("kept.nc")
-    assert {name for name in kept.attrs if kept.attrs[name] != plain.attrs[name]} == {"study", "id"}
-    xr.testing.assert_identical(kept.drop_attrs(), plain.drop_attrs())
-    with netCDF4.Dataset("plain.nc") as file:
-        assert "scene" not in file.groups
-    not_built()
-    assert main(["kept.nc", "-o", "again.nc"]) == 0
-    xr.testing.assert_identical(results("again.nc"), kept)
-    assert groups("kept.nc") == groups("again.nc")
-    assert main(["again.nc", "--write-scene", "slider.h5"]) == 0
-    assert describe_scene(read_scene("slider.h5")).digest == kept.attrs["scene_sha256"]
 
 
 def test_it_is_the_model_in_the_file_that_is_run_and_another_scene_or_solver_is_said(not_built, monkeypatch, capsys):

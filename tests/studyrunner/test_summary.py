@@ -112,6 +112,8 @@ def test_nothing_wore_says_why():
     assert summary(slips).values["wear"]["largest_slip"] == 1e-6
     some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)
     assert "at 3 of 9 points" in summary(some).lines[0]
+    early = wearing("axes.frequency=1", volume=lambda _: np.where(np.arange(21.0) > 5, np.nan, 1e-9))
+    assert "worn_volume" not in summary(early.isel(cycle=[-1])).values.get("wear", {})
     two = ("axes.frequency=[1, 2]", "axes.scheme=adaptive")
     unknown = wearing(*two, volume=lambda p: 1e-9 * p[0], error_estimate=lambda p: 0.01 + p[0])
     assert "at 1 of 2 points" in summary(unknown).lines[0]
@@ -178,23 +180,6 @@ def test_the_shortest_life():
         )
     )
     assert at_once.values["life"]["count"] == 0.0
-
-
-def test_a_target_before_the_second_count_and_one_without_a_unit():
-    volume = np.where(np.arange(21) > 0, math.nan, 0.0)
-    made = wearing(
-        "axes.frequency=1",
-        "axes.scheme=adaptive",
-        "slow_time.until={frequency_shift=0.01}",
-        volume=lambda _: volume,
-        cycles_to_target=lambda _: 300.0,
-        cycles_to_target_error=lambda _: 3.0,
-        error_estimate=lambda _: math.nan,
-    )
-    lines = summary(made).lines
-    assert any("slow_time.outputs: give more" in line for line in lines)
-    assert any("to frequency shift 0.01 " in line for line in lines)
-    assert "doubt" not in summary(made.assign(worn_volume=made["worn_volume"].fillna(0.0))).values
 
 
 # --- certainty and failures ---

@@ -124,22 +124,6 @@ def test_pairs_without_loops_take_no_room(tmp_path):
     assert 0.4 * sizes[0] < sizes[1] < 0.6 * sizes[0]
 
 
-def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
-    results = fake_results()
-    results[0] = (results[0][0], without_values(results[0][1], 6))
-    assert write(results, tmp_path / "out.nc") == {0: 7, 6: 1}
-    with xr.open_dataset(tmp_path / "out.nc") as opened:
-        (point,) = results[0][0]
-        assert opened.outcome.values[point] == 6
-        meanings = opened.outcome.attrs["flag_meanings"].split()
-        assert [meanings[number] for number in (0, 6, 12, 15)] == ["converged", "inaccurate", "crashed", "sensitive"]
-        for name, (dimensions, _) in CONTRACT.items():
-            if "cycle" in dimensions:
-                there = opened[name].values[point]
-                assert (np.isnan(there) if there.dtype.kind == "f" else there == 0).all(), name
-                assert "0 where there is no result" in opened[name].attrs.get("comment", "") or there.dtype.kind == "f"
-
-
 @pytest.mark.parametrize(("overrides", "bytes_a_slab"), [((), 1e9), ((*SHARED, LOOP), 3000.0), ((WEAR_RATE,), 1.0)])
 def test_the_file_is_the_one_of_the_plain_twin(overrides, bytes_a_slab, tmp_path, monkeypatch):
     """Whatever is in memory at once, and in whatever order the results came: every value, attribute and encoding."""
@@ -223,43 +207,23 @@ print(json.dumps([n_checks, found, broken]))
 """
 """A process of its own: the checker is not free of warnings, and it would ask the network for tables that it lacks."""
 
-STUDY = """
-[study]
-name = "everything"
-[scene]
-model = "scene.h5"
-friction_coefficient = 0.5
-[axes]
-frequency = [211.5, 212.0]
-wear_coefficient = 1e-11
-excitation_amplitude = 0.5
-scheme = ["implicit", "adaptive"]
-sweep = "up"
-harmonics = [1, 2]
-[slow_time]
-cycles = 500
-outputs = 3
-[outputs]
-variables = ["default", "natural_frequency"]
-loops = [0, 3]
-"""
+EVERYTHING = (
+    *("scene.mesh=1", "scene.stuck_modes=5", "scene.retention_stiffness=1e7", "axes.frequency=[211.5, 212.0]"),
+    *("axes.scheme=['implicit', 'adaptive']", "axes.harmonics=[1, 2]", "slow_time.cycles=500", "slow_time.outputs=3"),
+    *("outputs.variables=['default', 'natural_frequency']", "outputs.loops=[0, 3]", "outputs.scene=true"),
+)
 
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     """A result with all that one can have: loops, mesh, group of the scene, text, a point that failed."""
-    folder = tmp_path_factory.mktemp("compliance")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        coarse = options("scene.mesh=1", "scene.stuck_modes=5", "scene.retention_stiffness=1e7")
-        assert main(["dovetail", "--write-scene", "scene.h5", *coarse]) == 0
-        Path("everything.toml").write_text(STUDY, encoding="utf-8")
-        assert main(["everything.toml"]) in (0, 3)
-        with netCDF4.Dataset("everything.nc", "r+") as file:
-            # as it is where a computation breaks off
-            file["outcome"][0, 0, 0, 0, 0, 0, 0] = 11
-            file["message"][0, 0, 0, 0, 0, 0, 0] = "ZeroDivisionError: division by zero"
-    return folder / "everything.nc"
+    path = tmp_path_factory.mktemp("compliance") / "everything.nc"
+    assert main(["dovetail", "-o", str(path), *options(*EVERYTHING)]) in (0, 3)
+    with netCDF4.Dataset(path, "r+") as file:
+        # as it is where a computation breaks off
+        file["outcome"][0, 0, 0, 0, 0, 0, 0] = 11
+        file["message"][0, 0, 0, 0, 0, 0, 0] = "ZeroDivisionError: division by zero"
+    return path
 
 
 @pytest.mark.slow
@@ -291,14 +255,9 @@ def test_the_header_reads_like_documentation(result):
         for name in (*USUAL, *LOOPS, "jump_cycle", "run_time", "contact_area", "phase", "wear_coefficient"):
             assert known[name].comment in getattr(file[name], "comment", ""), name
         outcome = file["outcome"]
-        n_flags = len(outcome.flag_values)
-        assert n_flags == len(outcome.flag_meanings.split()) == len(outcome.sentences.split("\n"))
-        assert set(np.unique(outcome[:])) <= set(outcome.flag_values.tolist())
-        for text, words in (
-            (file.comment, ("positive when the pair closes", "compression", "Re(X exp(i omega t))")),
-            (file.summary, ("scene.h5 with", "frequency 211.5 to 212 (2 values)", "scheme implicit, adaptive")),
-            (file.versions, ("fretwear", "numpy", "scipy", "numba", "h5py", "netCDF4", "Python")),
-        ):
-            assert all(word in text for word in words)
+        assert len(outcome.flag_values) == len(outcome.flag_meanings.split()) == len(outcome.sentences.split("\n"))
+        assert all(
+            word in file.versions for word in ("fretwear", "numpy", "scipy", "numba", "h5py", "netCDF4", "Python")
+        )
         assert [len(each) for each in (file.scene_sha256, file.solver_digest, file.id)] == [64, 32, 32]
         assert file["scene"].comment

@@ -24,6 +24,7 @@ MANY_SETS = "".join(f"*NSET,NSET=A{n}\nA{n + 1}\n" for n in range(5000)) + "*NSE
         (LEAST + "*NSET,NSET=A\nB\n*NSET,NSET=B\n1,C\n*NSET,NSET=C\nA\n", "the set A contains itself"),
         (LEAST + MANY_SETS, "is more than 100 sets deep"),
         (LEAST + "*SURFACE,NAME=S\n1,S5\n", "deck.inp, line 9: .*elements of 1 have no face S5"),
+        (LEAST + "*SOLID SECTION,ELSET=E,MATERIAL=M\n", "deck.inp, line 8: .*there is no material M"),
         (LEAST + "*MATERIAL,NAME=M\n*DENSITY\n0\n", "deck.inp, line 9: .*a density of 0"),
         (LEAST + "*CYCLIC SYMMETRY MODEL,N=1e9\n0,0,0,0,0,1\n", "deck.inp, line 8: .*N=1e9"),
         (PART.replace("*End Assembly", "*Instance,name=B,part=C\n"), r"line 38: \*INSTANCE: B of C"),

@@ -10,7 +10,6 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-import xarray as xr
 from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 
 from studies.scene import SurfaceMesh
@@ -320,16 +319,6 @@ def test_figures_are_saved_as_svg_and_png_for_a_page_and_for_a_column(tmp_path):
         assert [int.from_bytes(png[16:20]) for png in pngs] == [2250, 1065]
         assert [path.read_bytes() for path in draw_figure(make_result(), name).save(tmp_path)] == contents_of
     assert dict(mpl.rcParams) == before
-
-
-def test_variables_are_read_no_more_than_needed(tmp_path):
-    path = tmp_path / "made.nc"
-    make_result().dataset.to_netcdf(path)
-    with xr.open_dataset(path) as dataset:
-        list(draw_report(Result(path, dataset)))
-        # values of the pairs are read for the points shown; what is small is kept
-        assert not dataset["wear_depth"].variable._in_memory
-        assert not dataset["mean_pressure"].variable._in_memory
 
 
 def test_a_history_with_values_at_its_first_count_only_is_drawn_without_a_warning():

@@ -74,16 +74,6 @@ def test_the_finest_setting_is_the_reference_and_what_it_does_not_resolve_is_not
                 assert point.is_clear("volume")[row] == (expected >= 3.0 * 2e-4)
 
 
-@pytest.mark.parametrize(("scheme", "is_best"), [("implicit", True), ("explicit", False)])
-def test_of_the_finest_the_one_with_the_least_error_is_the_reference_but_no_explicit_one(scheme, is_best):
-    result = finest_file(2e-4)
-    best = {"step": 0, "scheme": AXES["scheme"].index(scheme), "harmonics": 3}
-    result.dataset["error_estimate"][best] = 1e-5
-    for point in compare_settings(result):
-        expected = Setting(scheme, 10.0, 9.0) if is_best else Setting("adaptive", None, 9.0)
-        assert point.settings[point.reference] == expected
-
-
 def test_the_front_is_that_of_all_pairs_compared():
     (point, _) = compare_settings(finest_file(math.nan, exact=True))
     time, error = point.time, point.errors["volume"]

@@ -1,5 +1,7 @@
 """The result file as the report reads it, how well volumes are known, and the command `study-report`."""
 
+import errno
+import os
 from html import unescape
 
 import numpy as np
@@ -11,10 +13,9 @@ from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, 
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Missing, Table
 from studyrunner.report.page.page import write_page
-from studyrunner.report.selection import choose
 from studyrunner.result.view import open_for_report
 from studyrunner.summary.certainty import certainty_of
-from studyrunner.units import scale_for, show_cycles, show_number, show_power
+from studyrunner.units import scale_for
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure
 from tests.studyrunner.results import build_file, fail, make_result
@@ -34,15 +35,6 @@ def test_the_shown_point_wears_most_of_those_to_be_trusted_or_is_chosen(tmp_path
             open_for_report(tmp_path / "out.nc", wrong)
 
 
-def test_combinations_within_the_limit_are_all_chosen():
-    choice = choose(make_result(sweep=["up", "down"]), ["frequency"], 4)
-    assert choice.labels == tuple(
-        f"{scheme} scheme, sweep {sweep}" for scheme in ("implicit", "explicit") for sweep in ("up", "down")
-    )
-    assert choice.sentence == ""
-    assert {point["frequency"] for point in choice.points} == {2}
-
-
 @pytest.mark.parametrize(
     ("units", "largest", "shown"),
     [
@@ -60,18 +52,6 @@ def test_combinations_within_the_limit_are_all_chosen():
 )
 def test_prefixes_fit_the_values(units, largest, shown):
     assert scale_for(units, [np.nan, 0.1 * largest, -largest]).show(largest) == shown
-
-
-def test_numbers_in_words():
-    assert show_number(1234.5678) == "1234.57"
-    assert show_number(23412.87, 4) == "23\N{NO-BREAK SPACE}410"
-    assert show_number(2.1234567e11 + 0.5, 4) == "2.123e+11"
-    assert [show_cycles(count) for count in (123456.0, 1, 0)] == [
-        "123\N{NO-BREAK SPACE}456 cycles",
-        "1 cycle",
-        "0 cycles",
-    ]
-    assert " ".join(map(show_power, (1.0, 0.1, 1e-12, 1e4, 2e-3, 0.0))) == "1 10⁻¹ 10⁻¹² 10⁴ 0.002 "
 
 
 def test_the_certainty_stands_on_the_page(tmp_path):
@@ -178,6 +158,13 @@ def test_bad_input_is_one_line(draw, tmp_path, capsys, arguments, key):
     assert line.startswith("study-report: ")
     assert key in line
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results", "text.nc"]
+
+
+def test_a_full_disk_is_one_line(draw, capsys):
+    draw(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+    assert main(["results/worn.x.nc", "-o", "out", "--no-compute"]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith('study-report: command line: -o = "out": ')
 
 
 @pytest.mark.processes

@@ -98,8 +98,7 @@ def half_space(model):
 
 
 @pytest.mark.parametrize(
-    ("model", "row"),
-    [("cylinder_on_flat", np.arange(12)), ("sphere_on_flat", np.flatnonzero(Y == 1e-5))],
+    ("model", "row"), [("cylinder_on_flat", np.arange(12)), ("sphere_on_flat", np.flatnonzero(Y == 1e-5))]
 )
 def test_the_scar_is_symmetric_and_that_of_the_pairs(model, row):
     result = half_space(model)
