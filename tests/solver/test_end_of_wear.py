@@ -41,13 +41,6 @@ def test_the_count_is_that_at_which_the_history_has_the_wear(scheme):
     assert found.newton_iterations < whole.newton_iterations
 
 
-def test_a_wear_that_is_not_reached_changes_nothing():
-    found, whole = march(4000.0, "adaptive", until=WearTarget("wear_depth", 1.0)), march(4000.0, "adaptive")
-    assert np.isnan([found.cycles_to_target, found.cycles_to_target_error]).all()
-    assert np.array_equal(found.wear_depth, whole.wear_depth)
-    assert np.array_equal(found.worn_volume_error, whole.worn_volume_error)
-
-
 def exact_count(frequency, depth):
     """Cycles until the slider is worn so deep."""
     pair = DenHartogSlider(0.1, 1.6e5, 10.0, 2 * np.pi * frequency), 0.5, 10.0, 1e5, AREA, ARCHARDS_WORK

@@ -1,7 +1,6 @@
 """Static states, found under any friction, or the reason why there is none; first periodic states; shakedown."""
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -30,16 +29,6 @@ from tests.studies.fe_models.solid_meshes import block, joined
 SETTINGS = SolverSettings(harmonics=3, samples=64)
 OMEGA = 2.0 * np.pi * 211.5
 PRESS = 200.0  # N on each pair: with it the glued dovetail pulls nowhere
-
-
-@lru_cache
-def pressed_dovetail():
-    """The coarse dovetail with so much more load on its flanks that all pairs of the glued structure are pressed."""
-    model = dovetail()
-    linear = model.linear[0]
-    load = linear.load_static.copy()
-    load[model.contact.dofs[:, 0]] += PRESS
-    return replace(model, linear={0: replace(linear, load_static=load)})
 
 
 def static_forces(model, friction):
@@ -79,8 +68,12 @@ def stacked(force, direction=(0.0, 0.0, -1.0), interference=None, edge=False):
 
 
 def test_beyond_the_friction_that_holds_all_pairs_the_static_state_is_the_glued_one():
-    model = pressed_dovetail()
-    linear = model.linear[0]
+    # so much more load on the flanks that all pairs of the glued structure are pressed
+    model = dovetail()
+    load = model.linear[0].load_static.copy()
+    load[model.contact.dofs[:, 0]] += PRESS
+    linear = replace(model.linear[0], load_static=load)
+    model = replace(model, linear={0: linear})
     condensed = condense(np.real(linear.stiffness), model.contact.dofs.ravel(), linear.load_static)
     force = np.real(condensed.force).reshape(-1, 3)
     # from this friction coefficient on the glued structure slips nowhere

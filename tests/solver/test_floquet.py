@@ -4,22 +4,24 @@
 """
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
 
 from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.stability.disturbances import build_monodromy, switching_pairs
-from solver.stability.floquet import multipliers_of
+from solver.stability.floquet import find_instability, multipliers_of
 from solver.structure.joint import build_case
 from tests.solver.exact_scenes import drawn
 from tests.solver.models import march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
+
+SETTINGS = SolverSettings()
 
 
 @pytest.fixture
@@ -28,31 +30,9 @@ def presented(monkeypatch):
     monkeypatch.setattr(frequency_sweep, "find_instability", lambda *_: None)
 
 
-def start_of(model, friction, excitation, frequency, settings):
-    ((_, start),) = follow_branch(model, friction, excitation, np.array([frequency]), "up", settings)
+def start_of(model, friction, excitation, frequency):
+    ((_, start),) = follow_branch(model, friction, excitation, np.array([frequency]), "up", SETTINGS)
     return start
-
-
-def state_at(model, friction, excitation, frequency, settings=None):
-    """The state that a sweep up comes to."""
-    settings = settings or SolverSettings()
-    start = start_of(model, friction, excitation, frequency, settings)
-    case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
-    joint = case.joint(2.0 * np.pi * frequency, excitation)
-    return case, joint, evaluated(joint, start.state)[1]
-
-
-@lru_cache
-def state_of(kind, seed, damping=1.0):
-    """A drawn scene, its damping times a factor, and its state."""
-    scene = drawn(kind, seed)
-    scene = replace(scene, damping=damping * scene.damping)
-    case, joint, at = state_at(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
-    return scene, case, joint, at
-
-
-def marched(joint, at, n_samples):
-    return multipliers_of(build_monodromy(joint, at, n_samples), every=True)
 
 
 def largest(multipliers):
@@ -76,9 +56,14 @@ def largest(multipliers):
     ],
 )
 def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed):
-    scene, _, joint, at = state_of(kind, seed)
-    exact = scene.orbit_next_to(joint, at.displacement_h).multipliers()
-    assert largest(marched(joint, at, 512)) == pytest.approx(largest(exact), abs=allowed)
+    scene = drawn(kind, seed)
+    start = start_of(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
+    case = build_case(scene.model, scene.friction, start.penalty_omega, SETTINGS, start.resolution)
+    joint = case.joint(scene.omega, scene.excitation)
+    at = evaluated(joint, start.state)[1]
+    exact = largest(scene.orbit_next_to(joint, at.displacement_h).multipliers())
+    assert largest(multipliers_of(build_monodromy(joint, at, 512), every=True)) == pytest.approx(exact, abs=allowed)
+    assert (find_instability(case, joint, at, Run(SETTINGS.tolerance)) is not None) == (exact > 1.0)
 
 
 def with_matrices(name, **matrices):
@@ -103,16 +88,16 @@ DRIVEN = np.array([[-0.5, -0.02], [-0.02, 0.02]])
 )
 def test_a_growing_vibration_is_no_result(name, matrices, asked):
     model, (friction, excitation, frequency) = with_matrices(name, **matrices), asked
-    start = start_of(model, friction, excitation, frequency, SolverSettings())
+    start = start_of(model, friction, excitation, frequency)
     assert start.outcome is Outcome.UNSTABLE
     assert start.state is None
-    history = march_wear(model, friction, start, 1e-9, 1.0, "implicit", np.zeros(1), SolverSettings())
+    history = march_wear(model, friction, start, 1e-9, 1.0, "implicit", np.zeros(1), SETTINGS)
     assert (history.outcome, history.message) == (start.outcome, start.message)
     assert np.isnan(history.response).all()
 
 
 def test_a_state_that_sticks_all_over_is_that_of_its_structure():
-    start = start_of(with_matrices("two_masses", damping=DRIVEN), 50.0, 20.0, 0.05, SolverSettings())
+    start = start_of(with_matrices("two_masses", damping=DRIVEN), 50.0, 20.0, 0.05)
     assert start.outcome is Outcome.UNSTABLE
     # for 20 s
     assert f"{np.exp(0.25 * 20.0):.3g}" in start.message

@@ -179,10 +179,6 @@ def test_a_singular_operator_gives_what_can_be_had_and_ends():
     # next to nothing but what lies out of reach is left
     assert 0.3 <= np.linalg.norm(matrix @ found - right) < 0.6
     assert count < 3 * STAGNATION_PRODUCTS
-    # the part that it reaches is no harder than with any other operator
-    found, converged, _ = gmres(matrix, reached, 1e-6, 60)
-    assert converged
-    assert np.linalg.norm(matrix @ found - reached) <= 1e-6 * np.linalg.norm(reached)
     assert not gmres(np.full((5, 5), np.nan), np.ones(5), 1e-3, 5)[1]
 
 

@@ -14,7 +14,7 @@ from solver.model import needed_nodal_diameters
 from solver.settings import Resolution, SolverSettings
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, condense, frequency_slope, relative_indices
-from solver.structure.fourier import build_basis, change_orders, from_complex, to_complex
+from solver.structure.fourier import build_basis, from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.joint import build_case
 from solver.structure.penalty import build_penalty
@@ -41,34 +41,12 @@ def test_a_complex_amplitude_is_the_real_part_of_a_rotation_forwards():
     assert np.array_equal(values_h[:, 0], static)
 
 
-@pytest.mark.parametrize(("orders", "samples"), [((1, 2, 3), 6), ((1, 3, 5), 10), ((), 0)])
-def test_samples_that_alias_are_refused(orders, samples):
-    with pytest.raises(ValueError, match="samples"):
-        build_basis(orders, samples)
-
-
 @given(orders=st.sets(st.integers(1, 30), max_size=8), extra=st.integers(1, 20), seed=st.integers(0, 2**31))
 def test_analysis_undoes_synthesis_for_any_orders(orders, extra, seed):
     ascending = tuple(sorted(orders))
     basis = build_basis(ascending, 2 * max(ascending, default=0) + extra)
     values_h = np.random.default_rng(seed).normal(size=(3, 2 * len(orders) + 1))
     assert values_h @ basis.synthesis @ basis.analysis == pytest.approx(values_h, abs=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("orders", "wanted"), [((1, 2, 3, 4, 5), (1, 3, 5)), ((1, 3, 5), (1, 2, 5, 8)), ((), (1, 3)), ((1, 3), ())]
-)
-def test_changed_orders_keep_the_harmonics_that_both_have(orders, wanted):
-    values_h = np.random.default_rng(3).normal(size=(2, 3, 2 * len(orders) + 1))
-    changed = change_orders(values_h, orders, wanted)
-    assert changed.shape == (2, 3, 2 * len(wanted) + 1)
-    assert np.array_equal(changed[..., 0], values_h[..., 0])
-    before, after = to_complex(values_h), to_complex(changed)
-    for place, order in enumerate(wanted):
-        if order in orders:
-            assert np.array_equal(after[..., place], before[..., orders.index(order)])
-        else:
-            assert not after[..., place].any()
 
 
 # --- condensation ---

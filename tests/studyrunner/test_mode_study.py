@@ -19,18 +19,10 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("folder")]
 
 # a mass on a rigid slider has its mode while it slides: above 1e-5 m sqrt(kg)
 SLIDER = """
-[study]
-name = "slider_modes"
-[scene]
-model = "sdof_slider"
-worn = {depth = [[1e-6], [0.0]], cycle = [1e4, 0]}
-[axes]
-modal_amplitude = [1e-3, 1e-6, 1e-4]
-mode = [1, 3]
-sweep = "down"
-[scatter]
-samples = 2
-friction_coefficient = {normal = {std = 0.03}}
+study = {name = "slider_modes"}
+scene = {model = "sdof_slider", worn = {depth = [[1e-6], [0.0]], cycle = [1e4, 0]}}
+axes = {modal_amplitude = [1e-3, 1e-6, 1e-4], mode = [1, 3], sweep = "down"}
+scatter = {samples = 2, friction_coefficient = {normal = {std = 0.03}}}
 """
 
 

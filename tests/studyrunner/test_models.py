@@ -204,8 +204,10 @@ def test_a_table_of_nodes_with_matrices_wears_as_the_deck(capsys):
 # --- a deck without cyclic symmetry, against Hertz ---
 
 CYLINDER = """
-[study]
-name = "cylinder"
+study = {name = "cylinder"}
+axes = {frequency = 50.0, wear_coefficient = 1e-11, excitation_amplitude = 20.0}
+slow_time = {cycles = 1e4, outputs = 2}
+solver = {rtol = 5e-2}
 [scene]
 model = "cylinder.inp"
 units = "mm-t-s"
@@ -215,15 +217,6 @@ tolerance = 1e-4
 friction_coefficient = 0.1
 load = {set = "TOP", direction = [1, 0, 0]}
 preload = [{set = "TOP", direction = [0, 0, -1], force = 363.0}]
-[axes]
-frequency = 50.0
-wear_coefficient = 1e-11
-excitation_amplitude = 20.0
-[slow_time]
-cycles = 1e4
-outputs = 2
-[solver]
-rtol = 5e-2
 """
 
 

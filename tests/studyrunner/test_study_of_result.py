@@ -23,23 +23,12 @@ OUTPUTS = ("slow_time.outputs=2", 'outputs.variables=["default"]', "outputs.loop
 LEVELS = ("solver.harmonics=2", "solver.samples=64")
 WAVE = ("scene.nodal_diameter=3", "scene.n_sectors=20")
 STUDY = """
-[study]
-name = "dovetail"
-title = "Fretting wear of a dovetail root around the first bending mode"
-[scene]
-model = "scene.h5"
-friction_coefficient = 0.5
-[axes]
-scheme = "implicit"
-frequency = [211.5, 212.0]
-excitation_amplitude = 0.5
-[slow_time]
-cycles = 500
-outputs = 2
-[solver]
-rtol = 0.1
-[outputs]
-loops = [3]
+study = {name = "dovetail", title = "Fretting wear of a dovetail root around the first bending mode"}
+scene = {model = "scene.h5", friction_coefficient = 0.5}
+axes = {scheme = "implicit", frequency = [211.5, 212.0], excitation_amplitude = 0.5}
+slow_time = {cycles = 500, outputs = 2}
+solver = {rtol = 0.1}
+outputs = {loops = [3]}
 """
 SLIDER = ["sdof_slider", *options("axes.frequency=[150, 160]", "slow_time.cycles=2000", "slow_time.outputs=3")]
 SLIDER += options("outputs.variables=['default', 'exact']")

@@ -5,13 +5,11 @@ import pytest
 
 from studyrunner import open_result
 from studyrunner.accessor import join_results
-from studyrunner.cli import main
 from studyrunner.report.figures.wear import draw_excitation
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from studyrunner.variables import CERTIFICATE, LOOPS, OF_A_HISTORY, USUAL
-from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import UNWORN, compute
 
@@ -143,19 +141,6 @@ def test_the_frequency_of_each_count_is_in_the_result_and_in_the_report(capsys):
     # the middle of the range is no frequency of the point
     assert "205" not in shown.describe(shown.shown, ["frequency"])
     shown.dataset.close()
-
-
-def test_every_point_without_a_resonance_says_why(capsys):
-    # so little excitation that the slider sticks: its resonance is far above the range
-    small = ("axes.excitation_amplitude=1.0", "slow_time.cycles=10.0", "scatter.samples=2")
-    scatter = "scatter.excitation_amplitude={uniform={half_width=0.1}}"
-    assert main(["sdof_slider", "-o", "out.nc", *options(*FOLLOWED, *small, scatter)]) == 3
-    said = capsys.readouterr().out
-    messages = {str(message) for message in results().message.values.ravel()}
-    assert messages == {"the sweep up meets no resonance between 180 and 230 Hz: give another range"}
-    assert "another axes.sweep" in said
-    assert "ramp" not in said
-    assert "205 Hz" not in said
 
 
 def test_each_scene_and_each_sample_has_its_own_frequency():

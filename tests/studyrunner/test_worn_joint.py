@@ -82,24 +82,11 @@ def test_the_command_draws_what_it_computes_and_says_what_is_wrong(path, tmp_pat
 # --- room for wear ---
 
 SLIDING = """
-[study]
-name = "sliding"
-[scene]
-model = "cylinder_on_flat"
-stroke = 10e-6
-friction_coefficient = 0.8
-P = 20e3
-strips = 12
-[axes]
-frequency = 20.0
-wear_coefficient = 1e-13
-sweep = "ramp"
-[slow_time]
-cycles = 2000
-outputs = 5
-[solver]
-harmonics = 3
-samples = 32
+study = {name = "sliding"}
+scene = {model = "cylinder_on_flat", stroke = 10e-6, friction_coefficient = 0.8, P = 20e3, strips = 12}
+axes = {frequency = 20.0, wear_coefficient = 1e-13, sweep = "ramp"}
+slow_time = {cycles = 2000, outputs = 5}
+solver = {harmonics = 3, samples = 32}
 """
 
 
