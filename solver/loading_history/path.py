@@ -19,7 +19,6 @@ from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, first_resolution
-from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
@@ -50,10 +49,6 @@ of the dovetail at 211 Hz is three times as large, with 0 there are a few nodes 
 
 LEAST_SLIP = 1e-3
 """Slip of a pair over its motion above which it forgets its history."""
-
-SAMPLES_OF_SIGN = 4
-"""Samples over those of a node that is unstable with fewer. Underplatform damper of nodal diameter 2, 30 stable states
-from 273.7 Hz on: 128 samples find four unstable, 512 samples none."""
 
 S = TypeVar("S", bound=State)
 
@@ -184,20 +179,10 @@ class LoadingPath(Path[State]):
         return self.near(replace(start, parameter=target), begin, history, run)
 
     def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:
-        """As in Path. Too few samples may turn the sign of the determinant where many pairs slip and open: a state is
-        unstable where it is so with more.
-        """
+        """As in Path."""
         balance = self.balance_at(state.parameter, history)
         found = run.state(balance, predicted_h, state.parameter, NEAR_ITERATIONS)
-        if found is None or run.is_stable(balance, found.evaluation):
-            return found
-        joint, basis = balance.joint, balance.joint.basis
-        # the predicted force of masses on rigid ground depends on the length of a sample
-        if joint.law.rate_dependent:
-            return None
-        fine = replace(joint, basis=build_basis(basis.orders, SAMPLES_OF_SIGN * basis.n_samples))
-        finer = replace(balance, joint=fine)
-        return found if run.fresh().is_stable(finer, finer.evaluate(found.evaluation.predicted_h)) else None
+        return found if found is not None and run.is_stable_finely(balance, found.evaluation) else None
 
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Failure:
         """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the

@@ -159,10 +159,11 @@ def set_from_zero(panel: Axes, largest: float | None = None) -> None:
 
 def label_outer(panels: NDArray[Any]) -> None:
     """Labels of axes at the left and below only; at the left of all panels of a narrow figure."""
+    # not seen, but in the file of the numbers
     for panel in [] if is_narrow() else panels[:, 1:].flat:
-        panel.set_ylabel("")
+        panel.yaxis.label.set_visible(False)
     for panel in panels[:-1].flat:
-        panel.set_xlabel("")
+        panel.xaxis.label.set_visible(False)
 
 
 def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:

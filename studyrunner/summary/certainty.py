@@ -103,7 +103,8 @@ def _advise_error(result: Result, place: tuple[int, ...], error: float) -> str:
     if "scheme" in result.axes:
         scheme = str(result.dataset["scheme"].values[place[result.axes.index("scheme")]])
     if scheme not in _OWN_STEPS:
-        return 'scheme = "adaptive" or a smaller step'
+        by_depth = scheme == "explicit" and "largest_depth" in result.study.get("slow_time", {})
+        return f'scheme = "adaptive" or a smaller {"slow_time.largest_depth" if by_depth else "step"}'
     if error >= _FAR * rtol:
         return "a smaller solver.rtol"
     # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller

@@ -174,3 +174,11 @@ def test_a_constant_load_wears_without_end_at_the_rate_of_its_path():
 def test_what_cannot_be_integrated_to_the_end_is_named(cycles, more, key):
     with pytest.raises(ValueError, match=f"^{key}"):
         march_model(build_scene("sdof_slider"), 160.0, 10.0, 0.5, 1e-11, cycles, **more)
+
+
+@pytest.mark.slow
+def test_a_travelling_wave_whose_last_state_is_unstable_only_with_few_samples_is_stable():
+    model = build_scene("dovetail_sector", mesh=1, nodal_diameter=3)
+    settings = SolverSettings(rtol=0.1)
+    found = march_model(model, 214.42358972, 1.5, 0.5, WEAR, [0.0, 1500.0, 3000.0], settings=settings)
+    assert found.outcome is Outcome.CONVERGED

@@ -195,6 +195,12 @@ def test_every_point_is_compared_with_its_own_rtol():
     assert summary(wearing(*study, error_estimate=lambda _: 5e-4)).values["certainty"]["n_known"] == 2
 
 
+@pytest.mark.parametrize(("more", "limit"), [((), "step"), (("slow_time.largest_depth=1e-7",), "largest_depth")])
+def test_what_limits_explicit_steps_is_to_be_smaller(more, limit):
+    made = wearing("axes.frequency=1", "axes.scheme=explicit", "axes.step=100", *more, error_estimate=lambda _: 0.1)
+    assert summary(made).values["certainty"]["advice"].endswith(limit)
+
+
 def test_points_that_failed_or_were_never_estimated_are_not_known():
     outcomes, errors = {(0, 0): FAILED, (0, 1): INACCURATE, (0, 2): SENSITIVE}, {(0, 0): 9.0, (0, 1): 0.03, (0, 2): 1.2}
     made = wearing(
