@@ -93,7 +93,8 @@ def _of_wear(result: Result, point: dict[str, int]) -> Iterator[Finding]:
     text = f"{_known(volume, error, 'm3')} after {show_cycles(end, result.counted)} at {where}"
     if n_left_out:
         more = f"{count(n_left_out, 'case')} without a known volume"
-        text += f", the most of {n_compared} cases; {more} may wear more"
+        best = f"the most of {n_compared} cases" if n_compared > 1 else "the only known case"
+        text += f", {best}; {more} may wear more"
     volumes, ranking = _of_samples(result)
     values = {"point": point, "worn_volume": volume, "error": error, "count": end}
     values |= {"n_compared": n_compared, "n_left_out": n_left_out}
