@@ -157,35 +157,36 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     last = int(rows[-1])
     if history.cycles[last] >= history.cut_off_cycle:
         return Outcome.CONTACT_CUT_OFF, describe_cut_off(history.cut_off_cycle / slower)
-    outcome, said = Outcome.CONVERGED, []
+    outcome, sentences = Outcome.CONVERGED, []
     error = float(history.worn_volume_error[last])
     if error > SENSITIVE_ERROR:
         volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
         coarser = "with longer steps, fewer harmonics and a coarser sweep"
-        outcome, said = Outcome.SENSITIVE, [describe_uncertain(*volumes, error, rtol, coarser)]
+        outcome, sentences = Outcome.SENSITIVE, [describe_uncertain(*volumes, error, rtol, coarser)]
     # inf means "never", but is the count of a final state, too
     elif math.inf > history.inaccurate_from <= history.cycles[last]:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
-        said = [begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"]
+        sentences = [begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"]
         outcome = Outcome.INACCURATE
     if math.inf > history.held_from <= history.cycles[last]:
-        said.append(
+        sentences.append(
             f"from cycle {in_digits(history.held_from / slower)} on every pair slips and only friction holds the joint"
             f" in one direction: its mean position is held there, by at most {HELD_FORCE:g} of the friction"
         )
-    return outcome, "; ".join(said)
+    return outcome, "; ".join(sentences)
 
 
 def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: float) -> float:
     """Estimated relative error of the last worn volume of a history; NaN where there is none, as where a history
     reaches its target before its first count.
 
-    counts, error, rate (n,): of cycles or missions that were reached; errors of the worn volume and wear rates there.
+    counts, error, rate (n,): of cycles or missions; errors of the worn volume, NaN where not reached, and wear rates.
     last: count that was computed.
     """
-    if not counts.size or (counts[-1] == 0.0 and last > 0.0 and bool(rate[-1] > 0.0)):
+    reached = np.flatnonzero(~np.isnan(error))
+    if not reached.size or (counts[reached[-1]] == 0.0 and last > 0.0 and bool(rate[reached[-1]] > 0.0)):
         return math.nan
-    return float(error[-1])
+    return float(error[reached[-1]])
 
 
 def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:

@@ -1,5 +1,8 @@
 """A joint that wears: its state, from which a history goes on, and how its states are solved.
 
+A `StartState` of a sweep has a `PeriodicState`, which is evaluated (`WearingJoint.unworn_state`) and becomes a `State`,
+as Newton's method gives it. A `WearState` has a `State` at a cycle count, and all with which the history goes on.
+
 A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
 amplitude (`solver.continuation.phase_lag`).
 """
@@ -112,10 +115,11 @@ class WearingJoint:
     """The joint of one wear history.
 
     case: model, friction and settings. start: unworn state, which exists; its load is that of the history.
-    wear_coefficient: 1/Pa. law: part of the slip work that wears.
+    wear_coefficient: 1/Pa. law: part of the slip work that wears; wearing_work: of the pairs by this law.
     follow: what the frequency of the excitation follows, None for the frequency of the unworn state.
-    area (n_contact,): m2. wearing: wearing work of the law.
-    run: counts the iterations, limits the time, and has a factorisation from one solve to the next.
+    area (n_contact,): m2.
+    run: counts the iterations, limits the time, and has a factorisation from one solve to the next. A fresh one lets
+        the next solve depend on the state alone.
     """
 
     def __init__(
@@ -130,7 +134,7 @@ class WearingJoint:
         self.case, self.start, self.wear_coefficient, self.follow = case, start, wear_coefficient, follow
         self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude
         self.area = case.model.contact.area
-        self.wearing = wearing_work(law, case.model.contact, case.friction_coefficient)
+        self.wearing_work = wearing_work(law, case.model.contact, case.friction_coefficient)
         self.run = Run(case.settings.tolerance)
         self._last: tuple[Case, Joint] | None = None
 
@@ -139,7 +143,7 @@ class WearingJoint:
         last = self._last
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
             case = replace(self.case, hold=state.hold).at(state.resolution)
-            self.drop_factor()
+            self.run = self.run.fresh()
         elif state.omega != last[1].omega:
             case = last[0]
         else:
@@ -155,26 +159,19 @@ class WearingJoint:
         """The balance that a state solves at constant wear depth."""
         return Balance(self.joint_of(state), state.at.history, state.depth)
 
-    def drop_factor(self) -> None:
-        """Drop the factorisation, so that the next solve depends on the state alone."""
-        self.run = self.run.fresh()
-
-    def is_stable(self, state: WearState) -> bool:
-        """Whether a state is stable at constant wear depth."""
-        return self.run.is_stable_finely(self.balance_of(state), state.at)
-
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
         return cycles * self.wear_coefficient / self.area
 
-    def begin(self, of: PeriodicState | None = None) -> WearState:
-        """The unworn state, or that of the reference sweep, evaluated and not solved again."""
-        start, state = self.start, of or self.unworn
-        balance, at = evaluated(self.case.at(start.resolution).joint(state.omega, self.excitation_amplitude), state)
+    def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
+        """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
+        start, periodic = self.start, periodic or self.unworn
+        joint = self.case.at(start.resolution).joint(periodic.omega, self.excitation_amplitude)
+        balance, at = evaluated(joint, periodic)
         nothing = np.zeros(self.area.size + 1)
-        begun = WearState(
+        state = WearState(
             0.0,
-            state.omega,
+            periodic.omega,
             State(at, final_history(balance, at)),
             start.resolution,
             left_out(start.resolution.orders, at),
@@ -186,9 +183,9 @@ class WearingJoint:
             # the stability of a start state has been checked
             judged_h=at.predicted_h,
         )
-        return self.with_rates(begun)
+        return self.with_rates(state)
 
-    def begin_reference(self) -> WearState:
+    def unworn_state_of_reference(self) -> WearState:
         """The unworn state of the reference solution.
 
         The state of the reference sweep has another tangential history, which may decide whether a pair goes on
@@ -196,23 +193,23 @@ class WearingJoint:
         0.106 mm3; both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep
         is taken.
         """
-        fine, reference = self.unworn, self.start.reference
-        begun = self.begin(reference)
+        own, reference = self.unworn, self.start.reference
+        state = self.unworn_state(reference)
         if reference is None:
-            return begun
-        history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
-        balance = Balance(self.joint_of(begun), history, begun.depth)
-        point = self.run.state(balance, begun.at.predicted_h, most=NEAR_ITERATIONS)
-        return begun if point is None else self.with_rates(replace(begun, point=point))
+            return state
+        history = own.start_history + 2.0 * (reference.start_history - own.start_history)
+        balance = replace(self.balance_of(state), history=history)
+        point = self.run.state(balance, state.at.predicted_h, most=NEAR_ITERATIONS)
+        return state if point is None else self.with_rates(replace(state, point=point))
 
     def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, Eqs. (7), (21), (25)."""
-        rate = self.gain(1.0) * self.wearing.work(*worn_by(state.at))
+        rate = self.gain(1.0) * self.wearing_work.work(*worn_by(state.at))
         volumes = rate * self.area
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
-        most = max(state.most_rate, self.wear_coefficient * (self.wearing.largest_factor * moved))
+        most = max(state.most_rate, self.wear_coefficient * (self.wearing_work.largest_factor * moved))
         rates = np.append(volumes, volumes.sum())
         largest = np.maximum(state.largest_rates, np.abs(rates))
         return replace(state, rate=rate, rates=rates, largest_rates=largest, most_rate=most)
@@ -241,7 +238,7 @@ class WearingJoint:
         return self.with_rates(replace(state, point=point, omega=omega, lag=lag, half_width=half_width))
 
     def at_followed(self, state: WearState) -> WearState | Failure:
-        """The state at the frequency that is followed, with its depths and its tangential history."""
+        """The state at the frequency that is followed, with its depth and its tangential history."""
         if self.follow is None:
             return state
         found = self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS)
@@ -251,11 +248,11 @@ class WearingJoint:
         """The end of a history whose frequency leaves its range, or beyond whose last state none is found."""
         wanted, frequency = self.follow, state.omega / (2.0 * math.pi)
         assert wanted is not None
-        said = "ends: no state beyond is found to go on with"
+        reason = "ends: no state beyond is found to go on with"
         if not wanted.low <= frequency <= wanted.high:
-            said = f"is out of the range from {wanted.low:g} to {wanted.high:g} Hz"
+            reason = f"is out of the range from {wanted.low:g} to {wanted.high:g} Hz"
         at = f"at cycle {in_digits(state.cycle)} and {frequency:.6g} Hz"
-        return Failure(Outcome.RESONANCE_LOST, f"{at} the {wanted.of} {said}")
+        return Failure(Outcome.RESONANCE_LOST, f"{at} the {wanted.of} {reason}")
 
     def frequency_error(self, state: WearState) -> float:
         """Error of a followed frequency, Hz; 0 for a given one. The phase lag is wrong by as much as the amplitude, and

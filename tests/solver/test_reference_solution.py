@@ -6,7 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.accuracy.history_error import (
+from solver.harmonic_balance.state import Failure
+from solver.outcome import Outcome
+from solver.packing import Packed
+from solver.settings import SolverSettings
+from solver.wear import problem
+from solver.wear.errors import (
     HISTORY_SAFETY,
     PAIR_OVER_VOLUME,
     Compared,
@@ -14,11 +19,6 @@ from solver.accuracy.history_error import (
     error_of_given_steps,
     history_error,
 )
-from solver.harmonic_balance.state import Failure
-from solver.outcome import Outcome
-from solver.packing import Packed
-from solver.settings import SolverSettings
-from solver.wear import problem
 from solver.wear.history import integrate_together
 from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
