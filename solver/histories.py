@@ -31,7 +31,7 @@ from solver.settings import (
 )
 from solver.structure.joint import friction_of_pairs
 from solver.wear.history import integrate_together
-from solver.wear.problem import WearRequest, steps_of
+from solver.wear.wearing_joint import WearRequest, steps_of
 
 
 def march_wear(

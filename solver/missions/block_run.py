@@ -9,7 +9,6 @@ import numpy as np
 import scipy.linalg
 
 from solver.clock import computing_time
-from solver.contact.wear_law import WearLaw
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, State, vibration_change
@@ -28,10 +27,10 @@ from solver.settings import Direction, Passage, Resolution
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
 from solver.wear.errors import HISTORY_SAFETY
-from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of
+from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.wearing_joint import Adaptive, WearingJoint, WearRequest, WearState
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
@@ -135,9 +134,16 @@ class BlockInput:
         return replace(self.block.model, contact=replace(contact, gap=contact.gap + self.depth))
 
     @property
-    def law(self) -> WearLaw:
-        """The wear law from the depth on."""
-        return self.mission.law.begun_at(self.depth)
+    def counts(self) -> FloatArray:
+        """Cycle counts (2,) at start and end of a block of steady vibration."""
+        return np.array([0.0, self.block.cycles or 0.0])
+
+    @property
+    def request(self) -> WearRequest:
+        """The wear history of the block, with the wear law from the depth before on."""
+        mission, law = self.mission, self.mission.law.begun_at(self.depth)
+        steps = Adaptive(mission.settings.rtol)
+        return WearRequest(mission.wear_coefficient, steps, self.counts, law=law, ends_at_last=True)
 
     @property
     def time_left(self) -> float:
@@ -159,7 +165,7 @@ class BlockInput:
 
     def wearing_joint(self, start: StartState) -> tuple[WearingJoint, WearState]:
         """The joint at the depth before the block, and a state of it."""
-        wearing = WearingJoint(self.case_of(start), start, self.mission.wear_coefficient, self.law)
+        wearing = WearingJoint(self.case_of(start), start, self.request)
         return wearing, wearing.unworn_state()
 
 
@@ -168,16 +174,11 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
     start, sweep = find_start(given)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    case, counts, steps = (
-        given.case_of(start),
-        np.array([0.0, given.block.cycles]),
-        Adaptive(given.mission.settings.rtol),
-    )
-    request = WearRequest(given.mission.wear_coefficient, steps, counts, law=given.law, ends_at_last=True)
+    case, counts = given.case_of(start), given.counts
     if given.guide is None:
-        problem = WearProblem(case, start, request, stable_end=given.with_switching)
+        problem = WearProblem(case, start, given.request, stable_end=given.with_switching)
     else:
-        problem = reference_of(case, start, request, given.guide, counts)
+        problem = reference_of(case, start, given.request, given.guide, counts)
     solution = Integrator(given.time_left).integrate(problem)
     if solution.failure is not None:
         return solution.failure

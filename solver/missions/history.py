@@ -18,9 +18,9 @@ from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
 from solver.newton.run import Run, guarded
-from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
+from solver.outcome import Outcome, known_to
 from solver.packing import Packed, packable
-from solver.results.history import describe_cut_off, describe_uncertain, last_error
+from solver.results.history import describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import Passage
 from solver.wear.errors import Compared, HistoryError, compare, error_of_target
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Solution
@@ -252,23 +252,21 @@ def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[
 
 def _judged(mission: MissionRequest, state: MissionState, history: MissionHistory) -> tuple[Outcome, str]:
     """The outcome of a complete history, and its sentence."""
-    rtol = mission.settings.rtol
-    if state.cut_off_from < math.inf:
-        return Outcome.CONTACT_CUT_OFF, describe_cut_off(state.cut_off_from, "mission")
-    outcome, sentences, inaccurate = Outcome.CONVERGED, [], np.asarray(state.inaccurate)
-    if history.error_estimate > SENSITIVE_ERROR:
-        outcome, last = Outcome.SENSITIVE, np.flatnonzero(np.isfinite(history.worn_volume))[-1]
-        volumes = history.worn_volume[last], history.reference_volume[last]
-        sentences.append(describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps"))
-    elif inaccurate.any():
-        outcome, name = Outcome.INACCURATE, mission.called(int(inaccurate.argmax()))
-        sentences.append(f"in {name} the vibration {known_to(float(inaccurate.max()), rtol)}")
+    rtol, inaccurate, about_state, about_hold = mission.settings.rtol, np.asarray(state.inaccurate), "", ""
+    last = np.flatnonzero(np.isfinite(history.worn_volume))[-1]
+    volumes = history.worn_volume[last], history.reference_volume[last]
+    uncertain = describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps")
+    cut_off = describe_cut_off(state.cut_off_from, "mission") if state.cut_off_from < math.inf else ""
+    if inaccurate.any():
+        name = mission.called(int(inaccurate.argmax()))
+        about_state = f"in {name} the vibration {known_to(float(inaccurate.max()), rtol)}"
     if state.held_from < math.inf:
-        sentences.append(
+        about_hold = (
             f"from mission {state.held_from:.0f} on only friction holds the joint in one direction: it is held there"
         )
+    passages = []
     for place in np.flatnonzero(history.sweep_rate > LARGEST_SWEEP_RATE):
         name, rate = mission.called(int(place)), history.sweep_rate[place]
         passes = f"passes at {rate:.2g} (zeta f)^2" if np.isfinite(rate) else "has no damping where the joint sticks"
-        sentences.append(f"{name} {passes}: it may wear otherwise than its steady states (see the error)")
-    return outcome, "; ".join(sentences)
+        passages.append(f"{name} {passes}: it may wear otherwise than its steady states (see the error)")
+    return verdict(history.error_estimate, uncertain, about_state, cut_off, about_hold, *passages)

@@ -155,25 +155,37 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     if not rows.size:
         return Outcome.CONVERGED, ""
     last = int(rows[-1])
-    if history.cycles[last] >= history.cut_off_cycle:
-        return Outcome.CONTACT_CUT_OFF, describe_cut_off(history.cut_off_cycle / slower)
-    outcome, sentences = Outcome.CONVERGED, []
-    error = float(history.worn_volume_error[last])
-    if error > SENSITIVE_ERROR:
-        volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
-        coarser = "with longer steps, fewer harmonics and a coarser sweep"
-        outcome, sentences = Outcome.SENSITIVE, [describe_uncertain(*volumes, error, rtol, coarser)]
+    at, error = history.cycles[last], float(history.worn_volume_error[last])
+    volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
+    uncertain = describe_uncertain(*volumes, error, rtol, "with longer steps, fewer harmonics and a coarser sweep")
+    cut_off = describe_cut_off(history.cut_off_cycle / slower) if at >= history.cut_off_cycle else ""
+    inaccurate = held = ""
     # inf means "never", but is the count of a final state, too
-    elif math.inf > history.inaccurate_from <= history.cycles[last]:
+    if math.inf > history.inaccurate_from <= at:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
-        sentences = [begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"]
-        outcome = Outcome.INACCURATE
-    if math.inf > history.held_from <= history.cycles[last]:
-        sentences.append(
+        inaccurate = begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"
+    if math.inf > history.held_from <= at:
+        held = (
             f"from cycle {in_digits(history.held_from / slower)} on every pair slips and only friction holds the joint"
             f" in one direction: its mean position is held there, by at most {HELD_FORCE:g} of the friction"
         )
-    return outcome, "; ".join(sentences)
+    return verdict(error, uncertain, inaccurate, cut_off, held)
+
+
+def verdict(error: float, uncertain: str, inaccurate: str, cut_off: str, *notes: str) -> tuple[Outcome, str]:
+    """Outcome of a complete history of wear or of missions, and its sentence.
+
+    error: of the last worn volume, relative; uncertain: sentence in case it is too large. The other sentences are ""
+    where there is nothing to say: about states above rtol, about a contact that is cut off, and additions.
+    """
+    if cut_off:
+        return Outcome.CONTACT_CUT_OFF, cut_off
+    outcome, reason = Outcome.CONVERGED, ""
+    if error > SENSITIVE_ERROR:
+        outcome, reason = Outcome.SENSITIVE, uncertain
+    elif inaccurate:
+        outcome, reason = Outcome.INACCURATE, inaccurate
+    return outcome, "; ".join(filter(None, (reason, *notes)))
 
 
 def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: float) -> float:

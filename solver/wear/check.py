@@ -37,9 +37,7 @@ Checked = tuple[WearState, dict[str, Any]]
 """A state that passed the check, possibly with other harmonics than before, and its report."""
 
 
-def full_check(
-    wearing: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
-) -> Checked | Failure:
+def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
     """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
     certificate = None if (anew := needs_new_choice(wearing, state)) else _certificate(wearing, state)
     # more harmonics or samples may suffice
@@ -64,7 +62,7 @@ def full_check(
         if (unstable := find_instability(case, joint, state.at, wearing.run, False)) is not None:
             return unstable
         state = replace(state, judged_h=state.at.predicted_h)
-    report = report_state(joint, state.at, certificate, loops, with_resonance=with_resonance)
+    report = report_state(joint, state.at, certificate, wearing.request.loops, with_resonance=wearing.shifts)
     return state, report | {"excitation_frequency_error": wearing.frequency_error(state)}
 
 
@@ -76,9 +74,7 @@ def _certificate(wearing: WearingJoint, state: WearState) -> Certificate | None:
     return found if found.holds(wearing.case.settings.tolerance) else None
 
 
-def report_only(
-    wearing: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
-) -> Checked:
+def report_only(wearing: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...]) -> Checked:
     """A state of a reference solution with its report, where it is found with the harmonics wanted at its count."""
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
@@ -86,7 +82,7 @@ def report_only(
         point = wearing.run.move(case, case.at(wanted).joint(state.omega, wearing.excitation_amplitude), state.point)
         moved = point and wearing.at_followed(wearing.with_rates(replace(state, point=point, resolution=wanted)))
         state = moved if isinstance(moved, WearState) else state
-    return state, report_state(wearing.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=with_resonance)
+    return state, report_state(wearing.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=wearing.shifts)
 
 
 def needs_new_choice(wearing: WearingJoint, state: WearState) -> bool:

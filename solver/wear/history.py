@@ -20,9 +20,9 @@ from solver.results.state_report import LOOP_PHASES
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
 from solver.wear.errors import compare, error_of_target
-from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest, reference_of
+from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Course, Guide, Integrator, Node, Solution
-from solver.wear.wearing_joint import WearState
+from solver.wear.wearing_joint import Adaptive, Given, WearRequest, WearState
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
 

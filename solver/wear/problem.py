@@ -13,13 +13,11 @@ steps, 1.89 mm3, with steps of 250 cycles 1.90; the truth is 2.03.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, replace
-from typing import ClassVar
+from dataclasses import astuple, replace
 
 import numpy as np
 
 from solver.accuracy.resolved_state import fewer, shifted
-from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray, ReducedModel
@@ -29,19 +27,17 @@ from solver.results.history import StartState
 from solver.settings import (
     FIRST_HARMONICS,
     ROUND_OFF,
-    FollowedFrequency,
     Resolution,
     Scheme,
     SolverSettings,
     ToTheEnd,
-    WearTarget,
 )
 from solver.structure.joint import Case
 from solver.wear.check import full_check, is_final, report_only, unstable_at_end, wears_without_end
 from solver.wear.jump import jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import allowed_error, attempt_step, explicit_step_limit, too_long
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.wearing_joint import Adaptive, Given, WearingJoint, WearRequest, WearState
 
 HISTORY_ITERATIONS = 3000
 """Most Newton iterations of a history or a reference solution, in addition to `NEAR_ITERATIONS` for each step. A
@@ -67,70 +63,6 @@ DOUBLINGS_ACROSS = 4
 across, by 3, 2, 2 and 4 doublings, errors 0.1 to 2.7 times the allowed ones; else `march_failed` at 846 cycles."""
 
 
-@dataclass(frozen=True)
-class Given:
-    """Euler steps of `length` cycles, which end at its multiples also after a shorter step: equal steps in `k_w h` of
-    histories that differ in k_w only. To the end of wear, each step wears about as much as the first one.
-
-    depth: in place of the length, wear of the fastest pair at the rate of the start of a step, m, Eq. (22).
-    """
-
-    length: float
-    scheme: Scheme = "implicit"
-    depth: float | None = None
-
-
-@dataclass(frozen=True)
-class Adaptive:
-    """BDF2 steps with a relative error of the worn volume near `rtol`. The last cycle count is interpolated.
-
-    first: length of the first step, cycles; 0: by the explicit step limit.
-    """
-
-    rtol: float
-    first: float = 0.0
-    scheme: ClassVar[Scheme] = "adaptive"
-
-
-def steps_of(scheme: str, length: float, rtol: float, largest_depth: float | None = None) -> Given | Adaptive:
-    """The steps of a scheme by its name, "final" included; largest_depth: in place of the length of explicit steps."""
-    if scheme in ("adaptive", "final"):
-        return Adaptive(rtol)
-    return Given(length, "explicit", largest_depth) if scheme == "explicit" else Given(length)
-
-
-@dataclass(frozen=True)
-class WearRequest:
-    """What a wear history is asked for, Eqs. (20) to (26).
-
-    wear_coefficient: k_w, 1/Pa. law: part of the slip work that wears.
-    cycles (n_output,): ascending counts to report, the first 0; the last Euler step ends at the last one. Or
-        `ToTheEnd`: until nothing wears any more; not with explicit steps, which cannot grow.
-    until: target of the wear, with whose step the history ends. loops: pairs with reported fretting loops.
-    ends_at_last: whether the last adaptive step ends at the last count, for a joint that vibrates otherwise from there.
-    follow: what the frequency of the excitation follows; None for that of the start state.
-    """
-
-    wear_coefficient: float
-    steps: Given | Adaptive
-    cycles: FloatArray | ToTheEnd
-    law: WearLaw = ARCHARD
-    until: WearTarget | None = None
-    loops: tuple[int, ...] = ()
-    ends_at_last: bool = False
-    follow: FollowedFrequency | None = None
-
-    @property
-    def end(self) -> float:
-        """Last cycle count; inf where it is not known."""
-        return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
-
-    def with_steps(self, steps: Adaptive, counts: FloatArray) -> WearRequest:
-        """The same with other steps, to the last of some counts (n,), whatever target is reached before."""
-        never = self.until and replace(self.until, value=math.inf)
-        return replace(self, steps=steps, cycles=counts, until=never)
-
-
 class WearProblem(WearingJoint):
     """The joint of a history, or of the reference solution of an adaptive one, as `SlowProblem`; stepped by `take_step`
     over its cycles.
@@ -151,8 +83,8 @@ class WearProblem(WearingJoint):
         *,
         stable_end: bool = False,
     ) -> None:
-        super().__init__(case, start, request.wear_coefficient, request.law, request.follow)
-        self.request, self.steps, self.guide, self.stable_end = request, request.steps, guide, stable_end
+        super().__init__(case, start, request)
+        self.steps, self.guide, self.stable_end = request.steps, guide, stable_end
         if guide is not None:
             self.run = self.run.with_tolerance(case.settings.rough_tolerance)
             coarse = tuple((count, coarser(resolution, case.model)) for count, resolution in guide.resolutions)
@@ -179,11 +111,7 @@ class WearProblem(WearingJoint):
             end, local = self.step(state), course.nodes[-1].values["local"]
         if isinstance(end, Failure):
             return end
-        with_resonance = request.until is not None and request.until.quantity == "frequency_shift"
-        if self.guide is None:
-            checked = full_check(self, end, request.loops, with_resonance=with_resonance)
-        else:
-            checked = report_only(self, end, self.guide.resolutions, with_resonance=with_resonance)
+        checked = full_check(self, end) if self.guide is None else report_only(self, end, self.guide.resolutions)
         if isinstance(checked, Failure):
             return checked
         after, report = checked

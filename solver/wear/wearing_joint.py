@@ -1,4 +1,4 @@
-"""A joint that wears: its state, from which a history goes on, and how its states are solved.
+"""A joint that wears: what its history is asked for, its state, from which it goes on, and how its states are solved.
 
 A `StartState` of a sweep has a `PeriodicState`, which is evaluated (`WearingJoint.unworn_state`) and becomes a `State`,
 as Newton's method gives it. A `WearState` has a `State` at a cycle count, and all with which the history goes on.
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -26,11 +27,75 @@ from solver.outcome import Outcome, in_digits
 from solver.packing import packable
 from solver.results.history import PeriodicState, StartState
 from solver.results.state_report import evaluated
-from solver.settings import FollowedFrequency, Resolution
+from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case, Hold, Joint
 
 NO_WEAR = 1e-12
 """Fraction of `WearState.most_rate`: a joint that wears less sticks, and its rate is round-off."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """Euler steps of `length` cycles, which end at its multiples also after a shorter step: equal steps in `k_w h` of
+    histories that differ in k_w only. To the end of wear, each step wears about as much as the first one.
+
+    depth: in place of the length, wear of the fastest pair at the rate of the start of a step, m, Eq. (22).
+    """
+
+    length: float
+    scheme: Scheme = "implicit"
+    depth: float | None = None
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """BDF2 steps with a relative error of the worn volume near `rtol`. The last cycle count is interpolated.
+
+    first: length of the first step, cycles; 0: by the explicit step limit.
+    """
+
+    rtol: float
+    first: float = 0.0
+    scheme: ClassVar[Scheme] = "adaptive"
+
+
+def steps_of(scheme: str, length: float, rtol: float, largest_depth: float | None = None) -> Given | Adaptive:
+    """The steps of a scheme by its name, "final" included; largest_depth: in place of the length of explicit steps."""
+    if scheme in ("adaptive", "final"):
+        return Adaptive(rtol)
+    return Given(length, "explicit", largest_depth) if scheme == "explicit" else Given(length)
+
+
+@dataclass(frozen=True)
+class WearRequest:
+    """What a wear history is asked for, Eqs. (20) to (26).
+
+    wear_coefficient: k_w, 1/Pa. law: part of the slip work that wears.
+    cycles (n_output,): ascending counts to report, the first 0; the last Euler step ends at the last one. Or
+        `ToTheEnd`: until nothing wears any more; not with explicit steps, which cannot grow.
+    until: target of the wear, with whose step the history ends. loops: pairs with reported fretting loops.
+    ends_at_last: whether the last adaptive step ends at the last count, for a joint that vibrates otherwise from there.
+    follow: what the frequency of the excitation follows; None for that of the start state.
+    """
+
+    wear_coefficient: float
+    steps: Given | Adaptive
+    cycles: FloatArray | ToTheEnd
+    law: WearLaw = ARCHARD
+    until: WearTarget | None = None
+    loops: tuple[int, ...] = ()
+    ends_at_last: bool = False
+    follow: FollowedFrequency | None = None
+
+    @property
+    def end(self) -> float:
+        """Last cycle count; inf where it is not known."""
+        return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
+
+    def with_steps(self, steps: Adaptive, counts: FloatArray) -> WearRequest:
+        """The same with other steps, to the last of some counts (n,), whatever target is reached before."""
+        never = self.until and replace(self.until, value=math.inf)
+        return replace(self, steps=steps, cycles=counts, until=never)
 
 
 @packable
@@ -115,26 +180,19 @@ class WearingJoint:
     """The joint of one wear history.
 
     case: model, friction and settings. start: unworn state, which exists; its load is that of the history.
-    wear_coefficient: 1/Pa. law: part of the slip work that wears; wearing_work: of the pairs by this law.
-    follow: what the frequency of the excitation follows, None for the frequency of the unworn state.
-    area (n_contact,): m2.
+    wearing_work: of the pairs by the wear law. area (n_contact,): m2.
+    shifts: whether the target is a shift of the resonance, which each state then reports.
     run: counts the iterations, limits the time, and has a factorisation from one solve to the next. A fresh one lets
         the next solve depend on the state alone.
     """
 
-    def __init__(
-        self,
-        case: Case,
-        start: StartState,
-        wear_coefficient: float,
-        law: WearLaw = ARCHARD,
-        follow: FollowedFrequency | None = None,
-    ) -> None:
+    def __init__(self, case: Case, start: StartState, request: WearRequest) -> None:
         assert start.state is not None
-        self.case, self.start, self.wear_coefficient, self.follow = case, start, wear_coefficient, follow
+        self.case, self.start, self.request, self.follow = case, start, request, request.follow
         self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude
         self.area = case.model.contact.area
-        self.wearing_work = wearing_work(law, case.model.contact, case.friction_coefficient)
+        self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
+        self.wearing_work = wearing_work(request.law, case.model.contact, case.friction_coefficient)
         self.run = Run(case.settings.tolerance)
         self._last: tuple[Case, Joint] | None = None
 
@@ -161,7 +219,7 @@ class WearingJoint:
 
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
-        return cycles * self.wear_coefficient / self.area
+        return cycles * self.request.wear_coefficient / self.area
 
     def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
         """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
@@ -209,7 +267,7 @@ class WearingJoint:
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
-        most = max(state.most_rate, self.wear_coefficient * (self.wearing_work.largest_factor * moved))
+        most = max(state.most_rate, self.request.wear_coefficient * (self.wearing_work.largest_factor * moved))
         rates = np.append(volumes, volumes.sum())
         largest = np.maximum(state.largest_rates, np.abs(rates))
         return replace(state, rate=rate, rates=rates, largest_rates=largest, most_rate=most)

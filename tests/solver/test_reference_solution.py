@@ -20,7 +20,8 @@ from solver.wear.errors import (
     history_error,
 )
 from solver.wear.history import integrate_together
-from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest
+from solver.wear.problem import WearProblem
+from solver.wear.wearing_joint import Adaptive, Given, WearRequest
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import exact_depths_of_motion
 

@@ -17,9 +17,8 @@ from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear import problem as control
 from solver.wear.check import choose_anew
-from solver.wear.problem import Adaptive, Given
 from solver.wear.step import moved_fraction, rate_slope
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.wearing_joint import Adaptive, Given, WearingJoint, WearRequest, WearState
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import AREA, problem
 
@@ -187,7 +186,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
     model = scene("cylinder_on_flat", 3, strips=24)
     (start,) = branch_states(model, 0.6, 1.0, [2.0 * np.pi * 20.0], COARSE_BLADE, "ramp")
     case = build_case(model, 0.6, start.penalty_omega, COARSE_BLADE, start.resolution)
-    work = WearingJoint(case, start, 1e-4)
+    work = WearingJoint(case, start, WearRequest(1e-4, Given(1.0), np.array([0.0, 1.0])))
     state = work.unworn_state()
     work.run = Run(1e-13)
     joint, at = work.joint_of(state), state.at
