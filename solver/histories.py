@@ -115,8 +115,8 @@ def march_wear(
     _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     steps = steps_of(scheme, length, settings.rtol)
-    asked = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
-    return next(integrate_together(model, friction, settings, start, (asked,)))
+    request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
+    return next(integrate_together(model, friction, settings, start, (request,)))
 
 
 def _check_frequency(

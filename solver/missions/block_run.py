@@ -145,14 +145,9 @@ class BlockInput:
         steps = Adaptive(mission.settings.rtol)
         return WearRequest(mission.wear_coefficient, steps, self.counts, law=law, ends_at_last=True)
 
-    @property
-    def time_left(self) -> float:
-        """CPU seconds until the deadline."""
-        return self.deadline - computing_time()
-
     def sweeps(self, direction: Direction, amplitude: float) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N."""
-        settings = replace(self.mission.settings, time_limit=self.time_left)
+        settings = replace(self.mission.settings, time_limit=self.deadline - computing_time())
         sweeps = FrequencySweep(self.model, self.block.friction_coefficient, amplitude, direction, settings)
         sweeps.with_switching = self.with_switching
         sweeps.set_deadline(self.deadline)
@@ -179,7 +174,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         problem = WearProblem(case, start, given.request, stable_end=given.with_switching)
     else:
         problem = reference_of(case, start, given.request, given.guide, counts)
-    solution = Integrator(given.time_left).integrate(problem)
+    solution = Integrator(given.deadline - computing_time()).integrate(problem)
     if solution.failure is not None:
         return solution.failure
     state, values, slope = solution.state, solution.course.read(counts), None

@@ -179,9 +179,9 @@ def integrate_missions(
 def _assembled(mission: MissionRequest, solution: Solution) -> MissionHistory:
     """The result, not judged yet."""
     course, state, counts, area = solution.course, solution.state, np.array(mission.missions, float), mission.area
-    compare_at = partial(_compare_all, solution)
+    compare_at = partial(_compare, solution, slice(None))
     both, whole = compare_at(counts)
-    blocks = [_compare_blocks(solution, counts, slice(n, n + 1))[1] for n in range(len(mission.blocks))]
+    blocks = [_compare(solution, slice(n, n + 1), counts)[1] for n in range(len(mission.blocks))]
     values, depth, target, target_error = course.read(counts), both.values["wear_depth"], course.reached, math.nan
     if mission.until is not None and not math.isnan(target):
         target_error = error_of_target(solution, mission.until, compare_at)
@@ -210,17 +210,15 @@ def _assembled(mission: MissionRequest, solution: Solution) -> MissionHistory:
     )
 
 
-def _compare_all(solution: Solution, counts: FloatArray) -> tuple[Compared, HistoryError]:
-    """The whole wear beside that of the reference solution, and its errors, at the counts (n_output,), the first 0."""
-    both, error = _compare_blocks(solution, counts, slice(None))
+def _compare(solution: Solution, chosen: slice, counts: FloatArray) -> tuple[Compared, HistoryError]:
+    """Wear and responses of some blocks beside those of the reference solution, and their errors, at the counts
+    (n_output,), the first 0.
+    """
+    course = solution.course
+    both, error = compare(solution, counts, part=partial(_of_blocks, chosen, course.area))
     # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
-    local = np.where(counts[:, None] > 0.0, solution.course.read(counts)["local"], 0.0)
+    local = np.where(counts[:, None] > 0.0, course.read(counts)["local"], 0.0)
     return both, replace(error, wear_depth=np.fmax(error.wear_depth, local))
-
-
-def _compare_blocks(solution: Solution, counts: FloatArray, chosen: slice) -> tuple[Compared, HistoryError]:
-    """As `_compare_all`, of wear and responses of some blocks."""
-    return compare(solution, counts, part=partial(_of_blocks, chosen, solution.course.area))
 
 
 def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[str, Any]:

@@ -67,7 +67,9 @@ class WearProblem(WearingJoint):
     """The joint of a history, or of the reference solution of an adaptive one, as `SlowProblem`; stepped by `take_step`
     over its cycles.
 
-    guide: of a reference solution; None for a history. stable_end: whether the stability of the last state is tested.
+    guide: of a reference solution; None for a history. A reference solution takes a step that is `too_long`: its
+        difference is the warning, and in a last long step nearly all of the force of a joint at rest is moved.
+    stable_end: whether the stability of the last state is tested.
     limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`.
     """
 
@@ -173,23 +175,22 @@ class WearProblem(WearingJoint):
         end, follow = replace(taken[0], length=taken[1]), self.follow
         if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
             return self.lost(end)
-        return self._too_long(state, end.depth, end.cycle - state.cycle) or end
-
-    def _too_long(self, state: WearState, depth: FloatArray, length: float) -> Failure | None:
-        """As `too_long`; never of a reference solution, whose difference is the warning: in a last long step nearly all
-        of the force of a joint that comes to its end is moved.
-        """
-        return None if self.guide is not None else too_long(self, state, depth, length)
+        failure = too_long(self, state, end.depth, end.cycle - state.cycle) if self.guide is None else None
+        return failure or end
 
     def _shortest(self, state: WearState) -> float:
         """Shortest adaptive step, cycles: the accuracy to which the end of a branch is located."""
         return max(FOLD_RESOLUTION * state.cycle, SHORTEST_SLOW_STEP * state.first_length)
 
-    def attempt(self, state: WearState, length: float) -> WearState | None:
-        """As in SteppedProblem."""
-        if isinstance(self.steps, Adaptive):
-            return attempt_step(self, state, length, "adaptive")
-        return self._euler_step(state, length, self.steps.scheme)
+    def attempt(self, state: WearState, length: float, scheme: Scheme | None = None) -> WearState | None:
+        """As in SteppedProblem. scheme: another one than that of the steps. An Euler step ends in a stable state; a
+        followed resonance may be unstable at constant frequency.
+        """
+        scheme = scheme or self.steps.scheme
+        end = attempt_step(self, state, length, scheme)
+        if end is None or scheme == "adaptive" or self.follow is not None:
+            return end
+        return end if self.run.is_stable_finely(self.balance_of(end), end.at) else None
 
     def ratio(self, state: WearState, end: WearState, length: float) -> float:
         """As in SteppedProblem: an Euler step counts whatever its error, the shortest adaptive step where the vibration
@@ -205,23 +206,16 @@ class WearProblem(WearingJoint):
     def rescue(self, state: WearState, length: float) -> WearState | Failure:
         """As in SteppedProblem. In this order: an Euler step, a longer one across corners (both adaptive), a jump."""
         if isinstance(self.steps, Adaptive):
-            end = self._euler_step(state, length, "implicit") or self._step_across(state, length)
+            end = self.attempt(state, length, "implicit") or self._step_across(state, length)
             if end is not None:
                 return end
         worn = state.depth + length * state.rate
-        if (failure := self._too_long(state, worn, length)) is not None:
+        if self.guide is None and (failure := too_long(self, state, worn, length)) is not None:
             return failure
         beyond = jump(self, state, worn, state.cycle + length)
         if isinstance(beyond, Failure):
             return beyond if self.follow is None else self.lost(state)
         return self.at_followed(beyond)
-
-    def _euler_step(self, state: WearState, length: float, scheme: Scheme) -> WearState | None:
-        """An Euler step to a stable state, or None. A followed resonance may be unstable at constant frequency."""
-        end = attempt_step(self, state, length, scheme)
-        if end is None or self.follow is not None or self.run.is_stable_finely(self.balance_of(end), end.at):
-            return end
-        return None
 
     def _step_across(self, state: WearState, shortest: float) -> WearState | None:
         """A step longer than the shortest one, cycles, across corners of the branch; None where it is not found.

@@ -89,11 +89,6 @@ class Course:
         return np.array([node.rate for node in self.nodes])
 
     @cached_property
-    def volumes(self) -> FloatArray:
-        """Worn volumes (n_node,), m3."""
-        return self._volumes(self.depths)
-
-    @cached_property
     def reached(self) -> float:
         """Count at which the target was reached, NaN until then."""
         return math.nan if self.target is None else self.reach(self.target)[0]
@@ -105,7 +100,7 @@ class Course:
 
     def _thinned(self) -> Course:
         """The course without nodes of little progress in count and volume, between which nothing is read."""
-        at, volumes = self.counts, self.volumes
+        at, volumes = self.counts, self._volumes(self.depths)
         read = np.append(self.outputs, self.reached)
         ends = np.searchsorted(at, read[read <= at[-1]])
         way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
@@ -142,7 +137,8 @@ class Course:
         `wear_depth`, `depth_rate` (n, k): m, m per count; `wear_rate` (n,): m3 per count; and the values of the nodes.
         """
         (start, end, fraction), depth = self._steps_of(counts), self.depth_at(counts)
-        grown, part = self.volumes[end] - self.volumes[start], self._volumes(depth) - self.volumes[start]
+        volumes = self._volumes(self.depths)
+        grown, part = volumes[end] - volumes[start], self._volumes(depth) - volumes[start]
         fraction = np.divide(part, grown, out=fraction, where=grown > 0.0)
 
         def between(each: FloatArray) -> FloatArray:
