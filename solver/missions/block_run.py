@@ -55,7 +55,6 @@ class EarlierSweep:
     resolution: Resolution | None = None
 
 
-@packable
 @dataclass(frozen=True)
 class BlockResult:
     """A block that was computed once.

@@ -20,7 +20,7 @@ from solver.model import FloatArray
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome, known_to
 from solver.packing import Packed, packable
-from solver.results.history import describe_cut_off, describe_uncertain, last_error, verdict
+from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import Passage
 from solver.wear.errors import Compared, HistoryError, compare, error_of_target
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Solution
@@ -36,13 +36,15 @@ Missions of a slider: estimated over true error at least 1.7. With 0.25 two case
 class MissionState:
     """A joint after some missions; the next step depends on it and the last nodes of the course.
 
-    results, first: blocks of the last and of the first mission, none before. length: missions of the next step.
+    sweeps, first: with which the blocks of the last and of the first mission began, none before.
+    end: vibration at the end of the last mission, for a first block that continues. length: missions of the next step.
     inaccurate, sweep_rate (n_block,): largest values of the blocks so far.
     held_from, cut_off_from: missions before the first step with such a block, inf if never.
     """
 
-    results: tuple[BlockResult, ...] = ()
-    first: tuple[BlockResult, ...] = ()
+    sweeps: tuple[EarlierSweep | None, ...] = ()
+    first: tuple[EarlierSweep | None, ...] = ()
+    end: StartState | None = None
     length: float = 1.0
     inaccurate: FloatArray | float = 0.0
     sweep_rate: FloatArray | float = 0.0
@@ -80,16 +82,17 @@ class MissionProblem:
         longest = min(self.last - done, self.mission.largest_step or self.last)
         # a step over more than one extrapolates from three nodes
         longest = min(longest, self.last if len(course.ends) > 2 else 1)
-        earlier = state.results if done or self.history is None else self.history.state.first
-        self._sweeps = [each.sweep for each in earlier] or [None] * len(self.mission.blocks)
+        earlier = state.sweeps if done or self.history is None else self.history.state.first
+        self._sweeps = list(earlier) or [None] * len(self.mission.blocks)
         taken = take_step(self, (state, course), min(state.length, longest), Lengths(2, shortest=1, rescue=1))
         if isinstance(taken, Failure):
             return taken
         step, length = taken
-        results = tuple(replace(each, slope=None) for each in step.results)
+        results, sweeps = step.results, tuple(each.sweep for each in step.results)
         after = MissionState(
-            results,
-            state.first or tuple(replace(each, last=None) for each in results),
+            sweeps,
+            state.first or sweeps,
+            results[-1].last,
             length,
             np.maximum([each.inaccurate for each in results], state.inaccurate),
             np.maximum([each.sweep_rate for each in results], state.sweep_rate),
@@ -123,7 +126,7 @@ class MissionProblem:
         self, state: MissionState, number: int, depth: FloatArray, with_slopes: bool
     ) -> tuple[BlockResult, ...] | Failure:
         """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
-        mission, before, budget = self.mission, state.results[-1].last if state.results else None, self.run.budget
+        mission, before, budget = self.mission, state.end, self.run.budget
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.history is not None:
             course = self.history.course

@@ -164,11 +164,11 @@ def find_states(given: BlockInput) -> Swept | Failure:
     wanted, iterations = list(given.earlier.nodes if given.earlier else least), 0
     states: list[SweptState] = []
     while wanted:
-        found = states_at(given, np.array(sorted(wanted)))
-        if isinstance(found, Failure):
-            return found
-        iterations += max(state.start.newton_iterations for state in found)
-        states = sorted([*states, *found], key=lambda state: state.frequency)
+        more = states_at(given, np.array(sorted(wanted)))
+        if isinstance(more, Failure):
+            return more
+        iterations += max(state.start.newton_iterations for state in more)
+        states = sorted([*states, *more], key=lambda state: state.frequency)
         errors, volume = interval_errors(states, area), float((parts_of(states) @ area).sum())
         # wear that is small beside the wear so far, or beside that by all work of the excitation, may be round-off
         size = max(float(np.abs(state.response).max()) for state in states)
@@ -184,14 +184,14 @@ def find_states(given: BlockInput) -> Swept | Failure:
 
 def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least: Sequence[float]) -> tuple[float, ...]:
     """The frequencies `least`, Hz, and those whose absence makes the error of an interval larger than allowed, m3."""
-    found = [states[0].frequency]
+    needed = [states[0].frequency]
     for place in range(1, len(states) - 1):
         at = states[place].frequency
         # an interval twice as long has eight times the error; of two neighbours one is kept
-        dropped = found[-1] == states[place - 1].frequency and 8.0 * errors[place - 1 : place + 1].sum() < allowed
+        dropped = needed[-1] == states[place - 1].frequency and 8.0 * errors[place - 1 : place + 1].sum() < allowed
         if at in least or not dropped:
-            found.append(at)
-    return (*found, states[-1].frequency)
+            needed.append(at)
+    return (*needed, states[-1].frequency)
 
 
 def _between(one: SweptState, other: SweptState, finest: float) -> list[float]:

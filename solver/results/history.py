@@ -204,12 +204,12 @@ def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: fl
 def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
     """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before."""
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
-    own, its = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
+    volumes, others = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
     if not math.isfinite(other):
-        return f"{own}, {known}: {coarser} the history does not go so far"
+        return f"{volumes}, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:
-        return f"{own}, {known}: {its}, but worn at other pairs or counts"
-    return f"{own}, but {its}: {known}"
+        return f"{volumes}, {known}: {others}, but worn at other pairs or counts"
+    return f"{volumes}, but {others}: {known}"
 
 
 def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:

@@ -68,10 +68,11 @@ def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
 
 def _certificate(wearing: WearingJoint, state: WearState) -> Certificate | None:
     """The certificate of a state, with the errors of the last choice of its harmonics; None where it does not hold."""
-    found, estimate = certify(wearing.joint_of(state), state.at), state.estimate
+    estimate = state.estimate
     wear_rate_error = wearing.wearing_work.amplification(*worn_by(state.at)) * estimate.wear_rate
-    found = replace(found, response_error=estimate.response, wear_rate_error=wear_rate_error)
-    return found if found.holds(wearing.case.settings.tolerance) else None
+    certificate = certify(wearing.joint_of(state), state.at)
+    certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
+    return certificate if certificate.holds(wearing.case.settings.tolerance) else None
 
 
 def report_only(wearing: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...]) -> Checked:

@@ -189,10 +189,10 @@ def error_of_target(
 def _frequency_error(both: Compared, safety: float, known: FloatArray | float) -> FloatArray:
     """Error (n,), Hz, of the frequency of the excitation: its difference times `safety`, and the error of the other."""
     name = "excitation_frequency"
-    own = both.values.get("excitation_frequency_error", np.zeros(len(both.counts)))
+    of_states = both.values.get("excitation_frequency_error", np.zeros(len(both.counts)))
     if not both.follows:
-        return np.asarray(own)
-    whole = np.maximum(own, safety * np.abs(both.values[name] - both.other(name)) + known)
+        return np.asarray(of_states)
+    whole = np.maximum(of_states, safety * np.abs(both.values[name] - both.other(name)) + known)
     return np.where(np.isfinite(both.values["wear_rate"]) & np.isnan(whole), np.inf, whole)
 
 

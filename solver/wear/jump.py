@@ -48,15 +48,14 @@ def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, dri
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    balance = Balance(
-        replace(case, hold=hold).joint(state.omega, wearing.excitation_amplitude), state.point.history, worn
-    )
-    found = wearing.run.state(balance, state.at.predicted_h)
-    if found is None or not wearing.run.is_stable(balance, found.evaluation):
+    joint = replace(case, hold=hold).joint(state.omega, wearing.excitation_amplitude)
+    balance = Balance(joint, state.point.history, worn)
+    point = wearing.run.state(balance, state.at.predicted_h)
+    if point is None or not wearing.run.is_stable(balance, point.evaluation):
         return None
-    if creeps(joint, hold, found.evaluation) or vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
+    if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         return None
-    return replace(state, point=found, hold=hold, held_from=state.cycle)
+    return replace(state, point=point, hold=hold, held_from=state.cycle)
 
 
 def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
@@ -66,13 +65,13 @@ def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
     joint = wearing.joint_of(state)
-    found = relax_to_periodic(joint, worn, state.point, joint, wearing.run)
-    if isinstance(found, Failure):
-        return found if found.outcome is Outcome.ADRIFT else Failure(Outcome.MARCH_FAILED)
+    point = relax_to_periodic(joint, worn, state.point, joint, wearing.run)
+    if isinstance(point, Failure):
+        return point if point.outcome is Outcome.ADRIFT else Failure(Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners
-    if vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
+    if vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))
-    return replace(state, point=found)
+    return replace(state, point=point)
 
 
 def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | None:

@@ -122,7 +122,7 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     force_tangent, work_tangent = joint.law.tangent(at)
     by_work, by_force, by_depth = (gain * part for part in wearing.wearing_work.slopes(*worn_by(at)))
     growth = by_work[:, None] * work_tangent + by_force[:, None] * force_tangent[:, 0]
-    found = depths * (0.0 if fixed_factors else by_depth)
+    changes = depths * (0.0 if fixed_factors else by_depth)
     closing = np.where(joint.component_index % 3 == 0, depths[:, joint.component_index // 3], 0.0)
     # nothing acts back on a constant normal force
     acting = closing.any(axis=1)
@@ -131,8 +131,8 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
         steps = wearing.run.steps(balance, at, rights)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
-        found[acting] += (growth * moved).sum(axis=2)
-    return found
+        changes[acting] += (growth * moved).sum(axis=2)
+    return changes
 
 
 def explicit_step_limit(wearing: WearingJoint, state: WearState) -> float:

@@ -282,25 +282,24 @@ class WearingJoint:
         case, lag = self.case_and_joint(state)[0], state.lag
         if self.follow.of == "peak":
             peak = solve_at_peak(case, balance, start, lag, self.run, most)
-            found, lag = (None, lag) if peak is None else peak
+            solved, lag = (None, lag) if peak is None else peak
         else:
-            found = solve_at_lag(case, balance, start, lag, self.run, most)
-        if found is None:
+            solved = solve_at_lag(case, balance, start, lag, self.run, most)
+        if solved is None:
             return None
-        turn = math.nan if found.reduced is None else abs(float(found.reduced[0, 0]))
+        turn = math.nan if solved.reduced is None else abs(float(solved.reduced[0, 0]))
         if math.isnan(turn) and state.half_width == 0.0:
-            turn = abs(rise_of_response(found, self.run, accepted_rise(case.settings.rtol))[1])
+            turn = abs(rise_of_response(solved, self.run, accepted_rise(case.settings.rtol))[1])
         half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
-        point = State(found.at, final_history(found.balance, found.at))
-        omega = float(found.values[0])
+        point = State(solved.at, final_history(solved.balance, solved.at))
+        omega = float(solved.values[0])
         return self.with_rates(replace(state, point=point, omega=omega, lag=lag, half_width=half_width))
 
     def at_followed(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depth and its tangential history."""
         if self.follow is None:
             return state
-        found = self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS)
-        return found or self.lost(state)
+        return self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS) or self.lost(state)
 
     def lost(self, state: WearState) -> Failure:
         """The end of a history whose frequency leaves its range, or beyond whose last state none is found."""
