@@ -26,9 +26,8 @@ from solver.wear.errors import Compared, HistoryError, compare, error_of_target
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Solution
 
 STEP_ERROR_FRACTION = 0.5
-"""Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
-Missions of a slider: estimated over true error at least 1.7. With 0.25 two cases of the tests compute 21.5 and 33 of
-2000 missions, with 0.5 fewer than 20 and 30."""
+"""Share of rtol in `allowed_error`. Slider: estimated over true error at least 1.7. With 0.25 two cases of the tests
+compute 21.5 and 33 of 2000 missions, with 0.5 fewer than 20 and 30."""
 
 
 @packable

@@ -1,13 +1,13 @@
 """A wear history, or its reference solution, as a problem over the slow time: its steps, their lengths, their rescues.
 
-The reference solution is a second computation whose difference, pair by pair, is taken for the error. It starts from
-another sweep, with a third of the nodes (`solver.loading_history`), and is coarser in all: twice the tolerance of the
-steps, the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch ends, errors grow,
-and this difference with them; a sum of local errors does not.
+The difference of a history to its reference solution, pair by pair, is taken for the error. The reference solution
+starts from another sweep, with a third of the nodes (`solver.loading_history`), and is coarser: twice the tolerance of
+the steps, the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch ends, errors
+grow, and this difference with them; a sum of local errors does not.
 
 A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
-with the same steps errs as they do: where a pair only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit
-steps, 1.89 mm3, with steps of 250 cycles 1.90; the truth is 2.03.
+with the same steps errs as they do: dovetail, 16 pairs, 212.5 Hz, where a pair only just slips: 1.89 mm3 with implicit
+steps, 1.90 with steps of 250 cycles; the truth is 2.03.
 """
 
 from __future__ import annotations
@@ -47,9 +47,8 @@ FOLD_RESOLUTION = 0.005
 """Shortest adaptive step, as a fraction of the cycle count."""
 
 STEP_ERROR_FRACTION = 0.25
-"""Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
-Dovetail, 16 pairs, 212.42 to 213 Hz, `rtol` 1e-2: errors of the worn volume up to 0.21 %. With 0.5 a quarter to a third
-less steps, up to 0.5 %, and 5.9 % at 212.5 Hz, where a pair that only just slips then sticks."""
+"""Share of rtol in `allowed_error`. Dovetail, 16 pairs, 212.42 to 213 Hz, `rtol` 1e-2: errors up to 0.21 %. With 0.5 a
+quarter to a third fewer steps, up to 0.5 %, and 5.9 % at 212.5 Hz, where a pair that only just slips then sticks."""
 
 FIRST_STEP, FIRST_DEPTH = 0.05, 0.01
 """Length of the first adaptive step, whose error is not known, as a fraction of the explicit step limit, and its

@@ -23,9 +23,8 @@ from solver.packing import Packed, in_rows, pack, packable, unpack
 from solver.settings import Resolution, WearTarget
 
 RTOL_RATIO = 2.0
-"""Ratio of the step tolerances of reference solution and adaptive history: BDF2 steps are then a quarter longer. With 4
-the steps of a reference solution are too long for pairs that stick again: dovetail, 16 pairs, 13 harmonics, 212.75 Hz:
-1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true."""
+"""Ratio of the step tolerances of reference solution and adaptive history. With 4 steps are too long for pairs that
+stick again (dovetail, 16 pairs, 13 harmonics, 212.75 Hz: 1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true)."""
 
 MOST_NODES = 800
 """Most stored steps of a history beside those with an output; half as many after those with the least progress are
