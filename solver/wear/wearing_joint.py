@@ -179,7 +179,8 @@ class WearState:
 class WearingJoint:
     """The joint of one wear history.
 
-    case: model, friction and settings. start: unworn state, which exists; its load is that of the history.
+    case: model, friction and settings, with the resolution of the start. start: unworn state, which exists; its load is
+        that of the history.
     wearing_work: of the pairs by the wear law. area (n_contact,): m2.
     shifts: whether the target is a shift of the resonance, which each state then reports.
     run: counts the iterations, limits the time, and has a factorisation from one solve to the next. A fresh one lets
@@ -194,11 +195,11 @@ class WearingJoint:
         self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
         self.wearing_work = wearing_work(request.law, case.model.contact, case.friction_coefficient)
         self.run = Run(case.settings.tolerance)
-        self._last: tuple[Case, Joint] | None = None
+        self._stored: tuple[Case, Joint] | None = None
 
     def case_and_joint(self, state: WearState) -> tuple[Case, Joint]:
         """Case and joint of a state. The last ones are stored; others drop the factorisation."""
-        last = self._last
+        last = self._stored
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
             case = replace(self.case, hold=state.hold).at(state.resolution)
             self.run = self.run.fresh()
@@ -206,8 +207,8 @@ class WearingJoint:
             case = last[0]
         else:
             return last
-        self._last = case, case.joint(state.omega, self.excitation_amplitude)
-        return self._last
+        self._stored = case, case.joint(state.omega, self.excitation_amplitude)
+        return self._stored
 
     def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
@@ -224,8 +225,7 @@ class WearingJoint:
     def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
         """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
         start, periodic = self.start, periodic or self.unworn
-        joint = self.case.at(start.resolution).joint(periodic.omega, self.excitation_amplitude)
-        balance, at = evaluated(joint, periodic)
+        balance, at = evaluated(self.case.joint(periodic.omega, self.excitation_amplitude), periodic)
         nothing = np.zeros(self.area.size + 1)
         state = WearState(
             0.0,
