@@ -5,6 +5,7 @@ Commands that may change the model and are not acted upon are refused.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -15,7 +16,7 @@ import numpy as np
 
 from studies.fe_models.deck.contents import Deck, NodalValue
 from studies.fe_models.deck.model import deck_of_arrays
-from studies.fe_models.text import IntArray, Place, library_errors, shown
+from studies.fe_models.files import IntArray, Place, library_errors, shown, to_float
 from studies.scene_error import SceneError
 
 # which of the nodes of an element of ANSYS are those of which kind: bricks may be collapsed to wedges or tetrahedra
@@ -62,7 +63,6 @@ WITHOUT_INFLUENCE = _short(
 _BLOCKS = ("ETBL", "NBLO", "EBLO", "CMBL")  # what the library reads
 _WHERE_ZERO = _short("OMEGA DOMEGA CGOMGA DCGOMG ACEL CMOMEGA CMDOMEGA CMACEL BFUNIF TUNIF")  # CDWRITE writes them
 _WITH_LABEL = _short("CMOMEGA CMDOMEGA CMACEL BFUNIF")  # of these the first field is no number
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _DIRECTIONS = {"UX": (1, 1), "UY": (2, 2), "UZ": (3, 3), "ALL": (1, 3)}
 # key options of 1 that make other elements of some kinds than those that are read
 _OPTIONS = {
@@ -204,10 +204,11 @@ def _add_displacement(found: _Commands, fields: list[str], place: Place) -> None
     """A command D."""
     fields = [*fields, *[""] * 8]
     node, label, value = fields[1:4]
-    if not node.isdigit() or label not in _DIRECTIONS or any(fields[5:]) or (value and not _NUMBER.fullmatch(value)):
+    moved = to_float(value or "0")
+    if not node.isdigit() or label not in _DIRECTIONS or any(fields[5:]) or math.isnan(moved):
         what = f"D of {shown(node)}, {shown(label)} = {shown(value)}"
         raise place.wrong(what, "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read")
-    found.held.setdefault((label, float(value.replace("D", "E") or 0.0)), []).append(int(node))
+    found.held.setdefault((label, moved), []).append(int(node))
 
 
 def _lines(path: Path) -> Iterator[tuple[list[str], Place]]:
@@ -237,5 +238,4 @@ def _is_skipped(command: str, fields: list[str]) -> bool:
         return fields[-1 if fields[-1] else -2] == "-1"
     # _TINY is the number that stands for no temperature
     values = [part for part in fields[2 if command in _WITH_LABEL else 1 :] if part not in ("", "_TINY")]
-    zero = all(_NUMBER.fullmatch(value) and not float(value.replace("D", "E")) for value in values)
-    return command in _WHERE_ZERO and zero
+    return command in _WHERE_ZERO and all(to_float(value) == 0.0 for value in values)

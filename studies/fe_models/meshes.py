@@ -18,7 +18,7 @@ from studies.fe_models.cdb import read_cdb
 from studies.fe_models.deck.contents import ContactNodes, Deck
 from studies.fe_models.deck.model import deck_of_arrays
 from studies.fe_models.deck.read import read_deck
-from studies.fe_models.text import IntArray, library_errors
+from studies.fe_models.files import IntArray, library_errors
 from studies.scene_error import SceneError
 
 # meshio's names, whose order of nodes is VTK's: for these kinds that of the decks

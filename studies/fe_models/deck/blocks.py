@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.fe_models.text import (
+from studies.fe_models.files import (
     LARGEST_NUMBER,
     FloatArray,
     IntArray,
@@ -18,7 +18,6 @@ from studies.fe_models.text import (
     check_file,
     read_float,
     read_integer,
-    read_name,
     shown,
 )
 
@@ -27,6 +26,14 @@ _BYTE_ORDER_MARK = "\xef\xbb\xbf"  # of UTF-8, which some editors write, in Lati
 _WITH_INPUT = ("NODE", "ELEMENT", "NSET", "ELSET")
 # the name of a parameter, and its value: quoted, or up to the next comma
 _PARAMETER = re.compile(r'[\s,]*([^,="]+?)\s*(?:=\s*("[^"]*"|[^,"]*))?\s*(?:,|$)')
+
+
+def read_name(text: str) -> str:
+    """A name in capitals: without blanks, or as it stands between quotation marks."""
+    text = text.strip()
+    if len(text) >= 2 and text[0] == text[-1] == '"':
+        return text[1:-1].upper()
+    return "".join(text.split()).upper()
 
 
 @dataclass(frozen=True)
@@ -172,7 +179,7 @@ def _lines(
 
     An included file does not end a keyword: data lines may follow in it, and behind it.
     """
-    check_file(path, _LARGEST_DECK)
+    check_file(path, _LARGEST_DECK, "model")
     within = (*within, path.resolve())
     with path.open(encoding="latin-1") as file:
         for text, number in _joined(file):
@@ -288,3 +295,11 @@ def read_records(block: Block, length: int, what: str) -> IntArray:
 def _check_whole(block: Block, line: int) -> None:
     for part in block.row(line).fields:
         read_integer(part, block.row(line).place, "a node or element number")
+
+
+def unit(vector: FloatArray, place: Place, remedy: str) -> FloatArray:
+    """A vector (3,) of unit length. Raises SceneError, which asks for what gives one, where it has none."""
+    length = float(np.linalg.norm(vector))
+    if not 0 < length < np.inf:
+        raise place.wrong("a direction without a length", f"give {remedy}")
+    return np.asarray(vector / length)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from studies.fe_models.text import FloatArray, IntArray
+from studies.fe_models.files import FloatArray, IntArray
 from studies.finite_element.elements import ELEMENT_KINDS
 
 NODES_OF_KIND: Mapping[str, int] = {kind: len(each.reference.nodes) for kind, each in ELEMENT_KINDS.items()}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from studies.fe_models.deck.blocks import Block
-from studies.fe_models.text import shown
+from studies.fe_models.files import shown
 
 _OUTPUT = """
 OUTPUT NODEOUTPUT ELEMENTOUTPUT CONTACTOUTPUT ENERGYOUTPUT MODALOUTPUT INTEGRATEDOUTPUT RADIATIONOUTPUT NODEPRINT

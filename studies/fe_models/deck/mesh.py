@@ -10,7 +10,7 @@ import numpy as np
 from studies.fe_models.deck.blocks import Block, Reference
 from studies.fe_models.deck.contents import NODES_OF_KIND, ElementBlock, Surface
 from studies.fe_models.deck.sets import NONE, Key, Resolver, SetDefinitions, find_key
-from studies.fe_models.text import LARGEST_NUMBER, FloatArray, IntArray, Place, shown
+from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, shown
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.scene_error import SceneError
 

@@ -7,12 +7,12 @@ from itertools import product
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block, Reference, Row, read_points, read_records
+from studies.fe_models.deck.blocks import Block, Reference, Row, read_points, read_records, unit
 from studies.fe_models.deck.contents import NODES_OF_KIND
 from studies.fe_models.deck.keywords import KEYWORDS, find_keyword, keyword
 from studies.fe_models.deck.mesh import Draft, Records
 from studies.fe_models.deck.sets import NONE, NodesOf, Numbers, Resolver, SetDefinitions
-from studies.fe_models.text import (
+from studies.fe_models.files import (
     LARGEST_NUMBER,
     FloatArray,
     IntArray,
@@ -20,7 +20,6 @@ from studies.fe_models.text import (
     is_integer,
     read_integer,
     shown,
-    unit,
 )
 from studies.finite_element.cut_faces import turn_about
 

@@ -21,7 +21,7 @@ from studies.fe_models.deck.contents import (
 )
 from studies.fe_models.deck.mesh import Draft, Mesh, Records
 from studies.fe_models.deck.sets import NONE, Numbers
-from studies.fe_models.text import FloatArray, IntArray, Place, shown
+from studies.fe_models.files import FloatArray, IntArray, Place, shown
 from studies.scene_error import SceneError
 
 _SAME_AXIS = 1e-6  # distance of two axes over the distance of the points that give them

@@ -10,7 +10,7 @@ from studies.fe_models.deck.blocks import Block, Row
 from studies.fe_models.deck.contents import Equation, RigidMotion, Section, Transform
 from studies.fe_models.deck.keywords import keyword
 from studies.fe_models.deck.model import MaterialRows, Model
-from studies.fe_models.text import IntArray, Place, is_integer, shown
+from studies.fe_models.files import IntArray, Place, is_integer, shown
 
 _ALL = (1, 2, 3)
 

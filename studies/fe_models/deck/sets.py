@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from studies.fe_models.deck.blocks import Reference
-from studies.fe_models.text import IntArray, Place, is_integer, read_integer, shown
+from studies.fe_models.files import IntArray, Place, is_integer, read_integer, shown
 
 _DEEPEST = 100
 NONE = np.empty(0, dtype=np.int64)

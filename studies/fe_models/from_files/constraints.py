@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.fe_models.deck.contents import Deck, Equation, RigidMotion
-from studies.fe_models.model_files import Units
+from studies.fe_models.files import Units
 from studies.finite_element.constraints import Constraints, Dependence, eliminate
 from studies.scene_error import SceneError
 

@@ -12,10 +12,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from studies.fe_models.deck.contents import Deck
+from studies.fe_models.files import FloatArray, IntArray, Units
 from studies.fe_models.from_files.solid import SPEED_AGREES
 from studies.fe_models.matrices.matrices import Matrices
-from studies.fe_models.model_files import Units
-from studies.fe_models.text import FloatArray, IntArray
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.solid_mesh import Rotation, volumes_of_points
 from studies.scene_error import SceneError

@@ -11,6 +11,7 @@ import pandas as pd
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
+from studies.fe_models.files import ModelFiles, Units, library_errors
 from studies.fe_models.from_files.export_mistakes import (
     check_contact_removed,
     check_mass,
@@ -24,8 +25,6 @@ from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.from_files.solid import check_units
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
-from studies.fe_models.model_files import ModelFiles, Units
-from studies.fe_models.text import library_errors
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.scene_error import SceneError

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from solver.model import FloatArray, ReducedModel
 from studies.fe_models.deck.contents import Deck
+from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_digest
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.export_mistakes import check_nodes_have_dofs
 from studies.fe_models.from_files.imported import import_matrices, read_recovery
@@ -20,8 +21,6 @@ from studies.fe_models.from_files.selections import Selections, find_clamped, fi
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
-from studies.fe_models.model_files import UNITS, ModelFiles, Units, file_digest
-from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
 from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent

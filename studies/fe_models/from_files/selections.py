@@ -10,8 +10,8 @@ import numpy as np
 
 from solver.model import BoolArray, IntArray
 from studies.fe_models.deck.contents import Deck, SurfacePair
+from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.model_files import Units
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import SolidMesh

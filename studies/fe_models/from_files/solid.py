@@ -10,8 +10,8 @@ import numpy as np
 
 from solver.model import FloatArray, IntArray
 from studies.fe_models.deck.contents import Deck
+from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import MaterialTable, Parameters
-from studies.fe_models.model_files import Units
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.scene_error import SceneError

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NoReturn
+from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 import pandas as pd
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from studies.fe_models.text import shown
+from studies.fe_models.files import FloatArray, IntArray, library_errors, shown
 from studies.scene_error import SceneError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 NAMES = ("stiffness", "mass", "damping", "load")
 """Matrices of a model, and constant forces."""
@@ -75,8 +72,33 @@ def label(node: IntArray, dof: IntArray, file: str) -> IntArray:
     return np.asarray(_DOFS * node + dof, dtype=np.int64)
 
 
-def of_table(file: str, matrix: object, labels: IntArray) -> Entries:
-    """Entries of a matrix, dense or sparse, or of forces, whose rows have labels (n_dof,). Raises SceneError."""
+def entries_of_tables(
+    found: Mapping[str, Any], files: Mapping[str, Path], labels: IntArray | None = None
+) -> dict[str, Entries]:
+    """Entries of matrices, dense or sparse, and forces by name, whose rows have labels (n_dof,).
+
+    labels: None where a table of the rows is among the files. Raises SceneError.
+    """
+    first = next(iter(files.values())).name
+    if labels is None and "rows" not in files:
+        wrong(first, "no table of its rows", "give job_rows.csv with node and dof of each row")
+    labels = _read_rows(files["rows"]) if labels is None else labels
+    if np.unique(labels).size < labels.size:
+        wrong(first, "a dof has two rows", "give node and dof of each row once")
+    names = {name: files[name if name in files else "matrices"].name for name in found}
+    return {name: _entries_of_table(names[name], matrix, labels) for name, matrix in found.items()}
+
+
+def _read_rows(path: Path) -> IntArray:
+    """Labels of a table with the columns node and dof. Raises SceneError."""
+    with library_errors(path, "pandas", "pandas", "matrices"):
+        table = pd.read_csv(path, skipinitialspace=True)
+    if not {"node", "dof"} <= set(table) or any(table[name].dtype.kind != "i" for name in ("node", "dof")):
+        wrong(path.name, "no columns node and dof of whole numbers", "give a line for each row of the matrices")
+    return label(table["node"].to_numpy(), table["dof"].to_numpy(), path.name)
+
+
+def _entries_of_table(file: str, matrix: object, labels: IntArray) -> Entries:
     try:
         found = sp.coo_array(matrix if sp.issparse(matrix) else np.atleast_2d(np.asarray(matrix)))
     except (ValueError, TypeError) as error:

@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from studies.fe_models.deck.read import read_deck
+from studies.fe_models.files import UNITS
 from studies.fe_models.from_files.export_mistakes import (
     check_contact_removed,
     check_mass,
@@ -19,7 +20,6 @@ from studies.fe_models.from_files.export_mistakes import (
 from studies.fe_models.from_files.solid import check_units, rotation_of_deck
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
-from studies.fe_models.model_files import UNITS
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import CUBES, SECTOR, write
 from tests.studies.fe_models.solid_meshes import needs_ccx, run_ccx
