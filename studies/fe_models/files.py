@@ -18,6 +18,7 @@ from studies.scene_error import SceneError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 LARGEST_NUMBER = 2**31 - 1
 """Of a node or an element: the codes count in 32 bits."""

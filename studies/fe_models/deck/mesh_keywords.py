@@ -7,20 +7,21 @@ from itertools import product
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block, Reference, Row, read_points, read_records, unit
 from studies.fe_models.deck.contents import NODES_OF_KIND
-from studies.fe_models.deck.keywords import KEYWORDS, find_keyword, keyword
-from studies.fe_models.deck.mesh import Draft, Records
-from studies.fe_models.deck.sets import NONE, NodesOf, Numbers, Resolver, SetDefinitions
-from studies.fe_models.files import (
-    LARGEST_NUMBER,
-    FloatArray,
-    IntArray,
-    Place,
-    is_integer,
-    read_integer,
-    shown,
+from studies.fe_models.deck.keywords import (
+    KEYWORDS,
+    Block,
+    Reference,
+    Row,
+    find_keyword,
+    keyword,
+    read_points,
+    read_records,
+    unit,
 )
+from studies.fe_models.deck.mesh import Draft, Records
+from studies.fe_models.deck.sets import NONE, NodesOf, Numbers, Resolver, Sets
+from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, is_integer, read_integer, shown
 from studies.finite_element.cut_faces import turn_about
 
 OTHER_KINDS = {
@@ -84,7 +85,7 @@ def _instance(draft: Draft, block: Block) -> None:
 @keyword("NODE", "NSET SYSTEM INPUT", of_mesh=True)
 def _node(draft: Draft, block: Block) -> None:
     """Number, x, y, z, in the coordinates of *SYSTEM."""
-    if block.chosen("SYSTEM", ("R", "C", "S"), "R") != "R":
+    if block.value("SYSTEM") not in ("", "R"):
         raise block.place.wrong("nodes in cylindrical or spherical coordinates", "give them in Cartesian ones")
     numbers, coordinates = read_points(block)
     if draft.system is not None:
@@ -135,7 +136,7 @@ def _elset(draft: Draft, block: Block) -> None:
     _read_set(draft, draft.element_sets, block, "ELSET")
 
 
-def _read_set(draft: Draft, sets: SetDefinitions, block: Block, parameter: str) -> None:
+def _read_set(draft: Draft, sets: Sets, block: Block, parameter: str) -> None:
     """Members of a set; INSTANCE may say whose numbers they are."""
     key = block.scope, block.name(parameter)
     sets.add(key)
@@ -250,7 +251,7 @@ def _elcopy(draft: Draft, block: Block) -> None:
     """The elements of a set again, with larger numbers of elements and nodes."""
     given = [block.parameters.get(name, "") for name in ("ELEMENTSHIFT", "SHIFTNODES")]
     by_element, by_node = (np.array(_whole_numbers([text], block.place, (0,))) for text in given)
-    own = _find(draft.elements, draft.element_sets, block.reference("OLDSET"), "EALL")
+    own = _members(draft, block.reference("OLDSET"), of_elements=True)
     _copy_elements(draft, block, own, by_element, by_node, "NEWSET")
 
 
@@ -278,17 +279,13 @@ def _whole_numbers(fields: list[str], place: Place, default: tuple[int, ...]) ->
     return values
 
 
-def _find(records: list[Records], sets: SetDefinitions, reference: Reference, everything: str) -> IntArray:
-    """Numbers (m,) of a set of the same scope, as far as the deck is read. Raises SceneError."""
-    known = np.concatenate([NONE, *(each.numbers for each in records if each.scope == reference.scope)])
-    return Resolver(sets, np.unique(known), {reference.scope: 0}, everything).find(reference)
-
-
-def _members(draft: Draft, reference: Reference) -> IntArray:
-    """Nodes (m,) of a set, by number. Raises SceneError."""
-    if (reference.scope, reference.target) in draft.node_sets.unsorted:
+def _members(draft: Draft, reference: Reference, *, of_elements: bool = False) -> IntArray:
+    """Nodes, or elements, (m,) of a set of the same scope by number, as far as the deck is read. Raises SceneError."""
+    records, sets = (draft.elements, draft.element_sets) if of_elements else (draft.nodes, draft.node_sets)
+    if (reference.scope, reference.target) in sets.unsorted and not of_elements:
         raise reference.place.wrong(f"the set {reference.target} is UNSORTED", "give sets by ascending numbers here")
-    return _find(draft.nodes, draft.node_sets, reference, "NALL")
+    known = np.concatenate([NONE, *(each.numbers for each in records if each.scope == reference.scope)])
+    return Resolver(sets, np.unique(known), {reference.scope: 0}, "EALL" if of_elements else "NALL")(reference)
 
 
 def _coordinates(draft: Draft, block: Block, wanted: IntArray) -> FloatArray:

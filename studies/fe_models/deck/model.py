@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block
 from studies.fe_models.deck.contents import (
     NODES_OF_KIND,
     CyclicSymmetry,
@@ -19,6 +18,7 @@ from studies.fe_models.deck.contents import (
     Surface,
     SurfacePair,
 )
+from studies.fe_models.deck.keywords import Block
 from studies.fe_models.deck.mesh import Draft, Mesh, Records
 from studies.fe_models.deck.sets import NONE, Numbers
 from studies.fe_models.files import FloatArray, IntArray, Place, shown

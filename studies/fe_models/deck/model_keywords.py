@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block, Row
 from studies.fe_models.deck.contents import Equation, RigidMotion, Section, Transform
-from studies.fe_models.deck.keywords import keyword
+from studies.fe_models.deck.keywords import Block, Row, keyword
 from studies.fe_models.deck.model import MaterialRows, Model
 from studies.fe_models.files import IntArray, Place, is_integer, shown
 

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block, Row, read_name, unit
 from studies.fe_models.deck.contents import CentrifugalLoad, NodalValue, Pressure, SurfacePair
-from studies.fe_models.deck.keywords import keyword
+from studies.fe_models.deck.keywords import Block, Row, keyword, read_name, unit
 from studies.fe_models.deck.model import Interaction, Model, Step
 from studies.fe_models.files import is_integer, read_float, shown
 
