@@ -32,14 +32,12 @@ class Supported:
     references: Mapping[int, int]
 
 
-def find_constraints(
-    deck: Deck, numbers: IntArray, clamped: BoolArray | None, units: Units, cut: IntArray
-) -> Supported:
+def find_constraints(deck: Deck, numbers: IntArray, clamped: IntArray | None, units: Units, cut: IntArray) -> Supported:
     """Held displacements, constraints and nodal forces of a deck.
 
-    numbers (n_nodes,): nodes of the model, in any order. clamped (n_nodes, 3): displacements that the study holds in
-    place of the deck's boundary conditions; None of none. cut: rows of nodes on cut faces. Raises SceneError where a
-    displacement depends on others and is held, depends twice, or nodes are missing.
+    numbers (n_nodes,): nodes of the model, in any order. clamped: rows of nodes that the study holds in place of the
+    deck's boundary conditions; None of none. cut: rows of nodes on cut faces. Raises SceneError where a displacement
+    depends on others and is held, depends twice, or nodes are missing.
     """
     rows = {number: row for row, number in enumerate(numbers.tolist())}
     return _Builder(deck, numbers, units, set(cut.tolist()), rows).build(clamped)
@@ -61,7 +59,7 @@ class _Builder:
     oblique: dict[int, FloatArray] = field(default_factory=dict)
     entries: list[Dependence] = field(default_factory=list)
 
-    def build(self, clamped: BoolArray | None) -> Supported:
+    def build(self, clamped: IntArray | None) -> Supported:
         deck = self.deck
         self.first_terms = {int(equation.nodes[0]) for equation in deck.equations}
         self.frames = {int(node): each for each in deck.transforms for node in each.nodes}
@@ -70,11 +68,7 @@ class _Builder:
         for equation in deck.equations:
             for node in equation.nodes:
                 self._row(int(node), equation.place)
-        held: set[int] = set()
-        if clamped is not None:
-            held = set(np.flatnonzero(clamped.ravel()).tolist())
-        else:
-            self._hold(held)
+        held = self._held_by_deck() if clamped is None else {3 * row + k for row in clamped.tolist() for k in range(3)}
         for equation in deck.equations:
             self._equation(equation)
         forces = np.zeros(3 * (len(self.numbers) + len(self.extra)))
@@ -136,8 +130,9 @@ class _Builder:
         row, column, value = (np.concatenate(each) for each in zip(*parts, strict=True))
         self.entries.append(Dependence(dependent, row, column, value, motion.place))
 
-    def _hold(self, held: set[int]) -> None:
-        """Boundary conditions, those of nodes with directions of their own in these. Raises SceneError."""
+    def _held_by_deck(self) -> set[int]:
+        """Displacements that boundary conditions hold, of nodes with directions of their own in these."""
+        held: set[int] = set()
         wanted: dict[int, set[int]] = {}
         for boundary in self.deck.boundaries:
             first, last = max(boundary.first_dof, 1), min(boundary.last_dof, 6)
@@ -152,6 +147,7 @@ class _Builder:
                 held.update(self._held(node, sorted(dof - 1 for dof in dofs if dof <= 3)))
             if node in turns:
                 held.update(3 * turns[node] + dof - 4 for dof in dofs if dof > 3)
+        return held
 
     def _held(self, node: int, local: list[int]) -> list[int]:
         """Displacements that are 0 where those along some directions of a node are."""

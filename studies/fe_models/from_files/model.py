@@ -14,8 +14,7 @@ from solver.model import FloatArray, ReducedModel
 from studies.fe_models.deck.contents import Deck
 from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_digest
 from studies.fe_models.from_files.constraints import Supported, find_constraints
-from studies.fe_models.from_files.export_mistakes import check_nodes_have_dofs
-from studies.fe_models.from_files.imported import import_matrices, read_recovery
+from studies.fe_models.from_files.imported import check_nodes_have_dofs, import_matrices, read_recovery
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import Selections, find_clamped, find_cut, find_surfaces
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
@@ -33,15 +32,13 @@ from studies.scene_error import SceneError
 
 @dataclass(frozen=True)
 class LoadedModel:
-    """A model as its files and the study describe it.
+    """A model as its files and the study describe it. deck: in units of the files. model, joint: SI.
 
-    deck: in units of the file. mesh: m. model, joint: SI.
     omega_squared_held: square of the speed at which the matrices were made, rad2/s2; None where they do not tell.
     """
 
     deck: Deck
     units: Units
-    mesh: SolidMesh
     model: FeModel
     joint: JointDefinition
     omega_squared_held: float | None
@@ -122,10 +119,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
         imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
     nodes = mesh if imported is None else imported.mesh
-    numbers = nodes.numbers
-    if clamped is not None:
-        clamped = np.pad(clamped, ((0, len(numbers) - len(clamped)), (0, 0)))
-    supported = find_constraints(deck, numbers, clamped, units, on_cut)
+    supported = find_constraints(deck, nodes.numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
     n_nodes, forms = len(supported.held), None
@@ -157,7 +151,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         constraints=supported.constraints,
         pairs=_pairs_of_table(selections, whole, contacts, axis),
     )
-    return LoadedModel(deck, units, mesh, model, joint, None if imported is None else imported.omega_squared_held)
+    return LoadedModel(deck, units, model, joint, None if imported is None else imported.omega_squared_held)
 
 
 def _check_assembled(deck: Deck, units: Units) -> None:
@@ -171,21 +165,15 @@ def _check_assembled(deck: Deck, units: Units) -> None:
 
 
 def _pairs_of_table(
-    selections: Selections,
-    mesh: SolidMesh,
-    contacts: tuple[ContactSurfaces, ...],
-    axis: CyclicAxis | None,
+    selections: Selections, mesh: SolidMesh, contacts: tuple[ContactSurfaces, ...], axis: CyclicAxis | None
 ) -> ContactPairs | None:
     """Pairs of a table of nodes; None of a mesh, whose facets make them."""
     table, length = selections.deck.contact_nodes, selections.units.length
     if table is None:
         return None
-    others = mesh.n_nodes - len(table.area)
-    area, gap = (
-        np.pad(each, (0, others), constant_values=np.nan) for each in (table.area * length**2, table.gap * length)
-    )
-    normals = np.pad(table.normals, ((0, others), (0, 0)), constant_values=np.nan)
-    return match_nodes(mesh, contacts, (area, normals, gap), axis)
+    given = np.column_stack([table.area * length**2, table.normals, table.gap * length])
+    area, *normals, gap = np.pad(given.T, ((0, 0), (0, mesh.n_nodes - len(given))), constant_values=np.nan)
+    return match_nodes(mesh, contacts, (area, np.stack(normals, axis=1), gap), axis)
 
 
 def _preload(selections: Selections, supported: Supported) -> FloatArray:

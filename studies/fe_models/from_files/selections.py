@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.model import BoolArray, IntArray
+from solver.model import IntArray
 from studies.fe_models.deck.contents import Deck, SurfacePair
 from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import Parameters
@@ -221,11 +221,7 @@ def find_cut(selections: Selections, axis: CyclicAxis | None, contacts: Sequence
     return match_cut_faces(mesh, axis, first, second)
 
 
-def find_clamped(selections: Selections) -> BoolArray | None:
-    """Displacements (n_nodes, 3) of the nodes that the study clamps; None where the deck says what is held."""
-    if selections.parameters.clamp is None:
-        return None
-    held = np.zeros((selections.mesh.n_nodes, 3), dtype=np.bool_)
-    for name in selections.parameters.clamp:
-        held[selections.nodes(name, "clamp")] = True
-    return held
+def find_clamped(selections: Selections) -> IntArray | None:
+    """Rows of the nodes that the study clamps; None where the deck says what is held. Raises SceneError."""
+    names = selections.parameters.clamp
+    return None if names is None else np.concatenate([_NONE, *(selections.nodes(name, "clamp") for name in names)])
