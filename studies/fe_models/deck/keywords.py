@@ -9,11 +9,13 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, read_float, read_integer, shown
+
+_Thing = TypeVar("_Thing")
 
 
 def read_name(text: str) -> str:
@@ -26,9 +28,9 @@ def read_name(text: str) -> str:
 
 @dataclass(frozen=True)
 class Reference:
-    """What a line points to: the name of a set or surface in capitals, or a number, in a scope.
+    """What a line points to: the name of a set or surface in capitals, or a number, perhaps with "INSTANCE." before it.
 
-    scope: name of an instance, "" outside of instances. target: "INSTANCE.7" and "INSTANCE.NAME" are of an instance.
+    scope: name of the instance in which it stands, "" outside of instances.
     """
 
     scope: str
@@ -95,9 +97,9 @@ class Block:
         return Row(fields, Place(*self.places[line], self.place.keyword), self.scope)
 
     def rows(self, least: int = 0, what: str = "") -> Iterator[Row]:
-        """The data lines, each with at least so many fields; at least one, unless none is asked for. what: they are.
+        """The data lines, each with at least so many fields; at least one, unless none is asked for.
 
-        Raises SceneError.
+        what: the fields. Raises SceneError.
         """
         if least and not self.lines:
             raise self.place.wrong("no data lines", f"give {what} below it")
@@ -112,6 +114,16 @@ class Block:
         if line >= len(self.lines):
             raise self.place.wrong("the data line is missing", "give the numbers below it")
         return self.row(line).reals(0, least, f"{least}")
+
+    def points(self, line: int = 0) -> FloatArray:
+        """Two points or vectors (2, 3) in a data line. Raises SceneError."""
+        return np.array(self.reals(line, 6)[:6]).reshape(2, 3)
+
+    def below(self, thing: _Thing | None, keyword: str) -> _Thing:
+        """What a keyword above this one has begun. Raises SceneError where it has not."""
+        if thing is None:
+            raise self.place.wrong(f"no *{keyword} to which it belongs", f"write *{keyword} above it")
+        return thing
 
     def name(self, parameter: str) -> str:
         """The value of a parameter that is a name, in capitals. Raises SceneError where it is missing."""
