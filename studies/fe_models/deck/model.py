@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -109,7 +109,7 @@ class Model:
         gone = NONE
         for removed, elements, _ in self.get("removed"):
             gone = np.union1d(gone, elements) if removed else np.setdiff1d(gone, elements)
-        solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.blocks if block.kind in NODES_OF_KIND]
+        solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.solid_blocks]
         faces = {name: (surface, ~np.isin(surface.elements, gone)) for name, surface in mesh.surfaces.items()}
         kept = np.setdiff1d(mesh.all_elements[mesh.solid], gone)
         names = ("boundaries", "transforms", "equations", "rigid_motions", "forces", "pressures")
@@ -173,9 +173,8 @@ class Model:
         given, thermal = self.get("temperatures"), self.thermal
         if thermal.keys() >= {"TEMPERATURE", "EXPANSION"}:
             raise thermal["TEMPERATURE"].wrong("it strains materials with *EXPANSION", "remove one of them")
-        solid = [each.nodes.ravel() for each in self.mesh.blocks if each.kind in NODES_OF_KIND]
         warm = np.concatenate([NONE, *(nodes for nodes, _ in given)])
-        everywhere = np.isin(np.concatenate([NONE, *solid]), warm).all() and "TEMPERATURE" not in thermal
+        everywhere = "TEMPERATURE" not in thermal and all(np.isin(b.nodes, warm).all() for b in self.mesh.solid_blocks)
         values = {value for _, value in given} if everywhere else set()
         problem, found = material.problem, list[float | None]()
         for name, column, n_values in (("ELASTIC", 0, 2), ("ELASTIC", 1, 2), ("DENSITY", 0, 1)):
@@ -229,11 +228,11 @@ class Model:
 def deck_of_arrays(
     name: str,
     nodes: tuple[IntArray, FloatArray],
-    blocks: Mapping[str, tuple[IntArray, IntArray]],
-    node_sets: Mapping[str, IntArray],
-    element_sets: Mapping[str, IntArray],
+    blocks: Sequence[tuple[str, IntArray, IntArray]],
+    node_sets: Iterable[tuple[str, IntArray]],
+    element_sets: Iterable[tuple[str, IntArray]],
 ) -> Deck:
-    """A deck of node numbers (n,) with coordinates (n, 3), and numbers and nodes of elements by kind.
+    """A deck of node numbers (n,) with coordinates (n, 3), kind, numbers and nodes of elements, and parts of sets.
 
     Raises SceneError where numbers do not fit, or there are no elements.
     """
@@ -242,8 +241,8 @@ def deck_of_arrays(
         found = f"{name}: a coordinate is not a finite number" if blocks else f"{name} has no solid elements"
         raise SceneError("model", found, "write the volumes of the mesh again")
     draft = Draft(name, [Records("", *nodes, place)])
-    draft.elements += [Records("", numbers, own, place, kind) for kind, (numbers, own) in blocks.items()]
+    draft.elements += [Records("", numbers, own, place, kind) for kind, numbers, own in blocks]
     for sets, given in ((draft.node_sets, node_sets), (draft.element_sets, element_sets)):
-        for key, members in given.items():
-            sets.add(("", key.strip().upper()), Numbers("", members))
+        for key, members in given:
+            sets.add(("", key.strip().upper()), Numbers("", np.asarray(members, dtype=np.int64)))
     return Model(Mesh(draft)).deck()
