@@ -56,8 +56,8 @@ class Mesh:
     """Nodes, elements, sets and surfaces of a draft under the numbers that they have in the deck.
 
     offsets: what is added to the numbers of every scope. numbers (n,), coordinates (n, 3): of the nodes. blocks: by
-    kind. all_elements, kinds, solid (m,): numbers of all elements, their kinds, and whether these are read. nodes,
-    elements: those of a set or number. Raises SceneError where numbers or names are missing or do not fit.
+    kind. solid_blocks: those that are read. nodes, elements: of a set or number. Raises SceneError where numbers or
+    names are missing or do not fit.
     """
 
     def __init__(self, draft: Draft) -> None:
@@ -65,12 +65,12 @@ class Mesh:
         self.offsets = _find_offsets(draft)
         self.numbers, self.coordinates = _build_nodes(draft, self.offsets)
         self.blocks = _build_blocks(draft, self.offsets, self.numbers)
-        order = np.concatenate([NONE, *(block.numbers for block in self.blocks)])
+        self.solid_blocks = [block for block in self.blocks if block.kind in NODES_OF_KIND]
+        elements = np.concatenate([NONE, *(block.numbers for block in self.blocks)])
         kinds = np.repeat([block.kind for block in self.blocks], [block.numbers.size for block in self.blocks])
-        rows = np.argsort(order)
-        self.all_elements, self.kinds = order[rows], kinds[rows]
-        self.solid = np.isin(self.kinds, list(NODES_OF_KIND))
-        self.elements = Resolver(draft.element_sets, self.all_elements, self.offsets, "EALL")
+        order = np.argsort(elements)
+        self._kinds = kinds[order]
+        self.elements = Resolver(draft.element_sets, elements[order], self.offsets, "EALL")
         self.nodes = Resolver(draft.node_sets, self.numbers, self.offsets, "NALL", self.nodes_of)
         # sets first: their errors are about the lines where they are defined
         self.element_sets, self.node_sets = self._sets(self.elements), self._sets(self.nodes)
@@ -85,11 +85,6 @@ class Mesh:
         later = [(name, offset) for name, offset in self.offsets.items() if offset]
         numbering = (f"Node 1 of {name or 'the assembly'} is node {offset + 1}." for name, offset in later)
         return (*self.nodes.notes, *self.elements.notes, *numbering)
-
-    @property
-    def solid_blocks(self) -> list[ElementBlock]:
-        """Elements that are read."""
-        return [block for block in self.blocks if block.kind in NODES_OF_KIND]
 
     def name_of_elements(self, reference: Reference) -> str:
         """Name that a set of elements has in the deck; the number of a single one."""
@@ -138,7 +133,8 @@ class Mesh:
 
     def other_kinds(self, elements: IntArray) -> list[str]:
         """Kinds of those elements (m,) that are not read."""
-        return sorted(set(self.kinds[np.isin(self.all_elements, elements) & ~self.solid].tolist()))
+        others = [block for block in self.blocks if block.kind not in NODES_OF_KIND]
+        return sorted(block.kind for block in others if np.isin(elements, block.numbers).any())
 
     def placed(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
         """Points or vectors (n, 3) of an instance where the instance stands."""
@@ -167,8 +163,7 @@ class Mesh:
             self._faces_left -= members.size
             if self._faces_left < 0:
                 raise reference.place.wrong(f"more than {_MOST_FACES} faces", "remove surfaces that are not used")
-            kinds = self.kinds[np.searchsorted(self.all_elements, members)]
-            for kind in set(kinds.tolist()):
+            for kind in set(self._kinds[np.searchsorted(self.elements.existing, members)].tolist()):
                 if kind not in ELEMENT_KINDS or len(ELEMENT_KINDS[kind].corner_faces) < face:
                     what = f"elements of {shown(reference.target)} have no face S{face}: they are {kind}"
                     raise reference.place.wrong(what, "give another, of a solid element")

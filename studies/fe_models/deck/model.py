@@ -111,7 +111,7 @@ class Model:
             gone = np.union1d(gone, elements) if removed else np.setdiff1d(gone, elements)
         solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.solid_blocks]
         faces = {name: (surface, ~np.isin(surface.elements, gone)) for name, surface in mesh.surfaces.items()}
-        kept = np.setdiff1d(mesh.all_elements[mesh.solid], gone)
+        kept = np.setdiff1d(np.concatenate([NONE, *(block.numbers for block in mesh.solid_blocks)]), gone)
         names = ("boundaries", "transforms", "equations", "rigid_motions", "forces", "pressures")
         fields: dict[str, Any] = {name: tuple(self.get(name)) for name in names}
         loads = [load for load in self.get("centrifugal") if np.isin(load.elements, kept).any() or not kept.size]

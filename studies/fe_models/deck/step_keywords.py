@@ -220,7 +220,6 @@ def _cload(model: Model, block: Block) -> None:
 def _dload(model: Model, block: Block) -> None:
     """CENTRIF in any step, P1 to P6 and GRAV in static ones; other loads are refused there."""
     step = _step_of_load(model, block, "gravity", "centrifugal", "pressures")
-    fresh = step.fresh
     for row in block.rows(2, "set, type and size"):
         kind = row.text(1).upper()
         if kind not in ("CENTRIF", "GRAV", "P1", "P2", "P3", "P4", "P5", "P6"):
@@ -236,9 +235,9 @@ def _dload(model: Model, block: Block) -> None:
             values = row.reals(2, 6, "omega^2, a point and the axis")
             axis = np.array((values + [0.0])[4:7]) if values[0] >= 0 else np.zeros(3)
             axis = unit(axis, row.place, "omega^2 of at least 0, a point and the axis")
-            if fresh:
+            if step.fresh:
                 model.fields["centrifugal"] = {}  # the last step that has some
-            fresh = step.fresh = False
+            step.fresh = False
             load = elements, values[0], np.array(values[1:4]), axis
             model.add("centrifugal", CentrifugalLoad(str(row.place), *load))
         else:

@@ -62,7 +62,7 @@ def _materials(deck: Deck, parameters: Parameters, units: Units) -> Iterator[tup
     """Label, element numbers and material; where an element has several the last one holds."""
     given, whole = parameters.material, None
     if isinstance(given, MaterialTable):
-        whole = _own(given)
+        whole = Material(**given.model_dump())
     elif parameters.matrices is not None:
         whole = _NOTHING
     if whole is not None:
@@ -84,11 +84,7 @@ def _materials(deck: Deck, parameters: Parameters, units: Units) -> Iterator[tup
             known = ", ".join(sorted(deck.element_sets)[:6]) or "none"
             found_none = f'there is no set of elements "{name}" in {deck.path}'
             raise SceneError("material", found_none, f"give one of {known}")
-        yield name.strip().upper(), elements, _own(table)
-
-
-def _own(table: MaterialTable) -> Material:
-    return Material(table.young_modulus, table.poisson_ratio, table.density)
+        yield name.strip().upper(), elements, Material(**table.model_dump())
 
 
 def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotation | None, CyclicAxis | None]:
