@@ -99,8 +99,9 @@ def read_cdb(path: Path) -> Deck:
 
 def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
     if np.any(archive.node_angles):
-        found = f"{path.name} has nodes with coordinate systems of their own"
-        raise SceneError("model", found, "write it with NROTAT to the global one: its directions are x, y and z")
+        raise SceneError(
+            "model", f"{path.name} has nodes with directions of their own", "NROTAT them to the global ones"
+        )
     rows: dict[str, list[tuple[int, IntArray]]] = {}
     passed: set[int] = set()
     materials: set[int] = set()
@@ -167,8 +168,7 @@ def _read_commands(path: Path) -> _Commands:
         elif command == "D":
             _add_displacement(found, fields, place)
         elif (command == "EBLO" and "SOLID" not in fields) or not _is_skipped(command, fields):
-            text = f"{shown(fields[0])} may change the model, and is not acted upon"
-            raise place.wrong(text, _REMEDIES.get(command, _REMEDY))
+            raise place.wrong(f"{shown(fields[0])} may change the model", _REMEDIES.get(command, _REMEDY))
     return found
 
 

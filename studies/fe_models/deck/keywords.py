@@ -144,8 +144,7 @@ class Block:
         """The same of a parameter that must be one of the known ones. Raises SceneError."""
         value = self.value(parameter) or default
         if value not in known:
-            remedy = f"write {parameter}={' or '.join(known)}, or remove the keyword"
-            raise self.place.wrong(f"{parameter}={shown(value)} is not read", remedy)
+            raise self.place.wrong(f"{parameter}={shown(value)} is not read", f"write {' or '.join(known)}")
         return value
 
 
@@ -274,6 +273,6 @@ def find_keyword(block: Block, *, any_parameters: bool = False) -> Keyword:
         raise block.place.wrong("this keyword is not read, and may change the model", remedy)
     for name in block.parameters:
         if not (any_parameters or {name, "*"} & known.parameters or name in known.harmless):
-            found = f"{shown(name)} is not read, and may change the model"
-            raise block.place.wrong(found, f"leave {shown(name)} out if the model is right without it")
+            remedy = "leave it out if the model is right without it"
+            raise block.place.wrong(f"{shown(name)} is not read, and may change the model", remedy)
     return known

@@ -95,8 +95,7 @@ class Mesh:
         """A node, or the only one of a set."""
         found = self.nodes(reference)
         if found.size != 1:
-            what = f"{shown(reference.target)} has {found.size} nodes"
-            raise reference.place.wrong(what, "give one reference node that exists")
+            raise reference.place.wrong(f"{shown(reference.target)} has {found.size} nodes", "give one that exists")
         return int(found[0])
 
     def ordered(self, reference: Reference) -> IntArray:
@@ -104,8 +103,8 @@ class Mesh:
         found = self.nodes(reference)
         unsorted = found.size > 1 and self.nodes.key(reference) in self.draft.node_sets.unsorted
         if unsorted or not found.size:
-            found_wrong = f"the set {shown(reference.target)} " + ("is UNSORTED" if unsorted else "has no node")
-            raise reference.place.wrong(found_wrong, "give nodes that exist, one by one")
+            what = f"the set {shown(reference.target)} is UNSORTED, or has no node"
+            raise reference.place.wrong(what, "give nodes that exist, one by one")
         return found
 
     def surface(self, reference: Reference) -> str:
@@ -165,8 +164,8 @@ class Mesh:
                 raise reference.place.wrong(f"more than {_MOST_FACES} faces", "remove surfaces that are not used")
             for kind in set(self._kinds[np.searchsorted(self.elements.existing, members)].tolist()):
                 if kind not in ELEMENT_KINDS or len(ELEMENT_KINDS[kind].corner_faces) < face:
-                    what = f"elements of {shown(reference.target)} have no face S{face}: they are {kind}"
-                    raise reference.place.wrong(what, "give another, of a solid element")
+                    what = f"elements of {shown(reference.target)} have no face S{face}"
+                    raise reference.place.wrong(what, f"give one of a solid element, not of {kind}")
             found.append(np.stack((members, np.full(members.size, face)), axis=1))
         both = np.unique(np.concatenate(found), axis=0)
         return Surface(both[:, 0].copy(), both[:, 1].copy(), NONE)

@@ -66,8 +66,9 @@ def _instance(draft: Draft, block: Block) -> None:
     """The mesh of a part, shifted and turned; sets of the assembly with all of the instance."""
     name, part = block.name("NAME"), block.name("PART")
     if part not in draft.parts or draft.part or draft.scope or name in draft.placed:
-        what = f"{shown(name)} of {shown(part)}, which is no part, or again"
-        raise block.place.wrong(what, "give *PART above it, and each instance once")
+        raise block.place.wrong(
+            f"{shown(name)} of {shown(part)}, no part, or again", "give *PART above it, and each once"
+        )
     draft.placed[name] = _placement(block)
     draft.scope, draft.system = name, None
     for each in draft.parts[part]:
@@ -112,7 +113,7 @@ def _element(draft: Draft, block: Block) -> None:
     kind = block.name("TYPE")
     length = NODES_OF_KIND.get(kind) or OTHER_KINDS.get(kind)
     if length is None:
-        remedy = f"mesh the model with {', '.join(NODES_OF_KIND)}, and remove elements that carry nothing"
+        remedy = f"mesh with {', '.join(NODES_OF_KIND)}, and remove elements that carry nothing"
         raise block.place.wrong(f"elements of type {shown(kind)}", remedy)
     records = read_records(block, length + 1, f"a {kind} of {length} nodes with its number")
     _add(draft, block, records[:, 0], records[:, 1:], kind=kind)
@@ -258,8 +259,7 @@ def _whole_numbers(fields: list[str], place: Place, default: tuple[int, ...]) ->
     values = list(default)
     for at, text in enumerate(fields):
         if at >= len(values) or (text and not (is_integer(text) and 0 < abs(int(text)) <= LARGEST_NUMBER)):
-            what = f"{shown(text)!r} in place of a number"
-            raise place.wrong(what, f"give at most {len(values)} whole numbers, none of them 0")
+            raise place.wrong(f"{shown(text)!r} in place of a number", f"give {len(values)} whole ones, none of them 0")
         values[at] = int(text) if text else values[at]
     return values
 

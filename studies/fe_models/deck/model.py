@@ -196,13 +196,11 @@ class Model:
         fits: dict[frozenset[str], tuple[str, float | None]] = {}
         for names, value, place in self.get("fits"):
             if frozenset(names) not in {frozenset(each) for each, *_ in pairs}:
-                found = f"there is no contact pair of {names[0]} and {names[1]}"
-                raise place.wrong(found, "give the surfaces of a *CONTACT PAIR")
+                raise place.wrong(f"no contact pair of {names[0]} and {names[1]}", "give those of a *CONTACT PAIR")
             fits[frozenset(names)] = str(place) + ("" if value is None else f" of {value:g}"), value
         for names, interaction, glued, adjusted, place in pairs:
             if interaction and interaction not in self.interactions:
-                found = f"there is no interaction {shown(interaction)}"
-                raise place.wrong(found, "define it with *SURFACE INTERACTION")
+                raise place.wrong(f"there is no interaction {shown(interaction)}", "define *SURFACE INTERACTION")
             law = self.interactions.get(interaction, Interaction())
             if frozenset(names) not in apart:
                 (one, other), (fitted, clearance) = names, fits.get(frozenset(names), ("", None))
@@ -220,8 +218,8 @@ class Model:
             own = (first.axis[1] - first.axis[0]) / np.linalg.norm(first.axis[1] - first.axis[0])
             apart = np.cross(axis - first.axis[0], own) / np.linalg.norm(axis[1] - axis[0])
             if number != first.n_sectors or np.abs(apart).max() > _SAME_AXIS or (axis[1] - axis[0]) @ own < 0:
-                found = f"{number} sectors, another one has {first.n_sectors}, or about other axes"
-                raise place.wrong(found, "give all of them one N and one axis: several stages are not supported")
+                what = f"{number} sectors, another one has {first.n_sectors}, or about other axes"
+                raise place.wrong(what, "give all of them one N and one axis: several stages are not supported")
         return first
 
 
@@ -238,8 +236,7 @@ def deck_of_arrays(
     """
     place = Place(name, 1)
     if not blocks or not np.isfinite(nodes[1]).all():
-        found = f"{name}: a coordinate is not a finite number" if blocks else f"{name} has no solid elements"
-        raise SceneError("model", found, "write the volumes of the mesh again")
+        raise SceneError("model", f"{name} has no solid elements, or coordinates that are infinite", "write it again")
     draft = Draft(name, [Records("", *nodes, place)])
     draft.elements += [Records("", numbers, own, place, kind) for kind, numbers, own in blocks]
     for sets, given in ((draft.node_sets, node_sets), (draft.element_sets, element_sets)):

@@ -40,8 +40,8 @@ def _elastic(model: Model, block: Block) -> None:
     material.rows["ELASTIC"] = [block.reals(line, 2) for line in range(max(len(block.lines), 1))]
     for young, poisson, *_ in material.rows["ELASTIC"]:
         if not young > 0 or not -1 < poisson < 0.5:
-            found = f"Young's modulus {young:g} and Poisson's ratio {poisson:g}"
-            raise block.place.wrong(found, "give a positive modulus, and a ratio between -1 and 0.5")
+            what = f"Young's modulus {young:g} and Poisson's ratio {poisson:g}"
+            raise block.place.wrong(what, "give a positive modulus, and a ratio between -1 and 0.5")
 
 
 @keyword("DENSITY")
@@ -122,8 +122,9 @@ def _equation(model: Model, block: Block) -> None:
         while len(fields) < 3 * n_terms and (more := next(rows, None)) is not None:
             fields += more.fields + [""] * (-len(more.fields) % 3)
         if len(fields) != 3 * n_terms:
-            found = f"{len(fields)} entries for {n_terms} terms"
-            raise head.place.wrong(found, "give node, dof and coefficient of each")
+            raise head.place.wrong(
+                f"{len(fields)} entries for {n_terms} terms", "give node, dof and coefficient of each"
+            )
         terms = [Row(fields[at : at + 3], head.place, block.scope) for at in range(0, len(fields), 3)]
         model.add("equations", *_equations(model, terms, head.place))
 
@@ -136,8 +137,7 @@ def _equations(model: Model, terms: list[Row], place: Place) -> Iterator[Equatio
         raise place.wrong("the first coefficient is 0", "give a first term that depends on the others")
     count = max(map(len, nodes))
     if len(nodes[0]) != count or any(len(each) not in (1, count) for each in nodes):
-        found = f"sets of {' and '.join(str(len(each)) for each in nodes)} nodes"
-        raise place.wrong(found, "give sets of as many nodes as the first one, or one node")
+        raise place.wrong("sets of different sizes", "give sets of as many nodes as the first one, or one node")
     for row in range(count):
         own = np.array([each[min(row, len(each) - 1)] for each in nodes])
         yield Equation(str(place), own, dofs, values)

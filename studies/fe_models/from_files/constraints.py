@@ -83,7 +83,7 @@ class _Builder:
         return Supported(fixed, extra, constraints, own, forces, references)
 
     def _row(self, number: int, place: str, kind: str = "") -> int:
-        """Row of a node or of what else it has; one without elements is added. Raises SceneError where there is none."""
+        """Row of a node, or of what else it has; what is not there is added. Raises SceneError where it is no node."""
         if (kind, number) not in self.rows:
             if not np.isin(number, self.deck.node_numbers):
                 raise SceneError("model", f"{place}: there is no node {number}", "define it with *NODE")
@@ -125,8 +125,9 @@ class _Builder:
         for boundary in self.deck.boundaries:
             first, last = max(boundary.first_dof, 1), min(boundary.last_dof, 6)
             if first <= min(last, 3) and boundary.value != 0.0:
-                found = f"{boundary.place} moves nodes by {boundary.value:g}"
-                raise SceneError("clamp", found, "hold it, or give `clamp`")
+                raise SceneError(
+                    "clamp", f"{boundary.place} moves nodes by {boundary.value:g}", "hold it, or give `clamp`"
+                )
             for node in boundary.nodes:
                 wanted.setdefault(int(node), set()).update(range(first, last + 1))
         turns = {motion.reference: self._turn(motion) for motion in self.deck.rigid_motions if motion.turns}
@@ -176,8 +177,7 @@ class _Builder:
             axis = (end - start) / np.linalg.norm(end - start)
             radial = arm - (arm @ axis) * axis
             if not np.linalg.norm(radial) > _ROUND_OFF * np.linalg.norm(end - start):
-                found = f"{transform.place}: node {node} is on the axis"
-                raise SceneError("model", found, "take it out of the set: it has no radial direction")
+                raise SceneError("model", f"{transform.place}: node {node} is on the axis", "take it out of the set")
             frame = np.stack([radial, np.cross(axis, radial), axis])
         return np.asarray(frame / np.linalg.norm(frame, axis=1, keepdims=True))
 

@@ -111,8 +111,7 @@ def import_matrices(
     other = np.flatnonzero((matrices.direction < 0) | (matrices.direction > 2))
     if other.size:
         found = f"{matrices.files[0]}: node {matrices.node[other[0]]} has the dof {matrices.direction[other[0]] + 1}"
-        remedy = "export a model of solid elements: dofs 1 to 3; to reduced matrices belongs a table of nodes, .csv"
-        raise SceneError("matrices", found, remedy)
+        raise SceneError("matrices", found, "export dofs 1 to 3; to reduced matrices belongs a table of nodes, .csv")
     check_units(deck, mass_of(deck, matrices), units)
     check_mass(deck, matrices, units)
     for each in (*surfaces[0], *surfaces[1]):
@@ -132,8 +131,9 @@ def _check_table(matrices: Matrices, selections: Selections, on_cut: IntArray) -
     # forces of rotation are among those of the matrices, or in `preload`
     for key in ("material", "rotation_speed"):
         if getattr(selections.parameters, key) is not None:
-            remedy = "leave it out: reduced matrices have it in them, and forces stand in their load or in preload"
-            raise SceneError(key, "the model is a table of nodes", remedy)
+            raise SceneError(
+                key, "the model is a table of nodes", "leave it out: forces stand in the load, or in preload"
+            )
     if matrices.load is not None and matrices.load.shape[1] > 1:
         raise SceneError("matrices", f"{matrices.files[0]}: several load cases", "give one column of forces")
     lost = np.setdiff1d(deck.node_numbers, matrices.node)
@@ -142,8 +142,7 @@ def _check_table(matrices: Matrices, selections: Selections, on_cut: IntArray) -
         raise SceneError("matrices", found, "give the nodes that the matrices keep")
     turning = matrices.node[np.isin(matrices.node, on_cut) & (matrices.direction > 2)]
     if len(turning):
-        found = f"node {turning[0]} of a cut face has rotations"
-        raise SceneError("cut_faces", found, "reduce the sector to the displacements of its cut faces")
+        raise SceneError("cut_faces", f"node {turning[0]} has rotations", "reduce the sector to displacements there")
 
 
 def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> None:
@@ -215,8 +214,8 @@ def check_mass(deck: Deck, matrices: Matrices, units: Units) -> None:
     # of a deck that lacks a density nothing is known
     if not math.isnan(expected) and not least <= found / expected <= 1 + _MASS_AGREES:
         masses = f"{found * units.mass:.3g} kg in the matrices, {expected * units.mass:.3g} kg by density and volume"
-        remedy = "give both of one run and in the same units, or a deck without *DENSITY"
-        raise SceneError("matrices", f"{matrices.files[0]} and {deck.path}: {masses}", remedy)
+        found_both = f"{matrices.files[0]} and {deck.path}: {masses}"
+        raise SceneError("matrices", found_both, "give both of one run in the same units, or a deck without *DENSITY")
 
 
 def omega_squared_of(deck: Deck, matrices: Matrices, axis: FloatArray) -> float | None:

@@ -160,8 +160,7 @@ def _check_assembled(deck: Deck, units: Units) -> None:
         raise SceneError("matrices", "missing", f"give the matrices of the nodes of {deck.path}")
     check_units(deck, None, units)
     if deck.unassembled:
-        remedy = "use solid elements, of one material in a .cdb, or give `matrices` of another program"
-        raise SceneError("model", deck.unassembled[0], remedy)
+        raise SceneError("model", deck.unassembled[0], "use solid elements, of one material in a .cdb, or `matrices`")
 
 
 def _pairs_of_table(

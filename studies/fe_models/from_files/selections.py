@@ -62,8 +62,9 @@ class Selections:
         else:
             raise self._unknown(name, key, (*deck.node_sets, *deck.surfaces, *deck.element_sets))
         if len(found) == 0:
-            remedy = "give nodes of the mesh that no *MODEL CHANGE takes away"
-            raise SceneError(key, f"{name} in {deck.path} has no node of an element", remedy)
+            raise SceneError(
+                key, f"{name} in {deck.path} has no node of an element", "give nodes of the mesh that stay"
+            )
         return found
 
     def surface(self, name: str, key: str) -> Surface:
@@ -120,8 +121,8 @@ def find_surfaces(
         if glued:
             found = f"{glued[0].glued}: all contact pairs are glued, so that nothing wears"
             raise SceneError("contact", found, "name those that move: `contact` in the study")
-        found = f"{deck.path} has neither CONTACT PAIR nor TIE"
-        raise SceneError("contact", found, 'give pairs of surfaces, as [["BLADES", "DISKS"]]')
+        remedy = 'give pairs of surfaces, as [["BLADES", "DISKS"]]'
+        raise SceneError("contact", f"{deck.path} has neither CONTACT PAIR nor TIE", remedy)
     # a name that the deck does not have is said before a friction coefficient that is missing for it
     named = [_surfaces(selections, pair, "contact") for pair in chosen]
     friction = _friction(chosen, selections.parameters, deck)
@@ -150,8 +151,7 @@ def _surfaces(selections: Selections, pair: SurfacePair, key: str) -> ContactSur
     if tolerance is None and pair.tolerance is not None:
         tolerance = pair.tolerance * length
     if pair.adjusted and clearance is None and parameters.gaps:
-        remedy = "leave ADJUST out where the distances of the mesh count, else leave gaps out"
-        raise SceneError("gaps", f"{pair.adjusted} onto the other surface, so that there are no gaps", remedy)
+        raise SceneError("gaps", f"{pair.adjusted} onto the other surface", "leave out gaps, or else ADJUST")
     if pair.fitted and not parameters.gaps:
         raise SceneError("gaps", f"{pair.fitted}, and the study lets the surfaces touch", "give gaps = true")
     clearance = None if clearance is None else clearance * length
@@ -199,8 +199,7 @@ def _friction(chosen: list[SurfacePair], parameters: Parameters, deck: Deck) -> 
         found.append(own[-1] if own else pair.friction_coefficient)
         if found[-1] is None:
             what = pair.problem or f"missing for {pair.labels[-1]} in {deck.path}"
-            remedy = "give one coefficient, there with *FRICTION or by friction_coefficient in the study"
-            raise SceneError("friction_coefficient", what, remedy)
+            raise SceneError("friction_coefficient", what, "give one coefficient, in the study or there with *FRICTION")
     return found
 
 

@@ -53,8 +53,9 @@ def build_solid_mesh(deck: Deck, parameters: Parameters, units: Units) -> SolidM
             left &= ~own
         if left.any():
             found = f"{np.count_nonzero(left)} elements of {deck.path} have none, as element {block.numbers[left][0]}"
-            remedy = "give *SOLID SECTION with *ELASTIC and *DENSITY in the deck, or `material` in the study"
-            raise SceneError("material", found, remedy)
+            raise SceneError(
+                "material", found, "give *SOLID SECTION and *MATERIAL in the deck, or `material` in the study"
+            )
     return SolidMesh(coordinates, numbers, tuple(groups))
 
 
@@ -75,15 +76,13 @@ def _materials(deck: Deck, parameters: Parameters, units: Units) -> Iterator[tup
             values = found.young * units.stress, found.poisson, found.density * units.density
             yield section.name, section.elements, Material(*values)
         elif not isinstance(given, dict):
-            lacks = f"{section.material} in {deck.path} lacks Young's modulus, Poisson's ratio or density"
-            remedy = "give one isotropic law and a density in the deck, or `material` in the study"
-            raise SceneError("material", found.problem or lacks, remedy)
+            what = found.problem or f"{section.material} in {deck.path} is not complete"
+            raise SceneError("material", what, "give one isotropic law and a density there, or `material` in the study")
     for name, table in given.items() if isinstance(given, dict) else ():
         elements = deck.element_sets.get(name.strip().upper(), np.empty(0, dtype=np.int64))
         if elements.size == 0:
             known = ", ".join(sorted(deck.element_sets)[:6]) or "none"
-            found_none = f'there is no set of elements "{name}" in {deck.path}'
-            raise SceneError("material", found_none, f"give one of {known}")
+            raise SceneError("material", f'no set of elements is named "{name}" in {deck.path}', f"give one of {known}")
         yield name.strip().upper(), elements, Material(**table.model_dump())
 
 
@@ -131,8 +130,7 @@ def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
     for one, other in pairwise(loads):
         same = math.isclose(one.omega_squared, other.omega_squared, rel_tol=SPEED_AGREES)
         if not same or abs(one.axis @ other.axis) < 1 - 1e-9:
-            speeds = " and ".join(f"{math.sqrt(each.omega_squared):g} rad/s" for each in (one, other))
-            found = f"{other.place} turns otherwise than before: {speeds}"
+            found = f"{other.place} turns otherwise than {one.place}"
             raise SceneError("model", found, "give all of the model one speed and one axis")
     elements = np.concatenate([block.numbers for block in deck.blocks] or [np.empty(0, dtype=np.int64)])
     turning = np.unique(np.concatenate([load.elements for load in loads]))

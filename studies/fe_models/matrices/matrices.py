@@ -67,8 +67,7 @@ def label(node: IntArray, dof: IntArray, file: str) -> IntArray:
     """Labels (m,) of nodes and their dofs, from 1, or 0 for a coordinate of no place. Raises SceneError."""
     if node.size and (np.abs(node).max() > _MOST_NODES or dof.min() < 0 or dof.max() >= _DOFS):
         at = int(np.flatnonzero((np.abs(node) > _MOST_NODES) | (dof < 0) | (dof >= _DOFS))[0])
-        found = f"dof {dof[at]} of node {node[at]}"
-        wrong(file, found, f"give node numbers of at most ten digits, and dofs below {_DOFS}")
+        wrong(file, f"dof {dof[at]} of node {node[at]}", f"give numbers of at most ten digits, and dofs below {_DOFS}")
     return np.asarray(_DOFS * node + dof, dtype=np.int64)
 
 
@@ -107,11 +106,9 @@ def _entries_of_table(file: str, matrix: object, labels: IntArray) -> Entries:
         found = found.T.tocoo()
     if found.shape[0] != labels.size or found.shape[1] not in (1, labels.size):
         shape = " x ".join(str(length) for length in found.shape)
-        remedy = "give node and dof of each row, in the order of the rows"
-        wrong(file, f"{shape} entries for {labels.size} rows", remedy)
+        wrong(file, f"{shape} entries for {labels.size} rows", "give node and dof of each row, in their order")
     if np.iscomplexobj(found.data):
-        remedy = "give real matrices of the sector and its cut faces, or a scene file with nd/<k>"
-        wrong(file, "complex numbers", remedy)
+        wrong(file, "complex numbers", "give real matrices with both cut faces, or a scene file with nd/<k>")
     vector = found.shape[1] == 1 and labels.size > 1
     columns = np.zeros_like(found.col) if vector else labels[found.col]
     return Entries(file, labels[found.row], columns.astype(np.int64), found.data.astype(np.float64))
@@ -135,8 +132,8 @@ def assemble(parts: Mapping[str, Entries], files: tuple[str, ...], code: str) ->
     found = {name: _symmetric(each, labels) for name, each in square.items()}
     held = int(np.count_nonzero(found["stiffness"].diagonal() > _HELD))
     if held:
-        entries = f"{held} entries of the diagonal are 1e36: boundary conditions were active at export"
-        wrong(parts["stiffness"].file, entries, "remove them in the step that writes the matrices")
+        what = f"{held} entries of the diagonal are 1e36: boundary conditions were active at export"
+        wrong(parts["stiffness"].file, what, "remove them in the step that writes the matrices")
     node, direction = labels // _DOFS, labels % _DOFS - 1
     load = _forces(parts["load"], labels) if "load" in parts else None
     return Matrices(found["stiffness"], found["mass"], node, direction, files, code, found.get("damping"), load)

@@ -61,9 +61,8 @@ def read_punch(files: Mapping[str, Path]) -> dict[str, Entries]:
         for number, word, fields in _entries(file):
             fields = [*fields, *[""] * (_CD + 1 - len(fields))]
             if word in ("GRID", "GRDSET") and fields[_CD] not in ("", "0"):
-                found = f"line {number}: {word} {shown(fields[0])} has displacements in the coordinate system"
-                remedy = "write the matrices with all displacements in the basic system: CD blank"
-                wrong(path.name, f"{found} {shown(fields[_CD])} (CD)", remedy)
+                what = f"{word} {shown(fields[0])} has displacements in the coordinate system {shown(fields[_CD])}"
+                wrong(path.name, f"line {number}: {what}", "write all of them in the basic system: CD blank")
             if word == "DMIG" and fields[0][:1].upper() in ("K", "M", "B", "P"):
                 try:
                     _take(fields, columns, passed)
@@ -156,8 +155,7 @@ def read_op4(files: Mapping[str, Path]) -> dict[str, Entries]:
             values = np.concatenate([[], *(values for *_, values in parts)])
             found[name] = sparse.coo_array((values, (rows.astype(np.int64), columns.astype(np.int64))), shape=shape)
     except (ValueError, TypeError, IndexError, OverflowError, StopIteration) as error:
-        what = f"this is no OP4 file, or damaged ({shown(str(error))})"
-        wrong(path.name, what, "write it again: OUTPUT4 or EXTSEOUT")
+        wrong(path.name, f"no OP4 file, or damaged ({shown(str(error))})", "write it again: OUTPUT4 or EXTSEOUT")
     names = _names_of_matrices(found, path.name)
     return entries_of_tables({name: found[own] for name, own in names.items()}, files)
 

@@ -69,8 +69,7 @@ def _read_calculix(files: Files) -> dict[str, Entries]:
             found = f"{size} rows for {n_dof} dofs in {dofs.name}, written for a nodal diameter"
             wrong(path.name, found, "export without *SELECT CYCLIC SYMMETRY MODES, and with CYCMPC=INACTIVE")
         if size != n_dof or min(rows.min(), columns.min()) < 1:
-            found = f"{size} rows for {n_dof} dofs in {dofs.name}"
-            wrong(path.name, found, "give the three files of one run, each of them whole")
+            wrong(path.name, f"{size} rows for {n_dof} dofs in {dofs.name}", "give the three whole files of one run")
         parts[name] = Entries(path.name, labels[rows - 1], labels[columns - 1], values)
     return parts
 
@@ -102,8 +101,7 @@ def _read_columns(
             warnings.simplefilter("ignore", UserWarning)  # of a file without data
             table = np.loadtxt(path, columns, comment, separator, encoding="latin-1", ndmin=1)
     except (ValueError, OverflowError) as error:
-        what = f"give lines of {kinds.count(int)} whole numbers and {kinds.count(float)} values"
-        remedy = what + (", of Abaqus FORMAT=MATRIX INPUT" if separator == "," else "")
+        remedy = "write them again" + (", FORMAT=MATRIX INPUT" if separator == "," else "")
         wrong(path.name, f"a line is no row of numbers ({shown(str(error))})", remedy)
     if not table.size:
         wrong(path.name, "no entries in the file", "export it again")
@@ -137,8 +135,7 @@ def _read_substructure(files: Files) -> dict[str, Entries]:
             except ValueError:
                 wrong(path.name, f"line {number} is {shown(text)!r}", "write OUTPUT FILE=USER DEFINED")
     if not nodes or not dofs:
-        remedy = "write *SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED"
-        wrong(path.name, "no *USER ELEMENT with its nodes", remedy)
+        wrong(path.name, "no *USER ELEMENT with its nodes", "write OUTPUT FILE=USER DEFINED")
     labels = _labels_of_substructure(nodes, dofs, path.name)
     column, row = np.tril_indices(labels.size)
     parts = {}
@@ -146,8 +143,7 @@ def _read_substructure(files: Files) -> dict[str, Entries]:
         if name not in _OF_TYPE.values():
             continue
         if len(values) != row.size:
-            found = f"{len(values)} entries of {name} for {labels.size} dofs, whose triangle has {row.size}"
-            wrong(path.name, found, "write it again, symmetric")
+            wrong(path.name, f"{len(values)} entries of {name} for {labels.size} dofs", "write the whole triangle")
         parts[name] = Entries(path.name, labels[row], labels[column], np.array(values))
     return parts
 
@@ -215,12 +211,10 @@ def _read_ansys(files: Files) -> dict[str, Entries]:
             file = reader.read_binary(str(path))
         except NotImplementedError as error:
             what = "lumped" if "lumped" in str(error) else "not symmetric"
-            remedy = "write them consistent and symmetric: LUMPM,OFF and no CORIOLIS"
-            wrong(path.name, f"the matrices are {what}", remedy)
+            wrong(path.name, f"the matrices are {what}", "write them with LUMPM,OFF and without CORIOLIS")
         reference, stiffness, mass = file.load_km() if hasattr(file, "load_km") else (None, None, None)
         if stiffness is None or mass is None:
-            remedy = "write the .full file of a modal analysis: HBMAT or WRFULL before the solution"
-            wrong(path.name, "no stiffness and mass", remedy)
+            wrong(path.name, "no stiffness and mass", "write that of a modal analysis, with HBMAT or WRFULL before it")
         held = np.array([[node, direction] for node, direction in file.const], dtype=np.int64).reshape(-1, 2)
     reference = np.asarray(reference, dtype=np.int64)
     labels = label(reference[:, 0], reference[:, 1] + 1, path.name)
