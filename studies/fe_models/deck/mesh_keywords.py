@@ -66,9 +66,8 @@ def _instance(draft: Draft, block: Block) -> None:
     """The mesh of a part, shifted and turned; sets of the assembly with all of the instance."""
     name, part = block.name("NAME"), block.name("PART")
     if part not in draft.parts or draft.part or draft.scope or name in draft.placed:
-        raise block.place.wrong(
-            f"{shown(name)} of {shown(part)}, no part, or again", "give *PART above it, and each once"
-        )
+        what = f"{shown(name)} of {shown(part)}, which is no part, or again"
+        raise block.place.wrong(what, "give *PART above it, and each instance once")
     draft.placed[name] = _placement(block)
     draft.scope, draft.system = name, None
     for each in draft.parts[part]:
