@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from studies.fe_models.cdb import read_cdb
-from studies.fe_models.deck.contents import ContactNodes, Deck
+from studies.fe_models.deck.contents import Deck
 from studies.fe_models.deck.model import deck_of_arrays
 from studies.fe_models.deck.read import read_deck
 from studies.fe_models.files import IntArray, library_errors
@@ -131,7 +131,7 @@ def _read_node_table(path: Path) -> Deck:
             raise SceneError("model", f"{path.name} has no column {missing[0]}", f"give {listed}")
         table = table.sort_values("node")
         places = table[_PLACE].to_numpy(dtype=np.float64)
-        contact = table.reindex(columns=_CONTACT).to_numpy(dtype=np.float64)
+        contact = table.reindex(columns=_CONTACT).to_numpy(dtype=np.float64, copy=True)
         numbers = table["node"].to_numpy()
     whole = numbers.dtype.kind == "i" and len(np.unique(numbers)) == len(numbers)
     if not whole or not np.isfinite(places).all():
@@ -141,8 +141,7 @@ def _read_node_table(path: Path) -> Deck:
     for number, names in zip(numbers.tolist(), table["sets"].fillna("").astype(str), strict=True):
         for name in names.upper().split():
             sets.setdefault(name, []).append(number)
-    length = np.linalg.norm(contact[:, 1:4], axis=1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        nodes = ContactNodes(contact[:, 0], contact[:, 1:4] / length, contact[:, 4])
+        contact[:, 1:4] /= np.linalg.norm(contact[:, 1:4], axis=1, keepdims=True)
     node_sets = {name: np.array(members, dtype=np.int64) for name, members in sets.items()}
-    return Deck(path.name, numbers.astype(np.int64), places, (), node_sets, contact_nodes=nodes)
+    return Deck(path.name, numbers.astype(np.int64), places, (), node_sets, contact_nodes=contact)

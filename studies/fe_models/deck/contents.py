@@ -167,15 +167,6 @@ class CentrifugalLoad:
 
 
 @dataclass(frozen=True)
-class ContactNodes:
-    """Nodes of a table: area (n,), unit normal (n, 3) out of the body, initial gap (n,); NaN where none is given."""
-
-    area: FloatArray
-    normals: FloatArray
-    gap: FloatArray
-
-
-@dataclass(frozen=True)
 class Deck:
     """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
 
@@ -184,7 +175,8 @@ class Deck:
     that has some. gravity (3,): acceleration of all elements in static steps. unassembled: places of what only matrices
     of another program hold. n_instances: where there are several, numbers are not those of the file. skipped: places of
     keywords that cannot change the model. notes: what was read in one of two ways, a sentence each. included: files
-    relative to the deck's folder. contact_nodes: of a table of nodes, which has no elements; None of a mesh.
+    relative to the deck's folder. contact_nodes (n, 5): of a table of nodes, which has no elements: area, unit normal
+    out of the body, initial gap, NaN where none is given; None of a mesh.
     """
 
     path: str
@@ -213,7 +205,7 @@ class Deck:
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     included: tuple[str, ...] = ()
-    contact_nodes: ContactNodes | None = None
+    contact_nodes: FloatArray | None = None
 
     @property
     def remarks(self) -> tuple[tuple[str, str], ...]:

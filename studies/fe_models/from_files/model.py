@@ -170,7 +170,7 @@ def _pairs_of_table(
     table, length = selections.deck.contact_nodes, selections.units.length
     if table is None:
         return None
-    given = np.column_stack([table.area * length**2, table.normals, table.gap * length])
+    given = table * [length**2, 1.0, 1.0, 1.0, length]
     area, *normals, gap = np.pad(given.T, ((0, 0), (0, mesh.n_nodes - len(given))), constant_values=np.nan)
     return match_nodes(mesh, contacts, (area, np.stack(normals, axis=1), gap), axis)
 

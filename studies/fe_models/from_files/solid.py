@@ -93,20 +93,19 @@ def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotatio
     """
     speed, given, n_sectors = parameters.rotation_speed, parameters.axis, parameters.n_sectors
     own = None if speed is not None and given is not None else rotation_of_deck(deck, units)
-    of_study = of_sector = None
+    of_study = of_sector = rotation = None
     if given is not None:
-        of_study = np.array(given.point), _unit(np.array(given.direction))
+        of_study = _axis(np.array(given.point), np.array(given.direction))
     if deck.cyclic is not None:
         n_sectors = n_sectors or deck.cyclic.n_sectors
         start, end = deck.cyclic.axis * units.length
-        of_sector = start, _unit(end - start)
-    rotation, turning = None, None if own is None else (own.point, own.axis)
+        of_sector = _axis(start, end - start)
+    missing = SceneError("axis", "missing", "give {point, direction} of the axis: the deck has none")
     if speed or (speed is None and own is not None):
-        axis = of_study or turning or of_sector
+        axis = of_study or (None if own is None else (own.point, own.axis)) or of_sector
         if axis is None:
-            raise SceneError("axis", "missing", "give {point, direction} of the axis of rotation: the deck has none")
-        omega_squared = own.omega_squared if speed is None and own is not None else (np.pi * (speed or 0.0) / 30.0) ** 2
-        rotation = Rotation(omega_squared, *axis)
+            raise missing
+        rotation = Rotation(own.omega_squared if speed is None and own else (np.pi * (speed or 0.0) / 30.0) ** 2, *axis)
     if n_sectors is None:
         for key in ("cut_faces", "next_sector"):
             if getattr(parameters, key):
@@ -114,12 +113,13 @@ def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotatio
         return rotation, None
     axis = of_study or of_sector or (None if rotation is None else (rotation.point, rotation.axis))
     if axis is None:
-        raise SceneError("axis", "missing", "give {point, direction} of the axis of the cyclic structure")
+        raise missing
     return rotation, CyclicAxis(n_sectors, *axis)
 
 
-def _unit(vector: FloatArray) -> FloatArray:
-    return np.asarray(vector / np.linalg.norm(vector))
+def _axis(point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A point, and the unit vector along a direction."""
+    return point, direction / np.linalg.norm(direction)
 
 
 def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
