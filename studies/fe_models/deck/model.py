@@ -90,6 +90,11 @@ class Model:
         """Entries of a field."""
         return [item for items in self.fields.get(name, {}).values() for item in items]
 
+    def check_coupling(self) -> None:
+        """Raises SceneError where a coupling does not say what it couples."""
+        if self.coupling is not None:
+            raise self.coupling.place.wrong("no *KINEMATIC below it", "write it there, or remove the coupling")
+
     def end_step(self) -> None:
         """Of a step that writes matrices nothing stays, of one that is not static no load."""
         step, self.step = self.step, None
@@ -105,8 +110,8 @@ class Model:
 
     def deck(self) -> Deck:
         """The deck. Raises SceneError where names are missing or do not fit."""
-        mesh = self.mesh
-        gone = NONE
+        self.check_coupling()
+        mesh, gone = self.mesh, NONE
         for removed, elements, _ in self.get("removed"):
             gone = np.union1d(gone, elements) if removed else np.setdiff1d(gone, elements)
         solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.solid_blocks]

@@ -186,6 +186,7 @@ def _rigid_body(model: Model, block: Block) -> None:
 @keyword("COUPLING", "REFNODE SURFACE", "CONSTRAINTNAME")
 def _coupling(model: Model, block: Block) -> None:
     """A reference node and a surface; *KINEMATIC below it says what is coupled."""
+    model.check_coupling()
     model.coupling = block
 
 

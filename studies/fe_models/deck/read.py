@@ -21,7 +21,7 @@ from studies.fe_models.files import Place, check_file, shown
 # the table is complete once all its readers are loaded
 __all__ = ["HARMLESS", "KEYWORDS", "model_keywords", "read_deck", "step_keywords"]
 
-_LARGEST_DECK = 2**28  # bytes of a deck together with all that it includes: a mesh of about two million nodes
+_LARGEST_DECK = 2**28  # bytes of a file: a mesh of about two million nodes
 _BYTE_ORDER_MARK = "\xef\xbb\xbf"  # of UTF-8, which some editors write, in Latin-1
 _WITH_INPUT = ("NODE", "ELEMENT", "NSET", "ELSET")
 # the name of a parameter, and its value: quoted, or up to the next comma
@@ -35,75 +35,49 @@ def read_deck(path: Path) -> Deck:
     Numbers of the first instance are those of its part; of the others they are larger, as a note says. Raises
     SceneError about "model" where the deck makes no sense, or has what may change the model and is not read.
     """
-    draft = Draft(path.name)
-    for block in read_blocks(path, draft.included):
-        read_mesh_keyword(draft, block)
+    draft, block = Draft(path.name), None
+    for begun in _read_keywords(path, path.name, path.parent.resolve(), draft.included, (), []):
+        if block is not None:
+            read_mesh_keyword(draft, block)
+        block = begun
+    if block is None:
+        raise Place(path.name, 1).wrong("no keyword in the file", "give a deck of CalculiX or Abaqus")
+    read_mesh_keyword(draft, block)
     if draft.part or draft.scope:
         raise block.place.wrong(f"the end of {draft.part or draft.scope} is missing", "write *END PART, *END INSTANCE")
     model = Model(Mesh(draft))
     for block in draft.others:
-        _read(model, block)
+        unused = model.step is not None and not model.step.loads_count
+        if block.keyword in HARMLESS or (unused and block.keyword in _LOADS):
+            model.skip(block)
+        else:
+            find_keyword(block, any_parameters=unused and block.keyword == "DLOAD").reader(model, block)
     model.end_step()
-    _check_coupling(model)
     return model.deck()
 
 
-def _read(model: Model, block: Block) -> None:
-    """Acts on a keyword, or skips it. Raises SceneError where it, or a parameter of it, may change the model."""
-    if block.keyword not in ("KINEMATIC", "DISTRIBUTING"):
-        _check_coupling(model)
-    unused = model.step is not None and not model.step.loads_count
-    if block.keyword in HARMLESS or (unused and block.keyword in _LOADS):
-        model.skip(block)
-    else:
-        find_keyword(block, any_parameters=unused and block.keyword == "DLOAD").reader(model, block)
+def _read_keywords(
+    path: Path, name: str, folder: Path, included: list[str], within: tuple[Path, ...], last: list[Block]
+) -> Iterator[Block]:
+    """The keywords of a file and of files that it includes, in the deck's folder or below, each as it begins.
 
-
-def _check_coupling(model: Model) -> None:
-    """Raises SceneError where a coupling does not say what it couples."""
-    if model.coupling is not None:
-        raise model.coupling.place.wrong("no *KINEMATIC below it", "write it there, or remove the coupling")
-
-
-def read_blocks(path: Path, included: list[str]) -> Iterator[Block]:
-    """The keywords of a deck, one after the other, those of files that it includes in their places.
-
-    Included files stand in the deck's folder or below; their names are appended to `included`. Raises SceneError.
-    """
-    block: Block | None = None
-    for each in _lines(path, path.name, path.parent.resolve(), included, ()):
-        if isinstance(each, Block):
-            if block is not None:
-                yield block
-            block = each
-        elif block is None:
-            raise Place(*each[1]).wrong(
-                f"{shown(each[0])!r} before the first keyword", "give a deck of CalculiX or Abaqus"
-            )
-        else:
-            block.lines.append(each[0])
-            block.places.append(each[1])
-    if block is None:
-        raise Place(path.name, 1).wrong("no keyword in the file", "give a deck of CalculiX or Abaqus")
-    yield block
-
-
-def _lines(
-    path: Path, name: str, folder: Path, included: list[str], within: tuple[Path, ...]
-) -> Iterator[Block | tuple[str, tuple[str, int]]]:
-    """Keywords without data lines, and data lines with their places. within: files that are open.
-
-    An included file does not end a keyword: data lines may follow in it, and behind it.
+    Data lines go to the last keyword, which is whole when another one begins, also in an included file and behind it.
+    included: takes names of files. within: files that are open.
     """
     check_file(path, _LARGEST_DECK, "model")
     within = (*within, path.resolve())
     with path.open(encoding="latin-1") as file:
         for text, number in _joined(file):
             if not text.startswith("*"):
-                yield text, (name, number)
+                if not last:
+                    what = f"{shown(text)!r} before the first keyword"
+                    raise Place(name, number).wrong(what, "give a deck of CalculiX or Abaqus")
+                last[-1].lines.append(text)
+                last[-1].places.append((name, number))
                 continue
             block = _cut_keyword(text, Place(name, number))
             if block.keyword != "INCLUDE":
+                last[:] = [block]
                 yield block
                 if block.keyword not in _WITH_INPUT or "INPUT" not in block.parameters:
                     continue
@@ -113,7 +87,7 @@ def _lines(
             relative = str(inner.relative_to(folder))
             if relative not in included:
                 included.append(relative)
-            yield from _lines(inner, relative, folder, included, within)
+            yield from _read_keywords(inner, relative, folder, included, within, last)
 
 
 def _joined(lines: Iterable[str]) -> Iterator[tuple[str, int]]:
