@@ -99,9 +99,8 @@ def read_cdb(path: Path) -> Deck:
 
 def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
     if np.any(archive.node_angles):
-        raise SceneError(
-            "model", f"{path.name} has nodes with directions of their own", "NROTAT them to the global ones"
-        )
+        found = f"{path.name} has nodes with coordinate systems of their own"
+        raise SceneError("model", found, "write it with NROTAT to the global one: its directions are x, y and z")
     rows: dict[str, list[tuple[int, IntArray]]] = {}
     passed: set[int] = set()
     materials: set[int] = set()

@@ -122,9 +122,8 @@ def _equation(model: Model, block: Block) -> None:
         while len(fields) < 3 * n_terms and (more := next(rows, None)) is not None:
             fields += more.fields + [""] * (-len(more.fields) % 3)
         if len(fields) != 3 * n_terms:
-            raise head.place.wrong(
-                f"{len(fields)} entries for {n_terms} terms", "give node, dof and coefficient of each"
-            )
+            what = f"{len(fields)} entries for {n_terms} terms"
+            raise head.place.wrong(what, "give node, dof and coefficient of each")
         terms = [Row(fields[at : at + 3], head.place, block.scope) for at in range(0, len(fields), 3)]
         model.add("equations", *_equations(model, terms, head.place))
 

@@ -71,7 +71,7 @@ def _read_keywords(
             if not text.startswith("*"):
                 if not last:
                     what = f"{shown(text)!r} before the first keyword"
-                    raise Place(name, number).wrong(what, "give a deck of CalculiX or Abaqus")
+                    raise Place(name, number).wrong(what, "give a deck of CalculiX or Abaqus as plain text")
                 last[-1].lines.append(text)
                 last[-1].places.append((name, number))
                 continue

@@ -110,9 +110,8 @@ class Resolver:
             return self.members(key, reference.place)
         if target == self.everything:
             return self.existing
-        raise reference.place.wrong(
-            f"there is no set of {self.sets.what} {shown(target)}", "define it, or remove it here"
-        )
+        what = f"there is no set of {self.sets.what} {shown(target)}"
+        raise reference.place.wrong(what, "define it, or remove it here")
 
     def key(self, reference: Reference) -> Key | None:
         """Of the named set; None of a number, or a set that is not defined."""

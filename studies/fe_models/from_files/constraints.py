@@ -125,9 +125,8 @@ class _Builder:
         for boundary in self.deck.boundaries:
             first, last = max(boundary.first_dof, 1), min(boundary.last_dof, 6)
             if first <= min(last, 3) and boundary.value != 0.0:
-                raise SceneError(
-                    "clamp", f"{boundary.place} moves nodes by {boundary.value:g}", "hold it, or give `clamp`"
-                )
+                found = f"{boundary.place} moves nodes by {boundary.value:g}"
+                raise SceneError("clamp", found, "hold it, or give `clamp`")
             for node in boundary.nodes:
                 wanted.setdefault(int(node), set()).update(range(first, last + 1))
         turns = {motion.reference: self._turn(motion) for motion in self.deck.rigid_motions if motion.turns}

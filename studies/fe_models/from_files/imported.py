@@ -131,9 +131,8 @@ def _check_table(matrices: Matrices, selections: Selections, on_cut: IntArray) -
     # forces of rotation are among those of the matrices, or in `preload`
     for key in ("material", "rotation_speed"):
         if getattr(selections.parameters, key) is not None:
-            raise SceneError(
-                key, "the model is a table of nodes", "leave it out: forces stand in the load, or in preload"
-            )
+            remedy = "leave it out: reduced matrices have it in them, and forces stand in their load or in preload"
+            raise SceneError(key, "the model is a table of nodes", remedy)
     if matrices.load is not None and matrices.load.shape[1] > 1:
         raise SceneError("matrices", f"{matrices.files[0]}: several load cases", "give one column of forces")
     lost = np.setdiff1d(deck.node_numbers, matrices.node)

@@ -62,9 +62,8 @@ class Selections:
         else:
             raise self._unknown(name, key, (*deck.node_sets, *deck.surfaces, *deck.element_sets))
         if len(found) == 0:
-            raise SceneError(
-                key, f"{name} in {deck.path} has no node of an element", "give nodes of the mesh that stay"
-            )
+            remedy = "give nodes of the mesh that no *MODEL CHANGE takes away"
+            raise SceneError(key, f"{name} in {deck.path} has no node of an element", remedy)
         return found
 
     def surface(self, name: str, key: str) -> Surface:

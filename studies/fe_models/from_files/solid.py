@@ -53,9 +53,8 @@ def build_solid_mesh(deck: Deck, parameters: Parameters, units: Units) -> SolidM
             left &= ~own
         if left.any():
             found = f"{np.count_nonzero(left)} elements of {deck.path} have none, as element {block.numbers[left][0]}"
-            raise SceneError(
-                "material", found, "give *SOLID SECTION and *MATERIAL in the deck, or `material` in the study"
-            )
+            remedy = "give *SOLID SECTION with *ELASTIC and *DENSITY in the deck, or `material` in the study"
+            raise SceneError("material", found, remedy)
     return SolidMesh(coordinates, numbers, tuple(groups))
 
 
