@@ -14,7 +14,6 @@ from studies.fe_models.deck.contents import (
     Deck,
     ElementBlock,
     Material,
-    Section,
     Surface,
     SurfacePair,
 )
@@ -121,6 +120,9 @@ class Model:
         fields: dict[str, Any] = {name: tuple(self.get(name)) for name in names}
         loads = [load for load in self.get("centrifugal") if np.isin(load.elements, kept).any() or not kept.size]
         changes = [text for taken, _, text in (*self.get("removed"), *self.get("apart")) if taken]
+        for section, place in self.get("sections"):
+            if section.material not in self.materials:
+                raise place.wrong(f"there is no material {shown(section.material)}", "define it with *MATERIAL")
         ties, named = self.get("ties"), [name for _, name, *_ in self.get("cyclic") if name]
         cut = [pair for name, cyclic, pair in ties if cyclic and (not named or name in named)]
         return Deck(
@@ -140,7 +142,7 @@ class Model:
             cyclic=self._cyclic(),
             cut_faces=tuple((pair.dependent, pair.independent) for pair in cut),
             materials={name: self._material(each) for name, each in self.materials.items()},
-            sections=tuple(self._sections()),
+            sections=tuple(section for section, _ in self.get("sections")),
             centrifugal=tuple(loads),
             gravity=self._gravity(kept),
             n_instances=len(mesh.draft.placed),
@@ -158,12 +160,6 @@ class Model:
             own = each.numbers + self.mesh.offsets[each.scope]
             if each.kind not in NODES_OF_KIND and not np.isin(own, carry).all():
                 yield f"{each.place} of type {each.kind} without a section"
-
-    def _sections(self) -> Iterator[Section]:
-        for section, place in self.get("sections"):
-            if section.material not in self.materials:
-                raise place.wrong(f"there is no material {shown(section.material)}", "define it with *MATERIAL")
-            yield section
 
     def _gravity(self, kept: IntArray) -> FloatArray | None:
         total = None

@@ -81,20 +81,17 @@ def entries_of_tables(
     first = next(iter(files.values())).name
     if labels is None and "rows" not in files:
         wrong(first, "no table of its rows", "give job_rows.csv with node and dof of each row")
-    labels = _read_rows(files["rows"]) if labels is None else labels
+    if labels is None:
+        path = files["rows"]
+        with library_errors(path, "pandas", "pandas", "matrices"):
+            table = pd.read_csv(path, skipinitialspace=True)
+        if not {"node", "dof"} <= set(table) or any(table[name].dtype.kind != "i" for name in ("node", "dof")):
+            wrong(path.name, "no columns node and dof of whole numbers", "give a line for each row of the matrices")
+        labels = label(table["node"].to_numpy(), table["dof"].to_numpy(), path.name)
     if np.unique(labels).size < labels.size:
         wrong(first, "a dof has two rows", "give node and dof of each row once")
     names = {name: files[name if name in files else "matrices"].name for name in found}
     return {name: _entries_of_table(names[name], matrix, labels) for name, matrix in found.items()}
-
-
-def _read_rows(path: Path) -> IntArray:
-    """Labels of a table with the columns node and dof. Raises SceneError."""
-    with library_errors(path, "pandas", "pandas", "matrices"):
-        table = pd.read_csv(path, skipinitialspace=True)
-    if not {"node", "dof"} <= set(table) or any(table[name].dtype.kind != "i" for name in ("node", "dof")):
-        wrong(path.name, "no columns node and dof of whole numbers", "give a line for each row of the matrices")
-    return label(table["node"].to_numpy(), table["dof"].to_numpy(), path.name)
 
 
 def _entries_of_table(file: str, matrix: object, labels: IntArray) -> Entries:

@@ -28,7 +28,7 @@ import h5py
 import numpy as np
 from scipy import io, sparse
 
-from studies.fe_models.files import IntArray, check_file, library_errors, shown
+from studies.fe_models.files import check_file, library_errors, shown
 from studies.fe_models.matrices.matrices import NAMES, Entries, Matrices, assemble, entries_of_tables, label, wrong
 from studies.fe_models.matrices.nastran import read_op4, read_punch
 from studies.scene_error import SceneError
@@ -136,7 +136,13 @@ def _read_substructure(files: Files) -> dict[str, Entries]:
                 wrong(path.name, f"line {number} is {shown(text)!r}", "write OUTPUT FILE=USER DEFINED")
     if not nodes or not dofs:
         wrong(path.name, "no *USER ELEMENT with its nodes", "write OUTPUT FILE=USER DEFINED")
-    labels = _labels_of_substructure(nodes, dofs, path.name)
+    # dofs of the first node, then the place of a node from which on others hold, and these
+    changes, own, pairs = {each[0]: each[1:] for each in dofs[1:]}, dofs[0], []
+    for place, node in enumerate(nodes, 1):
+        own = changes.get(place, own)
+        pairs += [(node, dof) for dof in own]
+    rows = np.array(pairs, dtype=np.int64)
+    labels = label(rows[:, 0], rows[:, 1], path.name)
     column, row = np.tril_indices(labels.size)
     parts = {}
     for name, values in numbers.items():
@@ -146,17 +152,6 @@ def _read_substructure(files: Files) -> dict[str, Entries]:
             wrong(path.name, f"{len(values)} entries of {name} for {labels.size} dofs", "write the whole triangle")
         parts[name] = Entries(path.name, labels[row], labels[column], np.array(values))
     return parts
-
-
-def _labels_of_substructure(nodes: list[int], dofs: list[list[int]], file: str) -> IntArray:
-    """dofs: those of the first node, then the place of a node from which on others hold, and these."""
-    changes = {1: dofs[0], **{each[0]: each[1:] for each in dofs[1:]}}
-    pairs, own = [], dofs[0]
-    for place, node in enumerate(nodes, 1):
-        own = changes.get(place, own)
-        pairs += [(node, dof) for dof in own]
-    node, dof = np.array(pairs, dtype=np.int64).T
-    return label(node, dof, file)
 
 
 def _read_tables(files: Files) -> dict[str, Entries]:
