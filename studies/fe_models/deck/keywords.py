@@ -30,12 +30,14 @@ def read_name(text: str) -> str:
 class Reference:
     """What a line points to: the name of a set or surface in capitals, or a number, perhaps with "INSTANCE." before it.
 
-    scope: name of the instance in which it stands, "" outside of instances.
+    scope: name of the instance in which it stands, "" outside of instances. of_elements: in a set of nodes, the nodes
+    of a set of elements.
     """
 
     scope: str
     target: str
     place: Place
+    of_elements: bool = False
 
 
 @dataclass(frozen=True)

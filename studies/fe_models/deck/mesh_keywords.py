@@ -20,7 +20,7 @@ from studies.fe_models.deck.keywords import (
     unit,
 )
 from studies.fe_models.deck.mesh import Draft, Records
-from studies.fe_models.deck.sets import NONE, NodesOf, Numbers, Resolver
+from studies.fe_models.deck.sets import NONE, Numbers, Resolver
 from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, is_integer, read_integer, shown
 from studies.finite_element.cut_faces import turn_about
 
@@ -124,8 +124,9 @@ def _set(draft: Draft, block: Block) -> None:
     """Numbers, ranges, other sets, or the nodes of a set of elements; INSTANCE may say whose numbers they are."""
     sets = draft.node_sets if block.keyword == "NSET" else draft.element_sets
     key = block.scope, block.name(block.keyword)
-    of_elements = block.keyword == "NSET" and "ELSET" in block.parameters
-    sets.add(key, *((NodesOf(block.reference("ELSET")),) if of_elements else ()))
+    sets.add(key)
+    if block.keyword == "NSET" and "ELSET" in block.parameters:
+        sets.add(key, replace(block.reference("ELSET"), of_elements=True))
     if "UNSORTED" in block.parameters:
         sets.unsorted.add(key)
     if "INSTANCE" in block.parameters:

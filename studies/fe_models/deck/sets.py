@@ -28,13 +28,6 @@ class Numbers:
     step: int = 0
 
 
-@dataclass(frozen=True)
-class NodesOf:
-    """The nodes of a set of elements."""
-
-    elements: Reference
-
-
 @dataclass
 class Sets:
     """Sets as they are written. what: "nodes" or "elements". items: of every set what it consists of.
@@ -43,10 +36,10 @@ class Sets:
     """
 
     what: str
-    items: dict[Key, list[Numbers | Reference | NodesOf]] = field(default_factory=dict)
+    items: dict[Key, list[Numbers | Reference]] = field(default_factory=dict)
     unsorted: set[Key] = field(default_factory=set)
 
-    def add(self, key: Key, *items: Numbers | Reference | NodesOf) -> None:
+    def add(self, key: Key, *items: Numbers | Reference) -> None:
         """Adds members to a set, which may be new."""
         self.items.setdefault(key, []).extend(items)
 
@@ -127,12 +120,10 @@ class Resolver:
         self._open.append(key)
         parts = [NONE]
         for item in self.sets.items[key]:
-            if isinstance(item, NodesOf):
-                parts.append(self.nodes_of(item.elements))
-            elif isinstance(item, Reference):
-                parts.append(self(item))
-            else:
+            if isinstance(item, Numbers):
                 parts.append(self._existing(item, f"set {shown(key[1])}"))
+            else:
+                parts.append(self.nodes_of(item) if item.of_elements else self(item))
         self._open.pop()
         self._done[key] = np.unique(np.concatenate(parts)).astype(np.int64)
         return self._done[key]

@@ -43,7 +43,7 @@ def describe_model(
     mass, placed = prepared.weight.sum(), ~np.isnan(coordinates[:, 0])
     rows = [
         ("mass", f"{mass:.6g} kg, {3 * np.count_nonzero(free)} displacements that are not held"),
-        ("extent", f"{_vector(np.ptp(coordinates[placed], axis=0))} m; given in {loaded.units.name}"),
+        ("extent", f"{_vector(np.ptp(coordinates[placed], axis=0))} m; given in {parameters.units}"),
         ("centre", f"{_vector(prepared.weight[placed] @ coordinates[placed] / mass)} m"),
     ]
     rotation, speed = loaded.model.rotation, "none"

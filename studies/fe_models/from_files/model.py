@@ -38,7 +38,6 @@ class LoadedModel:
     """
 
     deck: Deck
-    units: Units
     model: FeModel
     joint: JointDefinition
     omega_squared_held: float | None
@@ -151,7 +150,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         constraints=supported.constraints,
         pairs=_pairs_of_table(selections, whole, contacts, axis),
     )
-    return LoadedModel(deck, units, model, joint, None if imported is None else imported.omega_squared_held)
+    return LoadedModel(deck, model, joint, None if imported is None else imported.omega_squared_held)
 
 
 def _check_assembled(deck: Deck, units: Units) -> None:
