@@ -48,7 +48,7 @@ usual = lru_cache(worn)
 
 @pytest.mark.slow
 def test_the_error_holds_where_pairs_slide_for_long_in_one_direction():
-    """The steps, not the harmonics, make the error: 80.05 mm3 with a sixteenth of their tolerance, 80.22 with a tenth."""
+    """The steps make the error: 80.05 mm3 with a sixteenth of their tolerance, 80.22 with a tenth."""
     mu, pressure, frequency = 0.33563914916888354, 1.523108745024015e-11, 212.365293782595
     model, cycles, settings = dovetail(21), np.linspace(0.0, 464919.9621570562, 41), SolverSettings()
     (found,) = branch_states(model, mu, 0.7689399931298951, [2.0 * np.pi * frequency], settings, "ramp")
