@@ -247,7 +247,7 @@ def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
     try:
         return np.array(study.scene.worn.depths(len(facts.area)))
     except WrongValueError as error:
-        raise UserError(study.source, "scene.worn.depth", error.value, error.remedy) from None
+        raise UserError(study.source, f"scene.worn.{error.key}", error.value, error.remedy) from None
 
 
 def _pair_values(study: Study, facts: SceneFacts) -> _Values:

@@ -17,7 +17,7 @@ from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import plan_of
-from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
+from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values, write_depths
 
 pytestmark = pytest.mark.usefixtures("folder")
 THREE = ("slow_time.outputs=3", "axes.scheme=adaptive")
@@ -112,6 +112,14 @@ def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended()
     compute_worn_joint("worn.nc", ".", loops=[0], point={"worn_cycle": "1000"}, progress=False)
     depth = float(states.worn_depth[1] + states.wear_depth[1, -1])
     assert results("worn_joint_loops.nc").worn_depth.values.ravel()[-1] == pytest.approx(depth, rel=1e-12)
+
+
+def test_a_result_to_the_end_gives_its_depths_by_cycle_count(folder):
+    write_depths("ended.nc", 150.0, [0.0, 5.0, 7.0], 1, counts=[0.0, 1234.5, math.inf])
+    worn = f"scene.worn={{result='{folder / 'ended.nc'}', cycle=[1234.5]}}"
+    study = read_study("sdof_slider", (*CHEAP, worn))
+    assert study.dimensions["worn_cycle"] == (1234.5,)
+    assert study.variants[0].scene.worn.depths(1) == (5e-9,)
 
 
 # --- variables of the scene itself ---
