@@ -11,7 +11,7 @@ from solver import SolverSettings, march_wear
 from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
 from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.finite_element.reduced_joint import FeScene, Progress, glued_frequencies, prepare_model, silent
+from studies.finite_element.reduced_joint import FeScene, Progress, silent
 from studies.scene import make_compliant
 
 N_FREQUENCIES = 4
@@ -28,8 +28,8 @@ def describe_model(
 ) -> list[tuple[str, str]]:
     """Label and text of each line. scene: the reduced model. Raises SceneError."""
     deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.mesh.coordinates
-    prepared = prepare_model(loaded.model, joint)
-    free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
+    prepared = scene.prepared
+    free: BoolArray = np.asarray(~prepared.structure.held.all(axis=1))
     if joint.cut is not None:
         free[joint.cut.right] = False
     mass, placed = prepared.weight.sum(), ~np.isnan(coordinates[:, 0])
@@ -49,13 +49,13 @@ def describe_model(
     rows += [("glued", f"{tie.name} stay glued") for tie in joint.ties]
     progress("natural frequencies of the glued model")
     k = parameters.nodal_diameter
-    turning = glued_frequencies(prepared, k, N_FREQUENCIES)
+    turning = prepared.frequencies(k, N_FREQUENCIES)
     where = f"nodal diameter {k}: " if joint.cut is not None else ""
     glued = f"{where}{_frequencies(turning)} Hz without prestress"
     if loaded.model.forms is not None:
         glued = f"{where}{_frequencies(turning)} Hz, with what the matrices hold"
-    elif prepared.at_rest is not None:
-        still = prepared.at_rest.frequencies(k, N_FREQUENCIES) / (2.0 * np.pi)
+    elif "elastic" in prepared.forms:
+        still = prepared.frequencies(k, N_FREQUENCIES, "elastic")
         glued = f"{where}{_frequencies(still)} Hz at rest, {_frequencies(turning)} Hz with prestress"
     rows.append(("glued", glued))
     first = dict(sorted((k, found[0]) for k, found in scene.glued_frequencies.items()))
@@ -123,7 +123,7 @@ def _reduction_error(loaded: LoadedModel, model: ReducedModel, parameters: Param
 
 
 def _contacts(scene: FeScene) -> Iterator[str]:
-    pairs = scene.pairs
+    pairs = scene.prepared.pairs
     for place, (moving, opposite) in enumerate(zip(pairs.moving_name, pairs.opposite_name, strict=True)):
         own = pairs.surface == place
         neighbour = _NEIGHBOURS[int(pairs.sector[own][0])] if own.any() else ""

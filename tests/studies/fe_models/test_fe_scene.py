@@ -80,29 +80,29 @@ def test_reduction_against_dense_constraints(name, nodal_diameter):
     sector = CASES[name]()
     joint = sector.joint(held=plane_of_symmetry(sector)) if name == "plane of symmetry" else sector.joint()
     prepared = prepare_model(sector.model(), joint)
-    pairs, forms = prepared.pairs, prepared.reduction.forms
+    pairs, forms = prepared.pairs, prepared.forms
     load = np.stack([prepared.static_load, joint.load], axis=1)
     n_modes = 5
-    own = prepared.reduction.reduce(nodal_diameter, n_modes, load)
+    found, own, vectors = prepared.reduce(nodal_diameter, n_modes, load)
     shapes, stiffness, mass, frequencies = dense_twin(sector, joint, pairs, forms, nodal_diameter, n_modes)
     n = len(stiffness)
-    assert own.forms["stiffness"].shape == (n + n_modes, n + n_modes)
-    assert np.iscomplexobj(own.forms["mass"]) == (nodal_diameter == 2)
-    for ours, reference in ((own.forms["stiffness"], stiffness), (own.forms["mass"], mass)):
+    assert own["stiffness"].shape == (n + n_modes, n + n_modes)
+    assert np.iscomplexobj(own["mass"]) == (nodal_diameter == 2)
+    for ours, reference in ((own["stiffness"], stiffness), (own["mass"], mass)):
         assert np.abs(ours[:n, :n] - reference).max() < 1e-8 * np.abs(reference).max()
-    assert np.allclose(own.frequencies, frequencies, rtol=1e-8)
-    assert np.allclose(np.diag(own.forms["stiffness"])[n:], frequencies**2, rtol=1e-8)
-    assert np.abs(own.vectors[:n] - shapes.conj().T @ load).max() < 1e-8 * np.abs(own.vectors).max()
+    assert np.allclose(found, frequencies, rtol=1e-8)
+    assert np.allclose(np.diag(own["stiffness"])[n:], frequencies**2, rtol=1e-8)
+    assert np.abs(vectors[:n] - shapes.conj().T @ load).max() < 1e-8 * np.abs(vectors).max()
     # elastic stiffness, which is not the one of the shapes
     elastic = shapes.conj().T @ forms["elastic"].toarray() @ shapes
-    assert np.abs(own.forms["elastic"][:n, :n] - elastic).max() < 1e-7 * np.abs(elastic).max()
+    assert np.abs(own["elastic"][:n, :n] - elastic).max() < 1e-7 * np.abs(elastic).max()
 
 
 def test_pairs_on_cut_faces_and_planes_of_symmetry():
     sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 4, 2), blade_shape=wedge_shape)
     joint = sector.joint(held=plane_of_symmetry(sector))
     scene = build_fe_scene(sector.model(prestress=False), joint, ReductionOptions(n_modes=4), 1)
-    contact, pairs = scene.model.contact, scene.pairs
+    contact, pairs = scene.model.contact, scene.prepared.pairs
     face = 0.04 * 2.0 * 0.2 * np.tan(np.pi / N_SECTORS)
     assert contact.area.sum() == pytest.approx(face, rel=1e-10)
     assert contact.n_contact == 4 * 3
@@ -145,7 +145,7 @@ def test_plain_assembly_without_cyclic_symmetry():
     assert np.array_equal(scene.model.contact.friction_coefficient, np.full(scene.model.contact.n_contact, 0.3))
     assert prepare_model(model, joint).weight.sum() == pytest.approx(7800.0 * 0.03 * 0.004 * 0.15, rel=1e-10)
     # the upper plate as a whole: a rigid relative motion that nothing resists, and that moves its mass
-    pairs, linear = scene.pairs, scene.model.linear[0]
+    pairs, linear = scene.prepared.pairs, scene.model.linear[0]
     shift = np.zeros(len(linear.mass))
     motion = np.array([0.3, -0.2, 0.5])
     shift[: 3 * pairs.n_contact] = (pairs.frames @ motion).ravel()
@@ -204,7 +204,7 @@ def test_more_modes_than_a_singular_mass_has(kind, monkeypatch):
     assert np.isfinite(frequencies).all()
     mass = scene.model.linear[2].mass
     n = len(mass) - len(frequencies)
-    assert n == 3 * scene.pairs.n_contact
+    assert n == 3 * scene.prepared.pairs.n_contact
     assert np.linalg.eigvalsh(mass)[0] > -1e-9
     # by Lanczos' method, as those of a large model
     monkeypatch.setattr(reduction, "_SMALL", 0)
@@ -254,7 +254,9 @@ def test_retainer_acts_on_the_mean_relative_displacement():
     with_it, without = (build_fe_scene(model, each, ReductionOptions(n_modes=3), 1) for each in (retained, joint))
     added = with_it.model.linear[0].stiffness - without.model.linear[0].stiffness
     shift = np.zeros(len(added))
-    shift[: 3 * without.pairs.n_contact] = (without.pairs.frames @ np.array([0.25, 0.1, -3.0])).ravel()
+    shift[: 3 * without.prepared.pairs.n_contact] = (
+        without.prepared.pairs.frames @ np.array([0.25, 0.1, -3.0])
+    ).ravel()
     assert shift @ added @ shift == pytest.approx(5e6 * 0.25**2, rel=1e-10)
     assert np.linalg.matrix_rank(added, tol=1.0) == 1
 
