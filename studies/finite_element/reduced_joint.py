@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,10 +27,8 @@ from studies.finite_element.structure import (
     Structure,
     build_structure,
 )
+from studies.scene import Progress, silent
 from studies.scene_error import SceneError
-
-Progress = Callable[[str], None]
-"""Takes a line on the next step."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +41,6 @@ class FeScene:
     model: ReducedModel
     prepared: PreparedModel
     glued_frequencies: Mapping[int, FloatArray]
-
-
-def silent(_: str) -> None:
-    """Prints nothing."""
 
 
 def build_fe_scene(

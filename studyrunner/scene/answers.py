@@ -4,7 +4,7 @@ the scene that a result keeps.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.scene import as_scene, stuck_frequencies
+from studies.scene import Progress, as_scene, stuck_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
 from studyrunner.scene.scene_set import SceneSet, along_axes, find_scenes
@@ -40,7 +40,7 @@ class SmallArray:
     over_axes: bool = False
 
 
-def build_scene_variables(study: Study, model: ReducedModel, progress: Callable[[str], None]) -> tuple[SmallArray, ...]:
+def build_scene_variables(study: Study, model: ReducedModel, progress: Progress) -> tuple[SmallArray, ...]:
     """What the study asks of its scene, but exact answers. Raises UserError where the scene cannot give them."""
     found: list[SmallArray] = []
     with scene_errors(study.source, None):
@@ -100,7 +100,7 @@ def scene_to_store(study: Study, model: ReducedModel) -> StoredScene | None:
         return StoredScene(scene_attributes(model), datasets, describe_origin(study))
 
 
-def write_study_scene(study: Study, path: Path, progress: Callable[[str], None]) -> None:
+def write_study_scene(study: Study, path: Path, progress: Progress) -> None:
     """Writes the scene of a study as a scene file, as a whole or not at all.
 
     Raises UserError where the scene is wrong, or there are several.
@@ -200,7 +200,7 @@ def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
     return read_mesh_file(study.scene.files.mesh).remarks
 
 
-def check_study_model(study: Study, picture: Path, progress: Callable[[str], None]) -> str:
+def check_study_model(study: Study, picture: Path, progress: Progress) -> str:
     """Lines on the finite-element model of a study, for `--check`; the picture shows the contact pairs.
 
     Raises UserError where the study has no such model, the model is wrong, or the picture cannot be written.

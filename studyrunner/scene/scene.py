@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
 from studies.fe_models.model_files import file_digest
-from studies.scene import as_scene, make_compliant, stuck_frequencies
+from studies.scene import Progress, as_scene, make_compliant, silent, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.edge_pairs import edge_pairs
@@ -64,12 +64,7 @@ class SceneFacts:
         return self.surface, self.position.tobytes(), self.area.tobytes()
 
 
-def _silent(_: str) -> None: ...
-
-
-def build_study_scene(
-    study: Study, progress: Callable[[str], None] = _silent, known: ReducedModel | None = None
-) -> ReducedModel:
+def build_study_scene(study: Study, progress: Progress = silent, known: ReducedModel | None = None) -> ReducedModel:
     """Reduced model of the scene for the largest number of harmonics of the study and those that show the error.
 
     With automatic harmonics a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE; a scene file may hold
@@ -77,21 +72,8 @@ def build_study_scene(
     model from an earlier run. Raises UserError where the parameters or the scene file are wrong, or the scene lacks
     what the study asks for.
     """
-    scene = study.scene
-    # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
-    with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
-        if known is not None:
-            model = known
-        elif scene.path is None:
-            model = _build_here(study, progress)
-        else:
-            # h5py is loaded for scene files only: the bundled scenes do without it.
-            from studies.scene_file import read_scene
-
-            model = read_scene(scene.path, max(study.given_harmonics, default=1), scene.group)
-            # a scene in a result file is the one that was computed with
-            if not scene.group:
-                model = make_compliant(model, dict(scene.parameters)["contact_stiffness"])
+    with scene_errors(study.source, study.scene.path), np.errstate(all="ignore"):
+        model = _built(study, progress) if known is None else known
     raise_wrong(study.source, _wrong_beside(study, model))
     if "natural_frequency" in study.scene_variables:
         with scene_errors(study.source, None):
@@ -128,20 +110,20 @@ def describe_origin(study: Study) -> dict[str, str]:
     return read_origin(study.scene.path)
 
 
-def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
-    scene, n_harmonics = study.scene, harmonics_to_build(study)
-    try:
-        if scene.files is None:
-            return build_scene(scene.model, scene.parameters, n_harmonics)
+def _built(study: Study, progress: Progress) -> ReducedModel:
+    scene = study.scene
+    if scene.files is not None:
         from studies.fe_models.from_files.model import build
 
-        return build(scene.files, scene.parameters, n_harmonics, progress)
-    except SceneError:
-        raise
-    except (ArithmeticError, ValueError, MemoryError) as error:
-        # what a parameter alone does not show: LinAlgError is a ValueError, too
-        what = f"{study.scene.model} cannot be built: {error}"
-        raise SceneError("model", what, "give parameters of a possible structure") from None
+        return build(scene.files, scene.parameters, harmonics_to_build(study), progress)
+    if scene.path is None:
+        return build_scene(scene.model, scene.parameters, harmonics_to_build(study))
+    # h5py is loaded for scene files only: the bundled scenes do without it.
+    from studies.scene_file import read_scene
+
+    model = read_scene(scene.path, max(study.given_harmonics, default=1), scene.group)
+    # a scene in a result file is the one that was computed with
+    return model if scene.group else make_compliant(model, dict(scene.parameters)["contact_stiffness"])
 
 
 def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:

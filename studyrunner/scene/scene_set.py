@@ -6,13 +6,14 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.scene import Progress
 from studyrunner.scatter import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, harmonics_to_build
 from studyrunner.study.mistakes import keys_as_given
@@ -86,7 +87,7 @@ def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
     return replace(scenes, parts=tuple(parts))
 
 
-def plan_scenes(study: Study, say: Callable[[str], None]) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
+def plan_scenes(study: Study, say: Progress) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
     """The scenes of a study, facts of each, or of one that is as large, and the time, s, for building the others.
 
     Scenes that differ only in numbers with a fraction are taken to have the same sizes, but for the blocks of a

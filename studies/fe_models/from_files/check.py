@@ -11,8 +11,8 @@ from solver import SolverSettings, march_wear
 from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
 from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.finite_element.reduced_joint import FeScene, Progress, silent
-from studies.scene import make_compliant
+from studies.finite_element.reduced_joint import FeScene
+from studies.scene import Progress, make_compliant, silent
 
 N_FREQUENCIES = 4
 """Natural frequencies that are shown."""
