@@ -108,16 +108,11 @@ class Scene(BaseModel):
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, 1")
     contact_stiffness: ContactStiffness = None
 
-    def build(self, n_harmonics: int) -> ReducedModel:
+    def build(self, n_harmonics: int, /) -> ReducedModel:
         """Reduced model without its contact stiffness, with all nodal diameters that the harmonics 0..n_harmonics see.
 
         Raises SceneError where the parameters describe no possible structure.
         """
-        del n_harmonics
-        return self.reduced_model()
-
-    def reduced_model(self) -> ReducedModel:
-        """The same of a scene whose harmonics all see one structure."""
         raise NotImplementedError
 
     def natural_frequencies(self, model: ReducedModel) -> dict[int, FloatArray]:

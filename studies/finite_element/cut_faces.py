@@ -54,7 +54,7 @@ class CyclicAxis:
 
 @dataclass(frozen=True)
 class CutFaces:
-    """left, right (n,): nodes, each right one the image of the left one under the rotation `rotation` by one sector.
+    """left, right (n,): nodes, each right one the image of the left one under the rotation by one sector.
 
     `u_right = phase * rotation @ u_left` for a wave that goes round in the sense of the axis. There are none where
     sectors meet in contact alone.
@@ -63,11 +63,6 @@ class CutFaces:
     axis: CyclicAxis
     left: IntArray
     right: IntArray
-
-    @property
-    def rotation(self) -> FloatArray:
-        """Rotation (3, 3) by one sector."""
-        return self.axis.pitch()
 
     def across(self, sectors: IntArray, nodal_diameter: int) -> sparse.bsr_matrix:
         """Factors (3 n, 3 n) from displacements of points (n,) in this sector to those of their images.

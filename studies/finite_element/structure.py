@@ -199,9 +199,9 @@ def _check_followers(
             raise SceneError("model", f"{origin}: node {numbers[wrong[0]]} depends on others and {what}", remedy)
     if cut is None:
         return
-    slanted = constraints.oblique[cut.left] | constraints.oblique[cut.right]
+    turn, slanted = cut.axis.pitch(), constraints.oblique[cut.left] | constraints.oblique[cut.right]
     for one, other in zip(cut.left[slanted], cut.right[slanted], strict=True):
-        image = cut.rotation @ constraints.held_along(one) @ cut.rotation.T
+        image = turn @ constraints.held_along(one) @ turn.T
         if np.abs(image - constraints.held_along(other)).max() > _ROUND_OFF:
             found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
             raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
@@ -214,10 +214,10 @@ def _hold_cut_faces(held: BoolArray, cut: CutFaces | None, numbers: IntArray) ->
     """
     if cut is None:
         return held
-    either = held[cut.left] | held[cut.right]
+    either, turn = held[cut.left] | held[cut.right], cut.axis.pitch()
     for place in np.flatnonzero(either.any(axis=1) & ~either.all(axis=1)):
         projection = np.diag(either[place].astype(float))
-        if np.abs(cut.rotation @ projection - projection @ cut.rotation).max() > 1e-9:
+        if np.abs(turn @ projection - projection @ turn).max() > 1e-9:
             found = f"node {numbers[cut.left[place]]} of a cut face is held in some directions"
             raise SceneError("clamp", found, "hold nodes of cut faces in all directions, or along the axis")
     held = held.copy()

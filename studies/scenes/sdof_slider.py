@@ -172,7 +172,7 @@ class Parameters(Scene):
     )
     area: float = Field(1e-4, gt=0, description="contact area, m2")
 
-    def reduced_model(self) -> ReducedModel:
+    def build(self, _: int) -> ReducedModel:
         """The response is the displacement of the mass, on which the load acts.
 
         With a spring the closing displacement of the pair comes before that of the mass: a massless degree of freedom,
@@ -224,7 +224,7 @@ class Parameters(Scene):
         known = self.damping == 0.0 and self.contact_stiffness is None and changed <= _KNOWN
         if not (known and slider.holds(mu * max(load, 0.0))):
             return np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan)
-        begun, contact = law.begun_at(np.array([worn_depth])), self.reduced_model().contact
+        begun, contact = law.begun_at(np.array([worn_depth])), self.build(1).contact
         different, places = np.unique(sliding, return_inverse=True)
         work = wearing_work(begun, contact, np.array([mu]))
         depth, force = wear_of_slider(slider, mu, load, self.normal_stiffness, self.area, work, different)

@@ -37,7 +37,7 @@ def dense_twin(sector, joint, pairs, forms, nodal_diameter, n_modes):
     follow = node_blocks(n_nodes, rows)
     phase = np.exp(2j * np.pi * nodal_diameter / N_SECTORS)
     rows = [
-        [(right, np.eye(3)), (left, -phase * joint.cut.rotation)]
+        [(right, np.eye(3)), (left, -phase * joint.cut.axis.pitch())]
         for left, right in zip(joint.cut.left, joint.cut.right, strict=True)
     ]
     held = np.eye(3 * n_nodes)[joint.held.ravel()]
