@@ -1,13 +1,8 @@
-"""Scene files: a reduced model from any finite-element code, in HDF5.
+"""Scene files: a reduced model from any finite-element code, in HDF5, as `studies/OWN_MODEL.md` describes them.
 
 Numbers may be of any integer or floating type; complex ones are compounds `{r, i}`, as h5py, PyTables and netCDF4 write
-them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or variable length. Files are read without
-following anything out of them: external and soft links, external storage and virtual datasets are refused. Attributes
-other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: coefficients
-of mass and stiffness. `contact/edge` is 1 for pairs beyond which the bodies go on without pairs, 0 for the others.
-
-Programs that store columns first (MATLAB, Fortran) write matrices transposed, which their shapes show. `contact/dofs`
-of three pairs is square: where no other array of the file shows the order, it needs the attribute rows = "pairs".
+them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or variable length. Nothing out of the file is
+followed. Attributes other than `n_sectors` and `nodal_diameter` are the user's own.
 
 For pictures a file may hold outer faces of the mesh, without influence on the model or its hash: `mesh/x`, `mesh/y`,
 `mesh/z` (n_nodes,), m; `mesh/quad` (n_faces, 4), nodes anticlockwise from outside, of a triangle the last one twice;
@@ -19,7 +14,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -86,15 +81,14 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
     """
     with _open_scene(Path(path), group) as (root, datasets):
         prefixes = _prefixes(datasets)
-        grouped = prefixes != {0: ""}
-        n_sectors, nodal_diameter = (_read_count(root, name, required=grouped) for name in ATTRIBUTES)
+        n_sectors, nodal_diameter = (_read_count(root, name, required=prefixes != {0: ""}) for name in ATTRIBUTES)
         check_sector(n_sectors, nodal_diameter)
         linear = {k: _read_linear(datasets, prefix, real=k == 0) for k, prefix in prefixes.items()}
-        names = _read_names(datasets, [f"{prefix}response/names" for prefix in prefixes.values()])
+        names = _read_names(datasets, prefixes.values())
         model = ReducedModel(linear, _read_contact(datasets), names, n_sectors, nodal_diameter)
         # results are written here
         shows_order = bool(group) or _shows_order(datasets)
-    check_model(model, n_harmonics, grouped=grouped)
+    check_model(model, n_harmonics)
     if not shows_order:
         check_order(model.contact)
     return model
@@ -139,15 +133,13 @@ def _prefixes(datasets: Datasets) -> dict[int, str]:
 
 def _read_mesh(datasets: Datasets) -> SurfaceMesh:
     axes = [read_dataset(datasets, f"mesh/{axis}", "real") for axis in "xyz"]
-    n_nodes = axes[0].size
     for axis, values in zip("xyz", axes, strict=True):
-        if values.shape != (n_nodes,) or not np.isfinite(values).all():
-            found = f"shape {values.shape}" if values.shape != (n_nodes,) else "not finite"
-            raise SceneError(f"mesh/{axis}", found, "give one finite number for each node")
+        if values.shape != (axes[0].size,) or not np.isfinite(values).all():
+            raise SceneError(f"mesh/{axis}", f"shape {values.shape}", "give one finite number for each node")
     quads = read_dataset(datasets, "mesh/quad", "whole")
     if quads.ndim != 2 or quads.shape[1] != 4:
         raise SceneError("mesh/quad", f"shape {quads.shape}", "give one row of 4 nodes for each face")
-    _check_indices("mesh/quad", quads, n_nodes)
+    _check_indices("mesh/quad", quads, axes[0].size)
     parts = read_dataset(datasets, "mesh/part", "text")
     if len(parts) != len(quads):
         raise SceneError("mesh/part", f"{len(parts)} labels", f"give one label for each of {len(quads)} faces")
@@ -170,16 +162,16 @@ def _read_count(root: h5py.Group, name: str, *, required: bool) -> int:
     return int(number)
 
 
-def _read_names(datasets: Datasets, keys: list[str]) -> tuple[str, ...]:
+def _read_names(datasets: Datasets, prefixes: Iterable[str]) -> tuple[str, ...]:
     """Names of the responses, the same in all groups, or beside them."""
-    shared = "response/names"
-    names = {key: read_dataset(datasets, key if key in datasets or shared not in datasets else shared, "text")
-             for key in keys}  # fmt: skip
-    first: tuple[str, ...] = names[keys[0]]
-    for key, others in names.items():
-        if others != first:
-            raise SceneError(key, ", ".join(others), f"give the same names as elsewhere: {first}")
-    return first
+    shared, found = "response/names", tuple[str, ...]()
+    for prefix in prefixes:
+        key = f"{prefix}{shared}"
+        names = read_dataset(datasets, key if key in datasets or shared not in datasets else shared, "text")
+        if names != (found or names):
+            raise SceneError(key, ", ".join(names), f"give the same names as elsewhere: {found}")
+        found = names
+    return found
 
 
 def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
@@ -200,7 +192,7 @@ def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
         if np.iscomplexobj(damping) or not np.isfinite(damping).all():
             remedy = "give two finite numbers: of mass, 1/s, and stiffness, s"
             raise SceneError(key, f"{damping[0]}, {damping[1]}", remedy)
-        # what fits not is said of the mass
+        # a wrong shape is said of the mass
         fits = mass.shape == stiffness.shape
         damping = damping[0] * mass + damping[1] * stiffness if fits else np.zeros(stiffness.shape)
     return LinearModel(
@@ -222,7 +214,7 @@ def _read_contact(datasets: Datasets) -> ContactInterface:
 
 
 def _shows_order(datasets: Datasets) -> bool:
-    """Whether the file shows that its arrays are not transposed: by the attribute, or by one that is not square."""
+    """Whether the file shows that its arrays are not transposed: by an attribute, or by an array that is not square."""
     name, value = PAIRS_ARE_ROWS
     if read_text_attribute(datasets["contact/dofs"], name) == value:
         return True
@@ -232,9 +224,7 @@ def _shows_order(datasets: Datasets) -> bool:
 
 def scene_attributes(model: ReducedModel) -> dict[str, int]:
     """Attributes of the scene; none where the structure is no sector."""
-    if model.n_sectors == 0:
-        return {}
-    return {"n_sectors": model.n_sectors, "nodal_diameter": model.nodal_diameter}
+    return {name: getattr(model, name) for name in ATTRIBUTES} if model.n_sectors else {}
 
 
 def scene_datasets(model: ReducedModel, mesh: SurfaceMesh | None) -> Iterator[tuple[str, NDArray[np.generic]]]:
