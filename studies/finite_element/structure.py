@@ -195,14 +195,14 @@ def _check_followers(
     for nodes, what, remedy in ways:
         wrong = nodes[constraints.dependent[nodes].any(axis=1)]
         if len(wrong):
-            origin = constraints.origins[constraints.origin[wrong[0]]]
-            raise SceneError("model", f"{origin}: node {numbers[wrong[0]]} depends on others and {what}", remedy)
+            found = f"{constraints.origin[int(wrong[0])]}: node {numbers[wrong[0]]} depends on others and {what}"
+            raise SceneError("model", found, remedy)
     if cut is None:
         return
-    turn, slanted = cut.axis.pitch(), constraints.oblique[cut.left] | constraints.oblique[cut.right]
-    for one, other in zip(cut.left[slanted], cut.right[slanted], strict=True):
-        image = turn @ constraints.held_along(one) @ turn.T
-        if np.abs(image - constraints.held_along(other)).max() > _ROUND_OFF:
+    turn, none = cut.axis.pitch(), np.zeros((3, 3))
+    for one, other in zip(cut.left.tolist(), cut.right.tolist(), strict=True):
+        along, image = (constraints.oblique.get(node, none) for node in (one, other))
+        if np.abs(turn @ along @ turn.T - image).max() > _ROUND_OFF:
             found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
             raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
 
@@ -256,18 +256,18 @@ def _hold_pairs(
 
     Raises SceneError where a moving node is held along its normal, or the opposite point is not held as well.
     """
-    slanted = constraints.oblique
+    oblique = constraints.oblique
 
     def along(node: int) -> FloatArray:
         """Projection (3, 3) on the directions along which a node is held."""
-        return constraints.held_along(node) if slanted[node] else np.diag(held[node].astype(float))
+        return oblique[node] if node in oblique else np.diag(held[node].astype(float))
 
     frames, present = pairs.frames.copy(), pairs.present.copy()
-    for place in np.flatnonzero((held.any(axis=1) | slanted)[pairs.moving]):
+    for place in np.flatnonzero(held[pairs.moving].any(axis=1) | np.isin(pairs.moving, list(oblique))):
         node, name = int(pairs.moving[place]), pairs.moving_name[pairs.surface[place]]
-        by = " (*TRANSFORM)" if slanted[node] else ""
+        by = " (*TRANSFORM)" if node in oblique else ""
         values, vectors = np.linalg.eigh(along(node))
-        axes = vectors.T[values > 0.5] if slanted[node] else np.eye(3)[held[node]]
+        axes = vectors.T[values > 0.5] if node in oblique else np.eye(3)[held[node]]
         normal = frames[place, 0]
         if np.linalg.norm(axes @ normal) > _SLANTED:
             clamped = np.linalg.norm(held[pairs.moving] * pairs.frames[:, 0], axis=1) > _SLANTED
