@@ -1,8 +1,7 @@
-"""The scenes of a run: built once, for all ranks.
+"""The scenes of a run: each built once, by rank 0 or, where there are several, by all ranks side by side.
 
-A single scene is built by rank 0, several scenes by all ranks side by side, each scene once. They are kept in the file
-of the run. A task brings the model to a rank that does not have it: as a file that the ranks map
-(`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
+They are stored in the file of the run. A task brings the model to a rank that does not have it: as a file that the
+ranks map (`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 
 from __future__ import annotations
@@ -132,8 +131,8 @@ class Scenes:
 def build_scenes(ranks: Ranks, study: Study, store: Store, say: Progress) -> Scenes:
     """Rank 0: builds the scenes of a study, several of them together with the other ranks.
 
-    store: the file of the run, with what an earlier run has computed. say: takes a line on the next step, where a step
-    may take long. Raises UserError where a scene is wrong, or lacks what the study asks for.
+    store: the file of the run, with what an earlier run has computed. Raises UserError where a scene is wrong, or lacks
+    what the study asks for.
     """
     scenes = find_scenes(study)
     building = _Building(scenes, store, say)

@@ -1,6 +1,4 @@
-"""What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, a check by eye, and
-the scene that a result keeps.
-"""
+"""What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, scene files."""
 
 from __future__ import annotations
 
@@ -41,7 +39,7 @@ class SmallArray:
 
 
 def build_scene_variables(study: Study, model: ReducedModel, progress: Progress) -> tuple[SmallArray, ...]:
-    """What the study asks of its scene, but exact answers. Raises UserError where the scene cannot give them."""
+    """What the study asks of its scene, but exact answers. Raises UserError."""
     found: list[SmallArray] = []
     with scene_errors(study.source, None):
         if "mesh" in study.scene_variables:
@@ -124,10 +122,9 @@ def write_study_scene(study: Study, path: Path, progress: Progress) -> None:
 def join_scene_variables(
     study: Study, scenes: SceneSet, of_scenes: Sequence[Sequence[SmallArray]]
 ) -> tuple[tuple[SmallArray, ...], tuple[str, ...]]:
-    """Variables of all scenes, and notes on those that are left out.
+    """Variables of all scenes, first along the axes along which they differ, and notes on those that are left out.
 
-    A variable that differs between the scenes gets the axes along which it differs as first dimensions. Variables of
-    different sizes, e.g. meshes of different density, are left out.
+    Left out are those of different sizes, e.g. meshes of different density.
     """
     joined, left_out = [], []
     for variables in zip(*of_scenes, strict=True):
@@ -160,18 +157,17 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     return tuple(variables)
 
 
-_WITHOUT_INFLUENCE = ("step", "scheme", "sweep")
-"""Keys of [axes] that say how a point is computed, and not which point."""
+_NOT_ASKED = (("scene", ("model", "parameters")), ("axes", ("step", "scheme", "sweep")), ("wear", ()))
+"""Tables, and keys in them that the scene knows, or that say how a point is computed, and not which point."""
 
 
 def _changed(study: Study) -> frozenset[str]:
     """Keys of a part of a study that differ from their defaults and may change the exact answer, as "wear.law".
 
-    Without the parameters of the scene, which knows them. [slow_time], [solver] and [outputs] say how a point is
-    computed and shown. What depends on another key has a closed form that knows the key, or none.
+    What depends on such a key has a closed form that knows the key, or none.
     """
     changed = {name for name in ("scatter", "loading", "mission") if getattr(study, name)}
-    for name, without in (("scene", ("model", "parameters")), ("axes", _WITHOUT_INFLUENCE), ("wear", ())):
+    for name, without in _NOT_ASKED:
         table = getattr(study, name)
         for key, entry in type(table).model_fields.items():
             default = entry.get_default(call_default_factory=True)
@@ -201,7 +197,7 @@ def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
 
 
 def check_study_model(study: Study, picture: Path, progress: Progress) -> str:
-    """Lines on the finite-element model of a study, for `--check`; the picture shows the contact pairs.
+    """Lines on the finite-element model of a study, for `--check`. picture: of the contact pairs, is written.
 
     Raises UserError where the study has no such model, the model is wrong, or the picture cannot be written.
     """

@@ -39,11 +39,9 @@ class SceneFacts:
 
     n_displacements: number of relative displacements, the unknowns of one harmonic coefficient.
     position (n_contact, 3): m. area (n_contact,): m2. surface: label of each pair. response_names: n_response texts.
-    digest: SHA-256 of all arrays and names of the reduced model, hexadecimal.
-    largest_harmonics: largest number of harmonics for this scene; None without limit.
-    stuck_frequency: Hz, first natural frequency with the joint stuck; NaN where there is none.
-    edge (n_contact,): whether a pair is at the edge of the contact (`edge_pairs`); False where unknown.
-    gap, friction_coefficient (n_contact,): m and 1, of each pair; friction None where the study gives one for all.
+    digest: SHA-256 of all arrays and names of the reduced model. largest_harmonics: None without limit.
+    stuck_frequency: Hz, first natural frequency with the joint stuck; NaN where there is none. edge (n_contact,): see
+    `edge_pairs`. gap, friction_coefficient (n_contact,): m, 1; None where the study gives one friction for all.
     """
 
     n_displacements: int
@@ -65,12 +63,10 @@ class SceneFacts:
 
 
 def build_study_scene(study: Study, progress: Progress = silent, known: ReducedModel | None = None) -> ReducedModel:
-    """Reduced model of the scene for the largest number of harmonics of the study and those that show the error.
+    """Reduced model of the scene of a study, for `harmonics_to_build`; a scene file may hold fewer.
 
-    With automatic harmonics a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE; a scene file may hold
-    fewer, see `largest_harmonics`. progress: takes a line on the next step, where a step may take long. known: the
-    model from an earlier run. Raises UserError where the parameters or the scene file are wrong, or the scene lacks
-    what the study asks for.
+    known: the model from an earlier run. Raises UserError where the parameters or the scene file are wrong, or the
+    scene lacks what the study asks for.
     """
     with scene_errors(study.source, study.scene.path), np.errstate(all="ignore"):
         model = _built(study, progress) if known is None else known
@@ -82,14 +78,14 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
 
 
 def harmonics_to_build(study: Study) -> int:
-    """Number of harmonics that a scene is built for, those that show the error of a given number included."""
+    """Number of harmonics that a scene is built for: the largest of the study, and those that show its error."""
     # two levels up: 1, 3, 5, 7, 9, 13, 19, 27...
     shown = 2 * max(study.given_harmonics, default=0) + 3
     return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.solver.harmonics else shown
 
 
 def model_key(study: Study) -> str:
-    """Hash under which the model of a scene is kept: of its parameters and files, and of the source of the scenes."""
+    """Hash under which the model of a scene is stored: of its parameters and files, and of the source of the scenes."""
     sources = [package_digest(package) for package in ("studies", "solver")]
     content = None if study.scene.path is None else file_digest(study.scene.path)
     own = study.scene.model, study.scene.of_model, describe_origin(study), content, harmonics_to_build(study)
@@ -189,14 +185,17 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
 
 def describe_scene(model: ReducedModel) -> SceneFacts:
     """Facts of a reduced model."""
-    contact = model.contact
+    contact, digest = model.contact, hashlib.sha256()
+    for name, value in _parts(model):
+        array = np.ascontiguousarray(value)
+        digest.update(f"{name} {array.dtype.str} {array.shape}".encode() + array.tobytes())
     return SceneFacts(
         n_displacements=int(np.count_nonzero(np.asarray(contact.dofs) >= 0)),
         position=contact.position,
         area=contact.area,
         surface=contact.surface,
         response_names=model.response_names,
-        digest=_digest(model),
+        digest=digest.hexdigest(),
         largest_harmonics=largest_harmonics(model),
         edge=edge_pairs(contact),
         gap=contact.gap,
@@ -224,15 +223,6 @@ def largest_harmonics(model: ReducedModel) -> int | None:
         except KeyError:
             return harmonic - 1
     return None
-
-
-def _digest(model: ReducedModel) -> str:
-    digest = hashlib.sha256()
-    for name, value in _parts(model):
-        array = np.ascontiguousarray(value)
-        digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
-        digest.update(array.tobytes())
-    return digest.hexdigest()
 
 
 def _parts(model: ReducedModel) -> Iterator[tuple[str, object]]:

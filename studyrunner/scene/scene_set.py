@@ -44,9 +44,9 @@ class SceneSet:
 
 
 def find_scenes(study: Study) -> SceneSet:
-    """The scenes of a study. Parts that differ only in friction share a scene, where its loads do not depend on it.
+    """The scenes of a study; parts that differ only in what no model depends on share one.
 
-    Raises UserError where a result file is to keep the scene, and there are several.
+    Raises UserError where a result file is to hold the scene, and there are several.
     """
     parts, studies, keys = parts_of(study), dict[str, Study](), list[list[str]]()
     for part in parts:
@@ -90,8 +90,7 @@ def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
 def plan_scenes(study: Study, say: Progress) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
     """The scenes of a study, facts of each, or of one that is as large, and the time, s, for building the others.
 
-    Scenes that differ only in numbers with a fraction are taken to have the same sizes, but for the blocks of a
-    mission; at most eight are built. Raises UserError where a scene is wrong.
+    Scenes that differ only in numbers with a fraction are taken to have the same sizes. Raises UserError.
     """
     scenes, built = find_scenes(study), dict[str, SceneFacts]()
     began, facts = time.monotonic(), []
@@ -128,8 +127,8 @@ class PairArrays:
     """Where the pairs are, for the coordinates of the result file.
 
     dimensions: axes along which the pairs differ, then "contact". position (..., n_contact, 3): m. area
-    (..., n_contact): m2. surface (..., n_contact): labels. exists (..., n_contact): whether there is a pair; None where
-    all scenes have the same pairs. Where there is none position and area are NaN, and the label is empty.
+    (..., n_contact): m2. surface (..., n_contact): labels. exists (..., n_contact): whether there is a pair, else NaN
+    and empty labels stand there; None where all scenes have the same pairs.
     """
 
     dimensions: tuple[str, ...]
@@ -219,8 +218,7 @@ def drawn_pairs(
 ) -> Iterator[tuple[Study, SceneFacts, _Values]]:
     """For each part of a study its variant, its scene, and drawn values (n_contact,) of the inputs of pairs.
 
-    facts: of each scene. block: place of the block in a mission; None for the study as it is. Raises UserError where a
-    sample draws a value that is none.
+    facts: of each scene. block: place of the block in a mission. Raises UserError as `contact_changes`.
     """
     of_parts = iter(scenes.of_blocks)
     for whole in study.variants or (study,):
@@ -242,7 +240,7 @@ def scatters_pairs(study: Study) -> bool:
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
-    """Wear depths (n_contact,), m, with which the history of a study of one scene begins. Raises UserError."""
+    """Wear depths (n_contact,), m, with which a study of one scene begins. Raises UserError where pairs differ."""
     if study.scene.worn is None:
         return np.zeros(len(facts.area))
     try:
