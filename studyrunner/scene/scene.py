@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -27,7 +27,7 @@ from studyrunner.values import Wrong
 from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 if TYPE_CHECKING:
-    from solver.model import ReducedModel
+    from solver.model import ContactInterface, ReducedModel
     from studies.scene import SurfaceMesh
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
@@ -35,31 +35,26 @@ _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """Facts of a scene with n_contact pairs, for the plan and the result file.
+    """Facts of a scene, for the plan and the result file.
 
-    n_displacements: number of relative displacements, the unknowns of one harmonic coefficient.
-    position (n_contact, 3): m. area (n_contact,): m2. surface: label of each pair. response_names: n_response texts.
-    digest: SHA-256 of all arrays and names of the reduced model. largest_harmonics: None without limit.
-    stuck_frequency: Hz, first natural frequency with the joint stuck; NaN where there is none. edge (n_contact,): see
-    `edge_pairs`. gap, friction_coefficient (n_contact,): m, 1; None where the study gives one friction for all.
+    n_displacements: number of relative displacements, the unknowns of one harmonic coefficient. contact: its pairs.
+    response_names: n_response texts. digest: SHA-256 of all arrays and names of the reduced model. largest_harmonics:
+    None without limit. stuck_frequency: Hz, first natural frequency with the joint stuck; NaN where there is none.
+    edge (n_contact,): see `edge_pairs`.
     """
 
     n_displacements: int
-    position: NDArray[np.float64]
-    area: NDArray[np.float64]
-    surface: tuple[str, ...]
+    contact: ContactInterface
     response_names: tuple[str, ...]
     digest: str
     largest_harmonics: int | None = None
     stuck_frequency: float = math.nan
     edge: NDArray[np.bool_] | None = None
-    gap: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
-    friction_coefficient: NDArray[np.float64] | None = None
 
     @cached_property
     def pairs(self) -> Hashable:
         """Where and how large the contact pairs are; equal for scenes with the same pairs."""
-        return self.surface, self.position.tobytes(), self.area.tobytes()
+        return self.contact.surface, self.contact.position.tobytes(), self.contact.area.tobytes()
 
 
 def build_study_scene(study: Study, progress: Progress = silent, known: ReducedModel | None = None) -> ReducedModel:
@@ -138,8 +133,7 @@ def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
     if loops and max(loops) >= contact.n_contact:
         remedy = f"give indices from 0 to {contact.n_contact - 1}, the contact pairs of the scene"
         yield Wrong("outputs.loops", max(loops), remedy)
-    facts = SceneFacts(0, contact.position, contact.area, contact.surface, model.response_names, "")
-    if (size := 8.0 * values_of_point(study, facts)) > _LARGEST_HISTORY:
+    if (size := 8.0 * values_of_point(study, SceneFacts(0, contact, model.response_names, ""))) > _LARGEST_HISTORY:
         key, value = ("outputs.loops", list(loops)) if loops else ("slow_time.outputs", len(study.output_counts))
         yield Wrong(key, value, f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB")
 
@@ -149,7 +143,7 @@ def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
     counted = {study.kind.counted: len(study.output_counts)} if study.kind.counted else {}
     blocks = {"block": len(study.mission)} if study.mission else {}
     loops = {"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}
-    return {**counted, **blocks, "contact": len(facts.area), "response": len(facts.response_names), **loops}
+    return {**counted, **blocks, "contact": facts.contact.n_contact, "response": len(facts.response_names), **loops}
 
 
 def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple[int, ...]]]:
@@ -191,16 +185,12 @@ def describe_scene(model: ReducedModel) -> SceneFacts:
         digest.update(f"{name} {array.dtype.str} {array.shape}".encode() + array.tobytes())
     return SceneFacts(
         n_displacements=int(np.count_nonzero(np.asarray(contact.dofs) >= 0)),
-        position=contact.position,
-        area=contact.area,
-        surface=contact.surface,
+        contact=contact,
         response_names=model.response_names,
         digest=digest.hexdigest(),
         largest_harmonics=largest_harmonics(model),
-        edge=edge_pairs(contact),
-        gap=contact.gap,
-        friction_coefficient=contact.friction_coefficient,
         stuck_frequency=_stuck_frequency(model),
+        edge=edge_pairs(contact),
     )
 
 

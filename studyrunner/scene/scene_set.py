@@ -111,14 +111,14 @@ def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
     """Facts of the scene with the most pairs, with the largest sizes and a digest of all scenes."""
     if len(facts) == 1:
         return facts[0]
-    largest = max(facts, key=lambda each: len(each.area))
+    largest = max(facts, key=lambda each: each.contact.n_contact)
     harmonics = [each.largest_harmonics for each in facts if each.largest_harmonics is not None]
     return replace(
         largest,
         n_displacements=max(each.n_displacements for each in facts),
         digest=hashlib.sha256("".join(each.digest for each in facts).encode()).hexdigest(),
         largest_harmonics=min(harmonics, default=None),
-        edge=largest.edge if all(len(each.area) == len(largest.area) for each in facts) else None,
+        edge=largest.edge if all(each.contact.n_contact == largest.contact.n_contact for each in facts) else None,
     )
 
 
@@ -141,14 +141,15 @@ class PairArrays:
 def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | None = None) -> PairArrays:
     """Positions, areas and labels of the pairs of all scenes of a study. facts: of each scene of `find_scenes`."""
     names, numbers = axes_of_difference(study, scenes or find_scenes(study), [each.pairs for each in facts])
+    contacts = [each.contact for each in facts]
     if not names:
-        one = facts[0]
+        one = contacts[0]
         return PairArrays(("contact",), one.position, one.area, np.array(one.surface), None)
-    shape = (len(facts), max(len(each.area) for each in facts))
+    shape = (len(facts), max(each.n_contact for each in contacts))
     position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
-    surface = np.full(shape, "", np.array([label for each in facts for label in each.surface]).dtype)
-    for number, each in enumerate(facts):
-        own = slice(len(each.area))
+    surface = np.full(shape, "", np.array([label for each in contacts for label in each.surface]).dtype)
+    for number, each in enumerate(contacts):
+        own = slice(each.n_contact)
         position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
     exists = np.isfinite(area[numbers])
     return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
@@ -207,7 +208,7 @@ def contact_changes(
         for variant, own, of_sample in drawn_pairs(study, scenes, facts, place):
             if variant.scene.worn is not None:
                 # wear opens a pair as a gap does, Eq. (7)
-                of_sample["gap"] = of_sample.get("gap", own.gap) + worn_depth(variant, own)
+                of_sample["gap"] = of_sample.get("gap", own.contact.gap) + worn_depth(variant, own)
             changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
         of_blocks.append(changes)
     return tuple(zip(*of_blocks, strict=True))
@@ -227,7 +228,7 @@ def drawn_pairs(
         drawn: dict[Hashable, _Values] = {}
         for sample in range(1 if study.scatter is None else study.scatter.n_rows):
             own = facts[next(of_parts)[block or 0]]
-            values = own.gap, own.friction_coefficient
+            values = own.contact.gap, own.contact.friction_coefficient
             key = own.pairs, *(None if each is None else each.tobytes() for each in values)
             if key not in drawn:
                 drawn[key] = _pair_values(variant, own) if scatters_pairs(study) else {}
@@ -242,17 +243,18 @@ def scatters_pairs(study: Study) -> bool:
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
     """Wear depths (n_contact,), m, with which a study of one scene begins. Raises UserError where pairs differ."""
     if study.scene.worn is None:
-        return np.zeros(len(facts.area))
+        return np.zeros(facts.contact.n_contact)
     try:
-        return np.array(study.scene.worn.depths(len(facts.area)))
+        return np.array(study.scene.worn.depths(facts.contact.n_contact))
     except WrongValueError as error:
         raise UserError(study.source, f"scene.worn.{error.key}", error.value, error.remedy) from None
 
 
 def _pair_values(study: Study, facts: SceneFacts) -> _Values:
     """Values (n_samples, n_contact) of the inputs that belong to pairs. study: with one scene. Raises UserError."""
-    friction, of_all = facts.friction_coefficient, study.friction_coefficient
+    contact, friction = facts.contact, facts.contact.friction_coefficient
     if friction is None:
-        friction = np.full(len(facts.area), np.nan if of_all is None else of_all)
-    own = {"gap": facts.gap, "area": facts.area, "friction_coefficient": friction}
-    return draw_inputs(study, ScatteredPairs(facts.surface, facts.position), own)
+        of_all = study.friction_coefficient
+        friction = np.full(contact.n_contact, np.nan if of_all is None else of_all)
+    own = {"gap": contact.gap, "area": contact.area, "friction_coefficient": friction}
+    return draw_inputs(study, ScatteredPairs(contact.surface, contact.position), own)
