@@ -19,9 +19,6 @@ _SYMMETRY = 1e-8
 """Largest difference of two entries that should mirror each other, relative to the geometric mean of the two diagonal
 entries that bound them in a positive semidefinite matrix. Differences below 1e-12 of the largest entry never count."""
 
-PAIRS_ARE_ROWS = ("rows", "pairs")
-"""Name and value of an attribute of the dataset `contact/dofs` that is not transposed."""
-
 TRANSPOSED = ": MATLAB and Fortran write columns first, so transpose every matrix of the file"
 """End of the remedy where a matrix has the right shape once it is transposed."""
 
@@ -34,8 +31,12 @@ def check_model(model: ReducedModel, n_harmonics: int = 1) -> None:
 
     n_harmonics: harmonics 0..n_harmonics must find their nodal diameter in the model.
     """
-    grouped = is_grouped(model)
-    check_sector(model.n_sectors, model.nodal_diameter)
+    if model.n_sectors < 0:
+        remedy = "give the number of sectors, or 0 for a structure that is no sector"
+        raise SceneError("n_sectors", str(model.n_sectors), remedy)
+    # above half the number of sectors a wave travels backwards
+    if not 0 <= model.nodal_diameter <= max(model.n_sectors - 1, 0):
+        raise SceneError("nodal_diameter", str(model.nodal_diameter), f"give 0 to {max(model.n_sectors - 1, 0)}")
     names = model.response_names
     if not names or "" in names or len(set(names)) < len(names):
         found = ", ".join(f'"{name}"' for name in names) or "no name"
@@ -49,37 +50,14 @@ def check_model(model: ReducedModel, n_harmonics: int = 1) -> None:
         if not 0 <= k <= model.n_sectors // 2:
             found = f"there are {model.n_sectors} sectors"
             raise SceneError(f"nd/{k}", found, f"give nodal diameters of 0 to {model.n_sectors // 2}")
-        _check_linear(linear, f"nd/{k}/" if grouped else "", len(model.response_names))
+        _check_linear(linear, f"nd/{k}/" if is_grouped(model) else "", len(model.response_names))
     _check_contact(model.contact, min(len(linear.stiffness) for linear in model.linear.values()))
-    _check_static(model.linear[0], model.contact, "nd/0/" if grouped else "")
+    _check_static(model.linear[0], model.contact, "nd/0/" if is_grouped(model) else "")
 
 
 def is_grouped(model: ReducedModel) -> bool:
     """Whether a scene file holds the model in groups `nd/<k>/`: a travelling wave, or several nodal diameters."""
     return model.nodal_diameter > 0 or len(model.linear) > 1
-
-
-def check_sector(n_sectors: int, nodal_diameter: int) -> None:
-    """Raise SceneError where there is no such number of sectors, or no such wave on them; above half of it it travels
-    backwards.
-    """
-    if n_sectors < 0:
-        remedy = "give the number of sectors, or 0 for a structure that is no sector"
-        raise SceneError("n_sectors", str(n_sectors), remedy)
-    if not 0 <= nodal_diameter <= max(n_sectors - 1, 0):
-        raise SceneError("nodal_diameter", str(nodal_diameter), f"give 0 to {max(n_sectors - 1, 0)}")
-
-
-def check_order(contact: ContactInterface) -> None:
-    """Raise SceneError where `contact/dofs`, checked before, may as well be transposed: of three pairs it is square."""
-    dofs, turned = contact.dofs, contact.dofs.T
-    if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
-        return
-    if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
-        name, value = PAIRS_ARE_ROWS
-        found = "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction"
-        remedy = f'write one row for each pair, and give the dataset the attribute {name} = "{value}"'
-        raise SceneError("contact/dofs", found, remedy)
 
 
 def _check_contact(contact: ContactInterface, n: int) -> None:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.hdf5 import Datasets, as_whole, find_datasets, open_hdf5, read_attribute, read_dataset, read_text_attribute
-from studies.model_check import PAIRS_ARE_ROWS, check_model, check_order, check_sector, is_grouped
+from studies.model_check import check_model, is_grouped
 from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
 
@@ -43,6 +43,8 @@ CONTACT = {
 LINEAR = ("mass", "damping", "stiffness", "load/static", "load/harmonic", "response/dofs", "response/names")
 MESH = ("x", "y", "z", "quad", "part")
 ATTRIBUTES = ("n_sectors", "nodal_diameter")
+PAIRS_ARE_ROWS = ("rows", "pairs")
+"""Name and value of an attribute of the dataset `contact/dofs` that is not transposed."""
 ORIGIN = ("model_files", "model_units", "model_reduced_by")
 """Attributes of a file whose scene was reduced here from a finite-element model."""
 
@@ -82,15 +84,12 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
     with _open_scene(Path(path), group) as (root, datasets):
         prefixes = _prefixes(datasets)
         n_sectors, nodal_diameter = (_read_count(root, name, required=prefixes != {0: ""}) for name in ATTRIBUTES)
-        check_sector(n_sectors, nodal_diameter)
         linear = {k: _read_linear(datasets, prefix, real=k == 0) for k, prefix in prefixes.items()}
         names = _read_names(datasets, prefixes.values())
         model = ReducedModel(linear, _read_contact(datasets), names, n_sectors, nodal_diameter)
-        # results are written here
-        shows_order = bool(group) or _shows_order(datasets)
-    check_model(model, n_harmonics)
-    if not shows_order:
-        check_order(model.contact)
+        check_model(model, n_harmonics)
+        if not group:  # results are written here
+            _check_order(datasets, model.contact)
     return model
 
 
@@ -213,13 +212,22 @@ def _read_contact(datasets: Datasets) -> ContactInterface:
     return ContactInterface(**{**absent, "position": np.full((n_contact, 3), np.nan), **found})
 
 
-def _shows_order(datasets: Datasets) -> bool:
-    """Whether the file shows that its arrays are not transposed: by an attribute, or by an array that is not square."""
-    name, value = PAIRS_ARE_ROWS
-    if read_text_attribute(datasets["contact/dofs"], name) == value:
-        return True
+def _check_order(datasets: Datasets, contact: ContactInterface) -> None:
+    """Raise SceneError where `contact/dofs` may as well be transposed: that of three pairs is square.
+
+    A file shows that it is not by the attribute, or by an array of the right shape that is not square.
+    """
+    (name, value), dofs, turned = PAIRS_ARE_ROWS, contact.dofs, contact.dofs.T
     shapes = [dataset.shape for key, dataset in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
-    return any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)
+    shown = read_text_attribute(datasets["contact/dofs"], name) == value
+    if shown or any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes):
+        return
+    if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
+        return
+    if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
+        found = "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction"
+        remedy = f'write one row for each pair, and give the dataset the attribute {name} = "{value}"'
+        raise SceneError("contact/dofs", found, remedy)
 
 
 def scene_attributes(model: ReducedModel) -> dict[str, int]:

@@ -52,8 +52,7 @@ class ContactSurfaces:
         """Coordinates (n_nodes, 3), m, where the second surface is; axis: of the cyclic structure."""
         if not self.sector:
             return coordinates
-        if axis is None:
-            raise ValueError("a contact between sectors needs the axis of the cyclic structure")
+        assert axis is not None, "of a sector"
         return axis.turned(coordinates, self.sector)
 
     @property

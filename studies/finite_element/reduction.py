@@ -171,16 +171,14 @@ def _lowest_modes(
         adjoint = space[0].conj().T
         values, vectors = eigh(adjoint @ space[1], adjoint @ space[2])
         found = np.flatnonzero(values > _STIFF * values[-1])[::-1][:n_modes]
-        if small or block.shape[1] == 0 or (len(known) == len(found) and _agree(values[found], known)):
+        if small or block.shape[1] == 0:
+            break
+        if len(known) == len(found) and (np.abs(values[found] - known) <= _SAME * known + _ROUND_OFF * known[0]).all():
             break
         known = values[found]
     modes = (space[0] @ vectors[:, found]) / np.sqrt(values[found])
     seen = random.standard_normal(n) @ modes
     return 1.0 / np.sqrt(values[found]), modes * (seen.conj() / np.abs(seen))
-
-
-def _agree(values: FloatArray, known: FloatArray) -> bool:
-    return bool((np.abs(values - known) <= _SAME * known + _ROUND_OFF * known[0]).all())
 
 
 def _orthonormal(block: Matrix, basis: Matrix) -> Matrix:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +145,13 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     """
     if "exact" not in study.outputs.variables:
         return ()
-    answers = [_answers(part.study) for part in parts_of(study)]
+    answers: list[Any] = []
+    for part in parts_of(study):
+        axes, scene = part.study.axes, part.study.scene
+        (depth,) = (0.0,) if scene.worn is None else scene.worn.depths(1)
+        rest = np.array(axes.wear_coefficient), np.array(part.study.output_counts), part.study.wear.as_law, depth
+        exact, changed = cast(Any, scene.parameters).exact_answer, _changed(part.study)
+        answers.append([[exact(f, a, *rest, changed) for a in axes.excitation_amplitude] for f in axes.frequency])
     others = (*(1,) * (len(study.own_axes) - 3), *(len(values) for values in study.axes_of_parts.values()))
     variables = []
     for place, (name, entry) in enumerate(SCENE["exact"].items()):
@@ -174,17 +180,6 @@ def _changed(study: Study) -> frozenset[str]:
             if not entry.exclude and key not in without and (entry.is_required() or getattr(table, key) != default):
                 changed.add(f"{name}.{key}")
     return frozenset(changed)
-
-
-def _answers(study: Study) -> list[list[Any]]:
-    """Exact answers of a part of a study, for all wear coefficients, by frequency and excitation amplitude."""
-    axes, changed = study.axes, _changed(study)
-    (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
-    counts, given = np.array(study.output_counts), np.array(axes.wear_coefficient)
-
-    scene: Any = study.scene.parameters
-    rest = given, counts, study.wear.as_law, depth, changed
-    return [[scene.exact_answer(one, other, *rest) for other in axes.excitation_amplitude] for one in axes.frequency]
 
 
 def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:

@@ -228,11 +228,14 @@ def drawn_pairs(
         drawn: dict[Hashable, _Values] = {}
         for sample in range(1 if study.scatter is None else study.scatter.n_rows):
             own = facts[next(of_parts)[block or 0]]
-            values = own.contact.gap, own.contact.friction_coefficient
-            key = own.pairs, *(None if each is None else each.tobytes() for each in values)
-            if key not in drawn:
-                drawn[key] = _pair_values(variant, own) if scatters_pairs(study) else {}
-            yield variant, own, {name: each[sample] for name, each in drawn[key].items()}
+            contact, friction = own.contact, own.contact.friction_coefficient
+            key = own.pairs, contact.gap.tobytes(), None if friction is None else friction.tobytes()
+            if key not in drawn and scatters_pairs(study):
+                of_all = np.nan if variant.friction_coefficient is None else variant.friction_coefficient
+                friction = np.full(contact.n_contact, of_all) if friction is None else friction
+                values = {"gap": contact.gap, "area": contact.area, "friction_coefficient": friction}
+                drawn[key] = draw_inputs(variant, ScatteredPairs(contact.surface, contact.position), values)
+            yield variant, own, {name: each[sample] for name, each in drawn.get(key, {}).items()}
 
 
 def scatters_pairs(study: Study) -> bool:
@@ -248,13 +251,3 @@ def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
         return np.array(study.scene.worn.depths(facts.contact.n_contact))
     except WrongValueError as error:
         raise UserError(study.source, f"scene.worn.{error.key}", error.value, error.remedy) from None
-
-
-def _pair_values(study: Study, facts: SceneFacts) -> _Values:
-    """Values (n_samples, n_contact) of the inputs that belong to pairs. study: with one scene. Raises UserError."""
-    contact, friction = facts.contact, facts.contact.friction_coefficient
-    if friction is None:
-        of_all = study.friction_coefficient
-        friction = np.full(contact.n_contact, np.nan if of_all is None else of_all)
-    own = {"gap": contact.gap, "area": contact.area, "friction_coefficient": friction}
-    return draw_inputs(study, ScatteredPairs(contact.surface, contact.position), own)
