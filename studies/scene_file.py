@@ -81,8 +81,7 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
     Raises SceneError about the dataset that is wrong, about "model" where the file is no HDF5; OSError where there is
     no such file or it cannot be opened.
     """
-    with _open_scene(Path(path), group) as (root, datasets):
-        prefixes = _prefixes(datasets)
+    with _open_scene(Path(path), group) as (root, datasets, prefixes):
         n_sectors, nodal_diameter = (_read_count(root, name, required=prefixes != {0: ""}) for name in ATTRIBUTES)
         linear = {k: _read_linear(datasets, prefix, real=k == 0) for k, prefix in prefixes.items()}
         names = _read_names(datasets, prefixes.values())
@@ -95,7 +94,7 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
 
 def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
     """The mesh of a scene file, None where it has none. Raises what `read_scene` raises."""
-    with _open_scene(Path(path), group) as (_, datasets):
+    with _open_scene(Path(path), group) as (_, datasets, _):
         return _read_mesh(datasets) if any(key.startswith("mesh/") for key in datasets) else None
 
 
@@ -106,14 +105,15 @@ def read_origin(path: str | Path) -> dict[str, str]:
 
 
 @contextmanager
-def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets]]:
-    """Group and datasets of a scene, found and looked at, but not read."""
+def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets, dict[int, str]]]:
+    """Group and datasets of a scene, and how their names begin for each nodal diameter, "" without groups `nd`."""
     with open_hdf5(path) as file:
         root = file.get(group) if group else file
         if not isinstance(root, h5py.Group):
             raise SceneError(group, "missing", f"give a file with a group {group}")
         datasets = find_datasets(root)
-        prefixes = _prefixes(datasets)
+        diameters = {int(match[1]) for key in datasets if (match := re.match(r"nd/(0|[1-9][0-9]*)/", key))}
+        prefixes = {k: f"nd/{k}/" for k in sorted(diameters)} or {0: ""}
         known = [f"contact/{name}" for name in CONTACT] + [f"mesh/{name}" for name in MESH]
         known += [prefix + name for prefix in prefixes.values() for name in LINEAR]
         for key in datasets:
@@ -121,13 +121,7 @@ def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets]]
                 remedy = f"remove it, known are {', '.join(known[: len(CONTACT) + len(MESH)] + list(LINEAR))}"
                 where = "" if prefixes == {0: ""} else ", the latter in nd/<nodal diameter>/"
                 raise SceneError(key, "unknown dataset", remedy + where)
-        yield root, datasets
-
-
-def _prefixes(datasets: Datasets) -> dict[int, str]:
-    """Beginnings of the names of the datasets of each nodal diameter; of 0 alone where the file has no groups `nd`."""
-    found = {int(match[1]) for key in datasets if (match := re.match(r"nd/(0|[1-9][0-9]*)/", key))}
-    return {k: f"nd/{k}/" for k in sorted(found)} or {0: ""}
+        yield root, datasets, prefixes
 
 
 def _read_mesh(datasets: Datasets) -> SurfaceMesh:

@@ -114,7 +114,9 @@ def build_contact_pairs(
         if len(shared):
             found = f"{contact.first.name} and {contact.second.name} share {len(shared)} nodes"
             raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
-        sizes = [each.facet_size(coordinates) for each in (contact.first, contact.second)]
+        both = contact.first, contact.second
+        # roots of the mean areas of their facets
+        sizes = [float(np.sqrt(each.areas_and_normals(coordinates)[0].sum() / len(each.facets))) for each in both]
         finer = contact.turned_round if sizes[1] < (1.0 - 1e-6) * sizes[0] else contact
         facet = max(sizes)
         limit = min(facet, _TOLERANCE * facet if contact.tolerance is None else contact.tolerance)

@@ -120,10 +120,6 @@ class Surface:
             raise SceneError("contact", found, "give a smooth surface of one body")
         return area[self.nodes], normal[self.nodes] / sizes[:, None]
 
-    def facet_size(self, coordinates: FloatArray) -> float:
-        """Typical size of a facet, m: root of the mean area."""
-        return float(np.sqrt(self.areas_and_normals(coordinates)[0].sum() / len(self.facets)))
-
 
 class Face(NamedTuple):
     """Face of an element.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
@@ -179,7 +180,12 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
 
 def describe_scene(model: ReducedModel) -> SceneFacts:
     """Facts of a reduced model."""
-    contact, digest = model.contact, hashlib.sha256()
+    contact, digest, stuck = model.contact, hashlib.sha256(), math.nan
+    # nothing moves or holds
+    with contextlib.suppress(SceneError):
+        # of a wave that travels backwards, those of its image
+        nodal_diameter = min(model.nodal_diameter, abs(model.n_sectors - model.nodal_diameter))
+        stuck = float(stuck_frequencies(model)[nodal_diameter][0])
     for name, value in _parts(model):
         array = np.ascontiguousarray(value)
         digest.update(f"{name} {array.dtype.str} {array.shape}".encode() + array.tobytes())
@@ -189,19 +195,9 @@ def describe_scene(model: ReducedModel) -> SceneFacts:
         response_names=model.response_names,
         digest=digest.hexdigest(),
         largest_harmonics=largest_harmonics(model),
-        stuck_frequency=_stuck_frequency(model),
+        stuck_frequency=stuck,
         edge=edge_pairs(contact),
     )
-
-
-def _stuck_frequency(model: ReducedModel) -> float:
-    """First natural frequency, Hz, with the joint stuck; NaN where nothing moves or holds."""
-    try:
-        found = stuck_frequencies(model)
-    except SceneError:
-        return math.nan
-    # of a wave that travels backwards, those of its image
-    return float(found[min(model.nodal_diameter, abs(model.n_sectors - model.nodal_diameter))][0])
 
 
 def largest_harmonics(model: ReducedModel) -> int | None:

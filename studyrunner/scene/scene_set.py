@@ -50,23 +50,19 @@ def find_scenes(study: Study) -> SceneSet:
     """
     parts, studies, keys = parts_of(study), dict[str, Study](), list[list[str]]()
     for part in parts:
-        own = part.study.block_studies or (part.study,)
-        keys.append([_key(each) for each in own])
-        for key, each in zip(keys[-1], own, strict=True):
-            studies.setdefault(key, each)
+        keys.append([])
+        for each in part.study.block_studies or (part.study,):
+            scene, harmonics = each.scene, harmonics_to_build(each)
+            files = None if scene.files is None else [str(path) for path in scene.files.all]
+            where = None if scene.path is None else str(scene.path), scene.group, files
+            keys[-1].append(json.dumps([scene.model, scene.of_model, where, harmonics], sort_keys=True))
+            studies.setdefault(keys[-1][-1], each)
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
         raise UserError(study.source, "outputs.scene", True, remedy)
     number_of = {key: number for number, key in enumerate(studies)}
     of_blocks = tuple(tuple(number_of[key] for key in each) for each in keys)
     return SceneSet(tuple(studies.values()), parts, of_blocks)
-
-
-def _key(study: Study) -> str:
-    scene = study.scene
-    files = None if scene.files is None else [str(path) for path in scene.files.all]
-    where = None if scene.path is None else str(scene.path), scene.group, files
-    return json.dumps([scene.model, study.scene.of_model, where, harmonics_to_build(study)], sort_keys=True)
 
 
 def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
