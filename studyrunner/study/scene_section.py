@@ -271,6 +271,8 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
     counts = dataset.get("cycle_count", dataset["cycle"]).isel(places, missing_dims="ignore").values.tolist()
     states = [place("cycle", count, counts) for count in cycle]
     chosen = depths.isel({**places, "cycle": states}).values.astype(np.float64)
+    if "contact_exists" in dataset:  # its scenes differ in their pairs
+        chosen = chosen[:, dataset["contact_exists"].isel(places, missing_dims="ignore").values != 0]
     for count, row in zip(cycle, chosen, strict=True):
         if not np.isfinite(row).all():
             remedy = "give an earlier cycle count: the result does not hold the depths of this one"

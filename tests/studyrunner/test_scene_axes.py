@@ -122,6 +122,16 @@ def test_a_result_to_the_end_gives_its_depths_by_cycle_count(folder):
     assert study.variants[0].scene.worn.depths(1) == (5e-9,)
 
 
+def test_depths_are_those_of_the_pairs_of_the_chosen_scene(folder):
+    write_depths("both.nc", 150.0, [0.0, 1.0], 2)
+    with xr.open_dataset("both.nc") as both:
+        depth = both.wear_depth.copy()
+        depth[..., 1] = np.nan
+        both.assign(wear_depth=depth, contact_exists=("contact", [1, 0])).to_netcdf("one.nc")
+    study = read_study("sdof_slider", (*CHEAP, f"scene.worn={{result='{folder / 'one.nc'}', cycle=[1]}}"))
+    assert study.variants[0].scene.worn.depths(1) == (1e-9,)
+
+
 # --- variables of the scene itself ---
 
 
