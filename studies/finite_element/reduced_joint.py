@@ -49,8 +49,9 @@ def build_fe_scene(
     options: ReductionOptions,
     n_harmonics: int,
     progress: Progress = silent,
+    prepared: PreparedModel | None = None,
 ) -> FeScene:
-    """Reduced model for the harmonics 0..n_harmonics.
+    """Reduced model for the harmonics 0..n_harmonics. prepared: the model where `prepare_model` has made it before.
 
     Displacements of the reduced model: first the relative ones, pair by pair normal (positive when the pair closes),
     first and second tangent; then modal coordinates of the glued structure. The static load, that of the rotation and
@@ -64,7 +65,7 @@ def build_fe_scene(
         most = f"use at most n_sectors // 2 = {n_sectors // 2}; more is the same wave turning the other way"
         raise SceneError("nodal_diameter", str(excited), most if n_sectors else "only a cyclic sector has one: use 0")
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
-    prepared = prepare_model(model, joint, progress)
+    prepared = prepared or prepare_model(model, joint, progress)
     vectors = np.stack([prepared.static_load, joint.load, *joint.responses.values()], axis=1)
     linear: dict[int, LinearModel] = {}
     found: dict[int, FloatArray] = {}

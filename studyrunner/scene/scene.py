@@ -181,7 +181,7 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
 def describe_scene(model: ReducedModel) -> SceneFacts:
     """Facts of a reduced model."""
     contact, digest, stuck = model.contact, hashlib.sha256(), math.nan
-    # nothing moves or holds
+    # NaN where nothing moves, or nothing holds the structure
     with contextlib.suppress(SceneError):
         # of a wave that travels backwards, those of its image
         nodal_diameter = min(model.nodal_diameter, abs(model.n_sectors - model.nodal_diameter))

@@ -63,7 +63,7 @@ def describe_model(
         listed = ", ".join(map(str, first))
         rows.append(("glued", f"first at nodal diameters {listed}: {_frequencies(np.array([*first.values()]))} Hz"))
     progress("reduction with twice the modes")
-    rows.append(("reduction", _reduction_error(loaded, scene.model, parameters)))
+    rows.append(("reduction", _reduction_error(loaded, scene, parameters)))
     rows.append(("rigid", f"{count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
     held = count_free_motions(scene.model)
     if held:
@@ -103,14 +103,14 @@ def sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray:
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
 
 
-def _reduction_error(loaded: LoadedModel, model: ReducedModel, parameters: Parameters) -> str:
+def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters) -> str:
     """How far frequencies change with twice the modes, where the pairs slide freely and the joint moves most."""
-    k = parameters.nodal_diameter
+    k, model = parameters.nodal_diameter, scene.model
     n_modes = len(model.linear[k].stiffness) - np.count_nonzero(model.contact.dofs >= 0)
     if n_modes < parameters.stuck_modes:
         return f"none: there are no more than {n_modes} modes with the pairs glued"
     more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
-    finer = reduce_model(loaded, more, 1).model
+    finer = reduce_model(loaded, more, 1, prepared=scene.prepared).model
     own, other = (sliding_frequencies(each.linear[k], each)[: 2 * N_FREQUENCIES] for each in (model, finer))
     n = min(len(own), len(other))
     elastic = other[:n] > 1e-3 * other[:n].max()

@@ -25,6 +25,7 @@ from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
 from studies.finite_element.reduced_joint import FeScene, build_fe_scene
+from studies.finite_element.reduction import PreparedModel
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
@@ -81,10 +82,16 @@ def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: 
     )
 
 
-def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, progress: Progress = silent) -> FeScene:
-    """Reduced model of a loaded one. Raises SceneError."""
+def reduce_model(
+    loaded: LoadedModel,
+    parameters: Parameters,
+    n_harmonics: int,
+    progress: Progress = silent,
+    prepared: PreparedModel | None = None,
+) -> FeScene:
+    """Reduced model of a loaded one, which may be prepared already. Raises SceneError."""
     options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-    return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress)
+    return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress, prepared)
 
 
 def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:
