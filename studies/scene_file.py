@@ -86,9 +86,12 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
         linear = {k: _read_linear(datasets, prefix, real=k == 0) for k, prefix in prefixes.items()}
         names = _read_names(datasets, prefixes.values())
         model = ReducedModel(linear, _read_contact(datasets), names, n_sectors, nodal_diameter)
-        check_model(model, n_harmonics)
-        if not group:  # results are written here
-            _check_order(datasets, model.contact)
+        marked = read_text_attribute(datasets["contact/dofs"], PAIRS_ARE_ROWS[0]) == PAIRS_ARE_ROWS[1]
+        shapes = [each.shape for key, each in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
+    check_model(model, n_harmonics)
+    # results are written here
+    if not (group or marked or any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)):
+        _check_order(model.contact)
     return model
 
 
@@ -206,19 +209,16 @@ def _read_contact(datasets: Datasets) -> ContactInterface:
     return ContactInterface(**{**absent, "position": np.full((n_contact, 3), np.nan), **found})
 
 
-def _check_order(datasets: Datasets, contact: ContactInterface) -> None:
+def _check_order(contact: ContactInterface) -> None:
     """Raise SceneError where `contact/dofs` may as well be transposed: that of three pairs is square.
 
-    A file shows that it is not by the attribute, or by an array of the right shape that is not square.
+    Of a file without the attribute PAIRS_ARE_ROWS, or an array that is not square and has the right shape.
     """
-    (name, value), dofs, turned = PAIRS_ARE_ROWS, contact.dofs, contact.dofs.T
-    shapes = [dataset.shape for key, dataset in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
-    shown = read_text_attribute(datasets["contact/dofs"], name) == value
-    if shown or any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes):
-        return
+    dofs, turned = contact.dofs, contact.dofs.T
     if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
         return
     if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
+        name, value = PAIRS_ARE_ROWS
         found = "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction"
         remedy = f'write one row for each pair, and give the dataset the attribute {name} = "{value}"'
         raise SceneError("contact/dofs", found, remedy)

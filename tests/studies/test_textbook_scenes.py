@@ -8,8 +8,7 @@ import pytest
 
 from studies import build_scene
 from studies.model_check import check_model
-from studies.scene_error import SceneError
-from studies.scenes import BUNDLED, scene_help, scene_parameters
+from studies.scenes import scene_help
 from studyrunner.cli import main
 from tests.references import coulomb_orbit, vibro_impact_orbit
 
@@ -28,13 +27,6 @@ def dynamic_stiffness(model, omega):
 )
 def test_scenes_are_possible_structures(name, values):
     check_model(build_scene(name, **values), n_harmonics=21)
-
-
-def test_an_unknown_scene_is_named_with_the_known_ones():
-    with pytest.raises(SceneError, match="bladeless") as caught:
-        scene_parameters("bladeless")
-    assert caught.value.key == "model"
-    assert all(name in caught.value.remedy for name in BUNDLED)
 
 
 def test_listing_the_scenes_imports_nothing_heavy():
