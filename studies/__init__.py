@@ -51,6 +51,8 @@ def build_scene(name: str, /, *, n_harmonics: int = OF_A_WAVE, **parameters: obj
         checked = kind.model_validate(given, strict=True)
     except ValidationError as error:
         wrong = error.errors(include_url=False)[0]
+        if isinstance(inner := wrong.get("ctx", {}).get("error"), SceneError):
+            raise inner from None
         key = ".".join(str(part) for part in wrong["loc"])
         if wrong["type"] == "extra_forbidden":
             known = ", ".join(each for each in kind.model_fields if each != "friction_coefficient")

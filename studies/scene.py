@@ -164,7 +164,7 @@ def build_compliant(
             return with_contact_stiffness(_last_rigid[key], contact_stiffness)
         except SceneError:
             raise
-        except (ArithmeticError, ValueError, MemoryError) as error:
+        except (ArithmeticError, ValueError, IndexError, MemoryError) as error:
             # what a parameter alone does not show: LinAlgError is a ValueError, too
             remedy = "give parameters of a possible structure"
             raise SceneError("model", f"{name} cannot be built: {error}", remedy) from None

@@ -82,9 +82,14 @@ def worn_edge(worn_depth: Callable[..., FloatArray], contact: float, stick: floa
     """Half-width b, m, over which the bodies touch where all has worn that can: the last depth above 0.
 
     worn_depth: of distances from the middle, radius, half-widths of the unworn contact and of the stick zone, m.
+    Raises SceneError where the bodies are so far from possible ones that numbers overflow.
     """
-    x = np.linspace(contact, _FARTHEST * contact, 10001)
-    return float(x[worn_depth(x, 1.0, contact, stick) > 0.0][-1])
+    with np.errstate(all="ignore"):
+        x = np.linspace(contact, _FARTHEST * contact, 10001)
+        touching = x[worn_depth(x, 1.0, contact, stick) > 0.0]
+    if not touching.size:
+        raise SceneError("model", "the width of the contact is no number", "give parameters of possible bodies")
+    return float(touching[-1])
 
 
 class PressedBody(Scene):
