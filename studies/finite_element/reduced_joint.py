@@ -33,7 +33,7 @@ from studies.scene_error import SceneError
 
 @dataclass(frozen=True)
 class FeScene:
-    """A reduced model, what it was reduced from, with the pairs in its order, and frequencies of the glued structure.
+    """A reduced model, what it was reduced from, and frequencies of the glued structure.
 
     glued_frequencies: Hz, ascending, by nodal diameter.
     """
@@ -41,6 +41,11 @@ class FeScene:
     model: ReducedModel
     prepared: PreparedModel
     glued_frequencies: Mapping[int, FloatArray]
+
+    @property
+    def pairs(self) -> ContactPairs:
+        """Contact pairs in the order of the model."""
+        return self.prepared.structure.pairs
 
 
 def build_fe_scene(

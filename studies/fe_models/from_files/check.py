@@ -123,7 +123,7 @@ def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters
 
 
 def _contacts(scene: FeScene) -> Iterator[str]:
-    pairs = scene.prepared.pairs
+    pairs = scene.pairs
     for place, (moving, opposite) in enumerate(zip(pairs.moving_name, pairs.opposite_name, strict=True)):
         own = pairs.surface == place
         neighbour = _NEIGHBOURS[int(pairs.sector[own][0])] if own.any() else ""

@@ -20,11 +20,11 @@ _ASIDE = (1.0, 0.5, 0.4)  # from where a surface is looked at, in its mean frame
 
 def draw_pairs(loaded: LoadedModel, scene: FeScene, path: Path) -> None:
     """Writes a PNG with one part for each pair of surfaces. Raises OSError."""
-    n = len(scene.prepared.pairs.moving_name)
+    n = len(scene.pairs.moving_name)
     rows, columns = -(-n // 3), min(n, 3)
     figure = Figure(figsize=(7.0 * columns, 6.5 * rows), layout="constrained")
     for place in range(n):
-        _draw_surface(figure, (rows, columns, place + 1), loaded, scene.prepared.pairs, place)
+        _draw_surface(figure, (rows, columns, place + 1), loaded, scene.pairs, place)
     figure.suptitle("contact pairs: normal (red), first tangent (green), second tangent (blue)")
     figure.savefig(path, format="png")
 
