@@ -64,7 +64,9 @@ class PreparedModel:
         """Lowest natural frequencies (n_modes,) of the glued structure, Hz, ascending. stiffness: name of the form."""
         coordinates = self.structure.coordinates(nodal_diameter)
         form, factor = self._factorise(coordinates, nodal_diameter, stiffness)
-        return _lowest_modes(form, _on(coordinates.glued, self.forms["mass"]), factor, n_modes)[0] / (2.0 * np.pi)
+        return _lowest_modes(form, _projected(coordinates.glued, self.forms["mass"]), factor, n_modes)[0] / (
+            2.0 * np.pi
+        )
 
     def reduce(
         self, nodal_diameter: int, n_modes: int, vectors: FloatArray
@@ -81,7 +83,7 @@ class PreparedModel:
         glued, relative = coordinates.glued, coordinates.relative
         stiffness, factor = self._factorise(coordinates, nodal_diameter)
         shapes = _static_shapes(coordinates, self.forms["stiffness"], factor)
-        frequencies, modes = _lowest_modes(stiffness, _on(glued, self.forms["mass"]), factor, n_modes)
+        frequencies, modes = _lowest_modes(stiffness, _projected(glued, self.forms["mass"]), factor, n_modes)
         moved, forms = glued @ modes, {}
         for name, form in self.forms.items():
             if name == "stiffness":  # no force but at the pairs
@@ -99,11 +101,11 @@ class PreparedModel:
         self, coordinates: Coordinates, nodal_diameter: int, name: str = "stiffness"
     ) -> tuple[sparse.csr_matrix, Factor]:
         """A stiffness with the pairs glued, and its factors."""
-        stiffness = _on(coordinates.glued, self.forms[name])
+        stiffness = _projected(coordinates.glued, self.forms[name])
         if not self.dissections:
             # where phases cancel at one of these diameters they do not at the other
             glued = sum(abs(self.structure.coordinates(diameter).glued) for diameter in (0, 1))
-            everything = _on(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
+            everything = _projected(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
             self.dissections.append(dissect(everything, coordinates.node, self.positions))
         try:
             return stiffness, factorise(stiffness, self.dissections[0])
@@ -119,7 +121,8 @@ class PreparedModel:
             raise SceneError("clamp", found, remedy) from error
 
 
-def _on(coordinates: sparse.csr_matrix, form: sparse.csr_matrix) -> sparse.csr_matrix:
+def _projected(coordinates: sparse.csr_matrix, form: sparse.csr_matrix) -> sparse.csr_matrix:
+    """A form in other coordinates."""
     return (coordinates.conj().T @ form @ coordinates).tocsr()
 
 
