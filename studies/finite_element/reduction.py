@@ -64,9 +64,8 @@ class PreparedModel:
         """Lowest natural frequencies (n_modes,) of the glued structure, Hz, ascending. stiffness: name of the form."""
         coordinates = self.structure.coordinates(nodal_diameter)
         form, factor = self._factorise(coordinates, nodal_diameter, stiffness)
-        return _lowest_modes(form, _projected(coordinates.glued, self.forms["mass"]), factor, n_modes)[0] / (
-            2.0 * np.pi
-        )
+        mass = _projected(coordinates.glued, self.forms["mass"])
+        return _lowest_modes(form, mass, factor, n_modes)[0] / (2.0 * np.pi)
 
     def reduce(
         self, nodal_diameter: int, n_modes: int, vectors: FloatArray
