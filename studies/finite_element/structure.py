@@ -194,9 +194,10 @@ def _check_followers(
             raise SceneError("model", found, remedy)
     if cut is None:
         return
-    turn, none = cut.axis.pitch(), np.zeros((3, 3))
-    for one, other in zip(cut.left.tolist(), cut.right.tolist(), strict=True):
-        along, image = (constraints.oblique.get(node, none) for node in (one, other))
+    turn, none, oblique = cut.axis.pitch(), np.zeros((3, 3)), constraints.oblique
+    slanted = np.isin(cut.left, list(oblique)) | np.isin(cut.right, list(oblique))
+    for one, other in zip(cut.left[slanted].tolist(), cut.right[slanted].tolist(), strict=True):
+        along, image = (oblique.get(node, none) for node in (one, other))
         if np.abs(turn @ along @ turn.T - image).max() > _ROUND_OFF:
             found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
             raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
