@@ -13,15 +13,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from solver.outcome import SENSITIVE_ERROR, Outcome
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
-from studyrunner.result.view import NO_VOLUME, WELL_ENOUGH, Point, Result
+from studyrunner.result.view import NO_VOLUME, Point, Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_cycles, show_number, show_percent
 
 _NO_MOTION = 1e-12  # m, round-off: less than the size of an atom
-_LEAST = 1e-4  # relative error that is shown, of any smaller one
+LEAST_ERROR = 1e-4
+"""Relative error that is shown, of any smaller one."""
+
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
 
@@ -55,7 +58,7 @@ def _known(value: float, error: float, units: str) -> str:
     text = _show(value, units)
     if math.isnan(error):
         return f"{text} (error not known)"
-    return f"{text} ± {show_percent(max(error / value, _LEAST))}" if value > 0.0 else text
+    return f"{text} ± {show_percent(max(error / value, LEAST_ERROR))}" if value > 0.0 else text
 
 
 # --- wear and vibration ---
@@ -175,7 +178,7 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     of = int(np.argmax(amplitude[0]))
     both = np.where(amplitude[:, of] > _NO_MOTION, amplitude[:, of], 0.0)
     wrong = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
-    both = np.where((wrong > WELL_ENOUGH) & (both > 0.0), np.nan, both)
+    both = np.where((wrong > SENSITIVE_ERROR) & (both > 0.0), np.nan, both)
     errors, name = wrong * both, result.responses[of]
     new, worn = (_known(value, error, "m") for value, error in zip(both.tolist(), errors.tolist(), strict=True))
     values: dict[str, Any] = {"response": name, "amplitude": both.tolist(), "error": errors.tolist()}
@@ -248,9 +251,9 @@ def shortest_life(result: Result) -> Finding | None:
     if not isinstance(until, dict) or not result.has("cycles_to_target"):
         return None
     (quantity, target), *_ = until.items()
-    found = result.computed & ~result.ended("sensitive")
+    found = result.computed & ~result.ended(Outcome.SENSITIVE)
     lives, errors = (result.dataset[name].values for name in ("cycles_to_target", "cycles_to_target_error"))
-    unknown = found & (errors > WELL_ENOUGH * lives)
+    unknown = found & (errors > SENSITIVE_ERROR * lives)
     n_beyond, n_unsure = int(np.count_nonzero(found & np.isnan(lives))), int(np.count_nonzero(unknown))
     lives = np.where(found & ~unknown, lives, np.nan)
     reaches = (

@@ -13,11 +13,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
+from solver.outcome import Outcome
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn, Table, as_sentences
 from studyrunner.report.panels import COLOURS, FloatArray
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
-from studyrunner.result.view import CONVERGED, NO_VOLUME, Result
+from studyrunner.result.opening import describe_outcome
+from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, measure_of
 from studyrunner.system.progress import count
@@ -244,13 +246,13 @@ def draw_deciding_inputs(result: Result) -> Drawn:
 def draw_outcomes(result: Result) -> Drawn:
     """One cell a point: the course across, a row for each other combination; nothing where all points are alike."""
     course = find_course(result)
-    if course is None or (result.dataset["outcome"].values == CONVERGED).all():
+    if course is None or (result.dataset["outcome"].values == Outcome.CONVERGED).all():
         return None
     choice = choose(result, [course.axis], _MOST_ROWS)
     field = np.array([course.read(result, "outcome", point) for point in choice.points])
     present = np.unique(field).astype(int).tolist()
     others = itertools.cycle(_OTHERS)
-    cells = {number: _CONVERGED_COLOUR if number == CONVERGED else next(others) for number in present}
+    cells = {number: _CONVERGED_COLOUR if number == Outcome.CONVERGED else next(others) for number in present}
     labels = [textwrap.fill(label, _LABEL_WIDTH) if plot.is_narrow() else label for label in choice.labels]
     figure, panel = plot.new_panel(1.4 + 0.32 * len(field) + 0.15 * sum(label.count("\n") for label in labels))
     norm = BoundaryNorm([*(np.array(present) - 0.5), present[-1] + 0.5], len(present))
@@ -264,9 +266,9 @@ def draw_outcomes(result: Result) -> Drawn:
     panel.set_yticks(np.arange(len(labels)), labels)
     panel.tick_params(length=0)
     panel.spines[:].set_visible(False)
-    words = {number: result.endings[number].word.replace("_", " ") for number in present}
+    words = {number: describe_outcome(number)[0].replace("_", " ") for number in present}
     plot.add_legend(figure, [Patch(facecolor=cells[number], label=words[number]) for number in present])
-    meaning = (f"{words[number].capitalize()}: {result.endings[number].sentence}" for number in present if number)
+    meaning = (f"{words[number].capitalize()}: {describe_outcome(number)[1]}" for number in present if number)
     return figure, as_sentences(*meaning), choice.sentence
 
 

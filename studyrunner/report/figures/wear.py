@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
+from solver.outcome import Outcome
 from studyrunner.report import panels as plot
 from studyrunner.report.drawing import Drawn, Table
 from studyrunner.report.panels import FloatArray
@@ -117,7 +118,7 @@ def _with_error(result: Result, point: Point) -> str:
     place = result.place(point)
     if not result.computed[place] or not 0.0 < result.errors[place] < np.inf:
         return ""
-    remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
+    remark = ", sensitive" if result.ended(Outcome.SENSITIVE)[place] else ", above rtol" if result.above[place] else ""
     return f" ± {result.show_error(point)}{remark}"
 
 
@@ -162,7 +163,7 @@ def draw_final(result: Result) -> Drawn:
 
 def _mark_care(result: Result, panel: Axes, course: Course, choice: Choice, fields: FloatArray) -> None:
     """Marks at points to be taken with care. fields (n_lines, n): their worn volumes, as shown."""
-    sensitive, early = result.ended("sensitive"), result.has_values & ~result.computed
+    sensitive, early = result.ended(Outcome.SENSITIVE), result.has_values & ~result.computed
     kinds = {"above rtol": ("s", result.above & ~sensitive), "sensitive": ("D", sensitive), "ended early": ("^", early)}
     for label, (marker, where) in kinds.items():
         marked = np.array([course.along(result, where, point) for point in choice.points]) & np.isfinite(fields)

@@ -26,6 +26,7 @@ from studyrunner.report.drawing import Drawing, Item, Missing
 from studyrunner.report.figures.response import find_loops
 from studyrunner.report.root import body_colours, find_views, read_root
 from studyrunner.report.selection import course_axis
+from studyrunner.result.opening import describe_outcome
 from studyrunner.result.pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import DRAWN
@@ -87,7 +88,7 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
     if data is not None:
         data["root"] = build_root_numbers(result, notes)
     return environment.get_template("page.html").render(
-        title=result.title,
+        title=result.dataset.attrs.get("title") or show_text(result.path.stem),
         file=show_text(result.path.name),
         css=own.joinpath("page.css").read_text("utf-8"),
         answer=summarise(result).rows,
@@ -175,6 +176,7 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
     used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])
     if not result.has_modes:
         shown["cycle"] = int(np.abs(kept - last).argmin())
+    outcomes = np.unique(result.dataset["outcome"].values).tolist()
     messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
     return {
         "dims": [_dimension(result, name, arrays) for name in used],
@@ -183,7 +185,7 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
         "variables": [_encode(array, arrays) for array in arrays.values()],
         "at": {name: shown.get(name, 0) for name in used},
         "start": _start(result, arrays),
-        "sentences": {str(number): ending.sentence for number, ending in result.endings.items()},
+        "sentences": {str(number): describe_outcome(number)[1] for number in outcomes},
         "messages": {str(place): text for place, text in enumerate(messages) if text and place < _MOST_MESSAGES},
     }
 
@@ -232,7 +234,7 @@ def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str
     if name in _PERCENT and name.endswith(("_error", "_estimate")):
         scale = Scale(100.0, "%")
     error = _ERRORS.get(name, f"{name}_error")
-    flags = attributes.get("flag_values", ()), str(attributes.get("flag_meanings", "")).split()
+    outcomes = np.unique(array.values).tolist() if name == "outcome" else []
     return {
         "name": name,
         "label": str(attributes.get("long_name", name)),
@@ -242,7 +244,7 @@ def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str
         "data": encode_floats(values),
         "error": error if error in arrays else None,
         "relative": error in arrays and str(arrays[error].attrs.get("units")) != str(attributes.get("units")),
-        "words": {str(int(value)): word.replace("_", " ") for value, word in zip(*flags, strict=False)},
+        "words": {str(number): describe_outcome(number)[0].replace("_", " ") for number in outcomes},
     }
 
 

@@ -14,7 +14,7 @@ from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Missing, Table
 from studyrunner.report.page.page import write_page
 from studyrunner.result.view import open_for_report
-from studyrunner.summary.certainty import certainty_of
+from studyrunner.summary.answer import certainty_of
 from studyrunner.units import scale_for
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure
