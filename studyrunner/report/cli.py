@@ -7,17 +7,16 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from studyrunner.system.process import keep_talking, raise_ending, take_endings
+from studyrunner.system.process import keep_talking, take_endings
 from studyrunner.user_error import StorageError, UserError
 
 if TYPE_CHECKING:
-    from studyrunner.report.drawing import Item
     from studyrunner.result.view import Result
 
 WRITTEN, UNEXPECTED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # exit statuses
@@ -107,7 +106,7 @@ def _report(options: argparse.Namespace) -> int:
     # Loaded late: help and mistakes on the command line do not wait for the libraries that draw.
     began = time.monotonic()
     from studyrunner.report.contents import draw_report
-    from studyrunner.report.page.page import write_page
+    from studyrunner.report.page import write_page
     from studyrunner.report.vtu import SERIES, find_writer
     from studyrunner.result.opening import reading_errors
     from studyrunner.result.pairs import read_profile
@@ -119,22 +118,19 @@ def _report(options: argparse.Namespace) -> int:
     with result.dataset, reading_errors(str(options.result)):
         write_series = find_writer(result) if options.vtu else None
         folder = options.folder or Path(f"{options.result.stem}-report")
-        _make_folder(folder)
+        with _writing_errors(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            trial = folder / f".index.html.{os.getpid()}.partial"
+            trial.touch()
+            trial.unlink()
         result, page = _compute(result, folder, options), folder / "index.html"
         with _writing_errors(folder):
-            shown = write_page(result, _until_ended(draw_report(result)), page)
+            shown = write_page(result, draw_report(result), page)
             n_files = write_series(folder) if write_series else 0
     print(f"{page}: {shown}, {format_seconds(time.monotonic() - began)}; open it in a browser")
     if options.vtu:
         print(f"{folder / SERIES}: time series of {count(n_files, 'VTU file')}; open it in ParaView")
     return WRITTEN
-
-
-def _until_ended(items: Iterable[Item]) -> Iterator[Item]:
-    """The items, until the process is ended from outside."""
-    for item in items:
-        raise_ending()
-        yield item
 
 
 def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Result:
@@ -151,15 +147,6 @@ def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Resul
             # a report of what there is, where the scene is gone or the file has no depths
             why = str(error)
     return replace(result, recomputed=recomputed, no_worn_response=why)
-
-
-def _make_folder(folder: Path) -> None:
-    """The folder, after a try whether files can be written into it. Raises UserError."""
-    with _writing_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        trial = folder / f".index.html.{os.getpid()}.partial"
-        trial.touch()
-        trial.unlink()
 
 
 @contextmanager

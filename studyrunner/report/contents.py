@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, as_sentences, style
+from studyrunner.report import drawing as plot
+from studyrunner.report.drawing import Drawing, Drawn, Item, Missing, Table, as_sentences
 from studyrunner.report.figures import pairs, points, precision, response, root, wear
-from studyrunner.report.panels import add_legend
 from studyrunner.report.selection import course_axis
 from studyrunner.result.pairs import OF_PAIRS, of_shown_scene
 from studyrunner.result.view import Result
@@ -78,7 +78,7 @@ class Entry:
         title = self.title.format(slow=result.counted, over=axis.replace("_", " ")).removesuffix(" (table)")
         shown = of_shown_scene(result, self.scene) if self.scene else result
         needs = (*self.needs, *(self.of if isinstance(self.of, dict) else ()))
-        drawn = result.lacks(*needs) or self._drawn(shown, WIDTH)
+        drawn = result.lacks(*needs) or self._drawn(shown, plot.WIDTH)
         if drawn is None:
             return None
         if isinstance(drawn, str):
@@ -90,14 +90,14 @@ class Entry:
             return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, how))
         figure, *notes = drawn
         caption = as_sentences(*notes, how)
-        return Drawing(self.name, title, caption, figure, lambda: cast("Any", self._drawn(shown, COLUMN_WIDTH))[0])
+        return Drawing(self.name, title, caption, figure, lambda: cast("Any", self._drawn(shown, plot.COLUMN_WIDTH))[0])
 
     def _drawn(self, result: Result, width: float) -> Drawn:
         # the style is that of the whole process: the caller does not run with it
-        with style(width):
+        with plot.style(width):
             drawn = self.draw(result) if self.of is None else self.draw(result, self.of)
             if isinstance(drawn, tuple) and not drawn[0].legends:
-                add_legend(drawn[0])
+                plot.add_legend(drawn[0])
         return drawn
 
 
@@ -150,7 +150,6 @@ FIGURES = (
     ),
     Entry("trends", "Trends along the axes of the study", points.draw_trends),
     Entry("worn_root", "The worn root", root.draw_root, **_ONE),
-    Entry("whole_disk", "The whole disk", root.draw_disk, scene=OF_PAIRS),
     Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, **_ONE),
     Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, **_ONE),
     Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, needs=("mean_pressure",), **_LOOPS),

@@ -256,7 +256,7 @@ def rgb(names: tuple[str, ...], which: Places) -> Floats:
     return np.array([to_rgb(colour) for colour in body_colours(names)])[which]
 
 
-def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View, *, lines: float = 0.2) -> None:
+def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View) -> None:
     """Faces (n, 4) with colours (n, 3) as seen in a view, in mm; inner sides, where a mesh is cut, are grey."""
     order = np.argsort(nodes[faces].mean(axis=1) @ view.to_eye, kind="stable")
     normals = face_normals(nodes, faces)
@@ -265,10 +265,8 @@ def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view
     painted = PolyCollection(
         list(view.seen(nodes)[faces[order]]),
         facecolors=lit[order],
-        edgecolors="0.25" if lines else "none",
-        linewidths=lines,
-        # smooth edges of neighbouring faces would let what is behind them shine through
-        antialiaseds=lines > 0.0,
+        edgecolors="0.25",
+        linewidths=0.2,
         rasterized=True,
     )
     panel.add_collection(painted)

@@ -33,7 +33,7 @@ _MIRRORED = ("cylinder_on_flat", "sphere_on_flat")
 """Bundled scenes with pairs of one half, x > 0, or one quarter, x > 0 and y > 0, of the contact."""
 
 _UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
-_HEADER = re.compile(r"\s*(x|depth)\s*[_(\[ ]\s*(m|mm|um|µm)\s*[)\]]?\s*", re.IGNORECASE)
+_COLUMN = re.compile(r"(x|depth)_?(m|mm|um|µm)", re.IGNORECASE)  # as `genfromtxt` writes the names of columns
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def contact_pairs(result: Result, point: Point) -> Pairs:
     """Where the pairs of a point are."""
 
     def read(name: str, missing: object) -> NDArray[Any]:
-        found = result.at(name, point).values if result.has(name) else missing
-        return np.broadcast_to(np.asarray(found), (result.dataset.sizes["contact"],))
+        values = result.at(name, point).values if result.has(name) else missing
+        return np.broadcast_to(np.asarray(values), (result.dataset.sizes["contact"],))
 
     position = np.stack([read(f"contact_{axis}", np.nan) for axis in "xyz"], axis=1).astype(float)
     surface = read("contact_surface", "contact").astype(np.str_)
@@ -93,8 +93,8 @@ def contact_pairs(result: Result, point: Point) -> Pairs:
 
 def axes_of_scenes(result: Result, names: Collection[str] = OF_PAIRS) -> tuple[str, ...]:
     """Axes along which variables of the scene differ; none where the file has one scene."""
-    found = {axis for name in names if result.has(name) for axis in result.dataset[name].dims}
-    return tuple(axis for axis in result.axes if axis in found)
+    differ = {axis for name in names if result.has(name) for axis in result.dataset[name].dims}
+    return tuple(axis for axis in result.axes if axis in differ)
 
 
 def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
@@ -127,16 +127,16 @@ def depths(result: Result, point: Point) -> NDArray[np.float64]:
     """Wear depth (n_cycles, n_contact), m, of one point; NaN at the counts of which the file holds none."""
     if result.has("wear_depth"):
         return np.asarray(result.at("wear_depth", point).values, dtype=float)
-    found = np.full((len(result.cycles), result.dataset.sizes["contact"]), np.nan)
-    found[result.last_reached(point)] = last_depth(result, point)
-    return found
+    depth = np.full((len(result.cycles), result.dataset.sizes["contact"]), np.nan)
+    depth[result.last_reached(point)] = result.at("wear_depth_last", point).values
+    return depth
 
 
 def last_depth(result: Result, point: Point) -> NDArray[np.float64]:
-    """Wear depth (n_contact,), m, of one point at the last count that it has reached."""
-    if result.has("wear_depth"):
-        return np.asarray(result.at("wear_depth", point, result.last_reached(point)).values, dtype=float)
-    return np.asarray(result.at("wear_depth_last", point).values, dtype=float)
+    """Wear depth (n_contact,), m, of one point at the last count that it has reached; 0 where the file has none."""
+    if not has_depths(result):
+        return np.zeros(result.dataset.sizes["contact"])
+    return np.asarray(depths(result, point)[result.last_reached(point)])
 
 
 # --- the grid in which the pairs of a flank lie ---
@@ -155,7 +155,7 @@ def find_grid(position: NDArray[np.float64]) -> Grid:
     if spacing <= 1e-9 * np.ptp(position, axis=0).max():
         raise ValueError("two of its contact pairs are in one place.")
     away = position - position[0]
-    found: list[tuple[float, float, int, NDArray[np.float64], NDArray[np.intp]]] = []
+    grids: list[tuple[float, float, int, NDArray[np.float64], NDArray[np.intp]]] = []
     # A line of the grid through the first point passes through others. Far ones give its direction best and come first.
     tried = np.zeros(len(away), dtype=np.bool_)
     for other in np.argsort(-np.linalg.norm(away, axis=1), kind="stable")[:-1]:
@@ -167,10 +167,10 @@ def find_grid(position: NDArray[np.float64]) -> Grid:
         lines = _parallel_lines(position, direction, _ALIGNED * spacing)
         if lines is not None:
             length = np.ptp(position[lines[0]] @ direction) / spacing
-            found.append((round(float(length), 1), round(abs(float(direction[2])), 6), -len(found), direction, lines))
-    if not found:
+            grids.append((round(float(length), 1), round(abs(float(direction[2])), 6), -len(grids), direction, lines))
+    if not grids:
         raise ValueError("its contact pairs do not lie on a grid.")
-    *_, direction, lines = max(found, key=lambda each: each[:3])
+    *_, direction, lines = max(grids, key=lambda each: each[:3])
     decimals = 6 - math.floor(math.log10(spacing))  # two flanks of one shape get the same coordinates
     centre = position[lines].mean(axis=1)
     centre -= np.outer(centre @ direction, direction)
@@ -228,23 +228,20 @@ def find_scar(result: Result) -> Scar | None:
 def read_profile(path: Path) -> Profile:
     """The profile in a CSV file: a header such as `x_mm,depth_um`, then a row for each position. Raises UserError."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines()
+        lines = [line for line in lines if line.strip(" ,")]
+        table: NDArray[Any] = np.genfromtxt(lines, delimiter=",", names=True, ndmin=1) if lines else np.zeros(0)
+    except (OSError, ValueError) as error:
         raise UserError(str(path), "the file", None, f"give a CSV file that can be read: {error}") from None
-    header, *rows = [line.replace('"', "").split(",") for line in lines if line.strip(" ,")] or [[""]]
-    matches = ((place, _HEADER.fullmatch(cell)) for place, cell in enumerate(header))
-    found = {match[1].lower(): (place, _UNITS[match[2].lower()]) for place, match in matches if match}
-    if set(found) != {"x", "depth"}:
+    columns = table.dtype.names or ()
+    units = {
+        match[1].lower(): (match[0], _UNITS[match[2].lower()]) for match in map(_COLUMN.fullmatch, columns) if match
+    }
+    if set(units) != {"x", "depth"}:
         remedy = "give a first line that names both columns with their units, m, mm or um, as x_mm,depth_um"
-        raise UserError(str(path), "line 1", Verbatim(f'"{",".join(header)[:60]}"'), remedy)
-    values = []
-    for number, row in enumerate(rows, start=2):
-        try:
-            values.append([float(row[place]) * factor for place, factor in (found["x"], found["depth"])])
-        except (ValueError, IndexError):
-            raise UserError(str(path), f"row {number}", ",".join(row)[:60], "give a number in both columns") from None
-    array = np.array(values, dtype=float).reshape(-1, 2)
-    if not len(array) or not np.isfinite(array).all():
-        raise UserError(str(path), "the file", None, "give at least one row, and finite numbers")
-    array = array[np.argsort(array[:, 0], kind="stable")]
-    return Profile(path.name, array[:, 0], array[:, 1])
+        raise UserError(str(path), "line 1", Verbatim(f'"{",".join(columns)[:60]}"'), remedy)
+    x, depth = (table[name] * factor for name, factor in (units["x"], units["depth"]))
+    if not x.size or not np.isfinite([x, depth]).all():
+        raise UserError(str(path), "the file", None, "give at least one row, and finite numbers in both columns")
+    order = np.argsort(x, kind="stable")
+    return Profile(path.name, x[order], depth[order])

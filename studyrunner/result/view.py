@@ -26,6 +26,12 @@ if TYPE_CHECKING:
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
 
+NO_MOTION = 1e-12
+"""Motion, m, below which it is round-off: less than the size of an atom."""
+
+OWN_STEPS = ("adaptive", "final")
+"""Schemes that choose their steps, without `step`."""
+
 _AT_ONCE = 2**21  # numbers that are read at once
 
 Mask = NDArray[np.bool_]

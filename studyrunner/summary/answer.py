@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.result.opening import as_history, describe_outcome
 from studyrunner.result.pairs import contact_pairs
-from studyrunner.result.view import Result
+from studyrunner.result.view import OWN_STEPS, Result
 from studyrunner.summary.findings import (
     LEAST_ERROR,
     Finding,
@@ -36,7 +36,6 @@ SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
 
 _MOST_FAILURES, _MOST_MODES = 2, 4
-_OWN_STEPS = ("adaptive", "final")  # schemes without `step`
 _WIDTH, _LONGEST = 12, 240
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
@@ -281,7 +280,7 @@ def _advise_error(result: Result, place: tuple[int, ...], error: float) -> str:
     scheme, rtol = "adaptive", float(result.rtol[place])
     if "scheme" in result.axes:
         scheme = str(result.dataset["scheme"].values[place[result.axes.index("scheme")]])
-    if scheme not in _OWN_STEPS:
+    if scheme not in OWN_STEPS:
         by_depth = scheme == "explicit" and "largest_depth" in result.study.get("slow_time", {})
         return f'scheme = "adaptive" or a smaller {"slow_time.largest_depth" if by_depth else "step"}'
     if error >= _FAR * rtol:

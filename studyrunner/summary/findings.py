@@ -15,13 +15,12 @@ import xarray as xr
 
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
-from studyrunner.result.view import NO_VOLUME, Point, Result
+from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_cycles, show_number, show_percent
 
-_NO_MOTION = 1e-12  # m, round-off: less than the size of an atom
 LEAST_ERROR = 1e-4
 """Relative error that is shown, of any smaller one."""
 
@@ -161,7 +160,7 @@ def _nothing(result: Result, resonance: str) -> Finding:
     if result.has("slip_range"):
         largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=-1))
         slip = float(largest[result.best_known].max())
-        slip = slip if slip >= _NO_MOTION else 0.0
+        slip = slip if slip >= NO_MOTION else 0.0
         why = f": pairs slip by up to {_show(slip, 'm')} without wear" if slip else ": all pairs stick"
     n_points, n_known = result.usable.size, int(np.count_nonzero(result.usable))
     where = f"at all {n_points} points" if n_points > 1 else f"at {where_is(result, result.shown)}"
@@ -176,7 +175,7 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     ends = [0, result.last_reached(point)]
     amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
     of = int(np.argmax(amplitude[0]))
-    both = np.where(amplitude[:, of] > _NO_MOTION, amplitude[:, of], 0.0)
+    both = np.where(amplitude[:, of] > NO_MOTION, amplitude[:, of], 0.0)
     wrong = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
     both = np.where((wrong > SENSITIVE_ERROR) & (both > 0.0), np.nan, both)
     errors, name = wrong * both, result.responses[of]

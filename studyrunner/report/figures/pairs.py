@@ -1,51 +1,215 @@
-"""Wear depth and pressure of the pairs: by number, on their surfaces, over a scar (Figs. 3, 5, 10, 11, 12)."""
+"""Contact pairs on their surfaces: numbers, wear depth and pressure, also over a scar (Figs. 3, 5, 10, 11, 12)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
-from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn
-from studyrunner.report.figures.flanks import (
-    Flank,
-    draw_field,
-    draw_fields,
-    find_flanks,
-    largest_pair,
-    map_height,
-    most_of_flanks,
-)
-from studyrunner.report.panels import COLOURS, FloatArray
+from studyrunner.report import drawing as plot
+from studyrunner.report.drawing import COLOURS, Drawn, FloatArray
 from studyrunner.report.selection import choose, course_axis, labelled
-from studyrunner.result.pairs import NO_DEPTH, Scar, depths, find_scar, has_depths, last_depth
+from studyrunner.result import pairs as contact
 from studyrunner.result.view import Result
+from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for
 
+JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
+"""The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
+
+_ORIGIN = "Axial 0 is the leading edge, up the flank 0 the inner end"
+_LONE, _SLIM = 1e-3, 0.2  # m; width of a single row of pairs, or this part of its length where that is less
+_STRAIGHT = 0.999
+_MOST_FLANKS, _SLENDER, _LOW, _LABEL_WIDTH = 3, 0.12, 0.4, 14
 _MOST_SERIES, _MOST_PROFILES = 4, 5
-_MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _SLENDER, _LONGEST_NAME = 150, 4, 120, 0.12, 20
+_MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _LONGEST_NAME = 150, 4, 120, 20
+
+
+# --- where the pairs of each surface lie ---
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A grid of pairs. x (n_x,), y (n_y,): m, rising from 0; y towards the line farther from the origin. pair (n_y,
+    n_x): index along the pairs of the flank. x_edges (n_x + 1,), y_edges (n_y + 1,): of the cells, m.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    pair: NDArray[np.intp]
+    x_edges: FloatArray
+    y_edges: FloatArray
+
+
+@dataclass(frozen=True)
+class Flank:
+    """One contact surface. pairs (n,): indices along `contact`. area (n,): m2.
+
+    cells: of the grid on which they lie; None where they lie on none. seen (n, 2): positions in the plane of the
+    surface, m; None where the file has no positions. directions: what the two directions are called.
+    """
+
+    surface: str
+    pairs: NDArray[np.intp]
+    area: FloatArray
+    cells: Cells | None = None
+    seen: FloatArray | None = None
+    directions: tuple[str, str] = ("", "")
+
+    @property
+    def height_over_width(self) -> float:
+        """Of the surface as it is drawn."""
+        return 0.75 if self.cells is None else float(np.ptp(self.cells.y_edges) / np.ptp(self.cells.x_edges))
+
+
+def find_flanks(result: Result) -> tuple[Flank, ...]:
+    """The contact surfaces of a file, in order of first appearance; a single one where the file has no labels."""
+    pairs = contact.contact_pairs(result, result.shown)
+    area = np.where(np.isfinite(pairs.area), pairs.area, 1.0)
+    words, flanks = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model"))), []
+    for surface in dict.fromkeys(pairs.surface.tolist()):
+        members = np.flatnonzero(pairs.surface == surface)
+        flank, position = Flank(surface or "contact", members, area[members]), pairs.position[members]
+        if np.isfinite(position).all():
+            centred, cells = position - position.mean(axis=0), None
+            _, _, plane = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
+            largest = np.argmax(np.abs(np.round(plane, 6)), axis=1)[:, None]
+            plane = plane * np.sign(np.take_along_axis(plane, largest, axis=1))
+            seen = centred @ plane[:2].T
+            with contextlib.suppress(ValueError):
+                cells = _build_cells(contact.find_grid(position), flank.area) if len(position) > 1 else None
+            if cells is not None:
+                first, across = position[cells.pair[0]], position[cells.pair[:, 0]]
+                plane = np.stack([first[-1] - first[0], across[-1] - across[0]])
+            named = words if words and (cells is None or len(cells.x) > 1) else (_name(plane[0]), _name(plane[1]))
+            flank = replace(flank, cells=cells, seen=seen, directions=named)
+        flanks.append(flank)
+    return tuple(flanks)
+
+
+def _name(direction: FloatArray) -> str:
+    """An axis of the mesh, or the components of a direction."""
+    unit = direction / (float(np.linalg.norm(direction)) or 1.0)
+    axis = int(np.argmax(np.abs(unit)))
+    along = f"along ({', '.join(f'{each + 0.0:.2g}' for each in unit)})" if unit.any() else "across"
+    return "xyz"[axis] if unit[axis] > _STRAIGHT else along
+
+
+def _build_cells(grid: contact.Grid, area: FloatArray) -> Cells:
+    """Cells about halfway between the pairs, as wide as the areas of their lines say."""
+    x, y, pair = grid.along, grid.across[-1] - grid.across[::-1], grid.pair[::-1]
+    total, lone = float(area.sum()), min(_LONE, _SLIM * float(max(x[-1], y[-1])))
+    x_share, y_share = (np.r_[0.0, np.cumsum(area[pair].sum(axis=axis))] / total for axis in (0, 1))
+    x_length, y_length = _length(x, x_share), _length(y, y_share)
+    if len(x) == len(y) == 2:
+        x_length, y_length = np.sqrt(total / (x[1] * y[1])) * np.array([x[1], y[1]])
+    elif 2 in (len(x), len(y)):
+        x_length, y_length = np.fmin([x_length, y_length], [total / y_length, total / x_length])
+    return Cells(x, y, pair, _edges(x, x_share, x_length, lone), _edges(y, y_share, y_length, lone))
+
+
+def _length(at: FloatArray, share: FloatArray) -> float:
+    """Length, m, of lines at rising positions (n,) whose cells have shares (n + 1,) of the area up to them; or NaN."""
+    return float(np.polyfit(share[1:-1], 0.5 * (at[1:] + at[:-1]), 1)[0]) if len(at) > 2 else np.nan
+
+
+def _edges(at: FloatArray, share: FloatArray, length: float, lone: float) -> FloatArray:
+    """Edges (n + 1,) of cells. lone: width of a single one, m."""
+    if len(at) == 1:
+        return lone * np.array([-0.5, 0.5])
+    if len(at) == 2:
+        # at most as if a third line stood on each side
+        length = float(np.clip(np.nan_to_num(length, nan=np.inf), at[1], 2.0 * at[1]))
+    start = float(np.mean(0.5 * (at[1:] + at[:-1]) - length * share[1:-1]))
+    return np.asarray(start + length * share)
+
+
+# --- maps ---
+
+
+def most_of_flanks(result: Result, *values: FloatArray) -> tuple[tuple[Flank, ...], str]:
+    """Surfaces with the largest values (n_contact,), as many as fit, none without positions; how they are drawn."""
+    flanks = find_flanks(result)
+    if any(flank.seen is None for flank in flanks):
+        return (), ""
+    largest = [max(float(np.nanmax(value[flank.pairs])) for value in values) for flank in flanks]
+    drawn = tuple(flanks[number] for number in sorted(np.argsort(largest)[::-1][:_MOST_FLANKS]))
+    on_grid = all(flank.cells is not None for flank in drawn)
+    how = "One cell is one contact pair, as large as its area"
+    how = how if on_grid else "The pairs lie on no grid: one dot is one contact pair"
+    others = len(flanks) - len(drawn)
+    return drawn, f"{how}. {count(others, 'more surface')} with lower values in the file" if others else how
+
+
+def largest_pair(result: Result, values: FloatArray, scale: Scale) -> str:
+    """The largest of values (n_contact,) in words, with its pair."""
+    return f"{scale.show(float(np.nanmax(values)))} at pair {result.dataset['contact'].values[np.nanargmax(values)]}"
+
+
+def map_height(flanks: Sequence[Flank]) -> float:
+    """Height of a row of maps of flanks side by side, inches."""
+    return 6.0 / len(flanks) * min(1.2, max(0.28, max(flank.height_over_width for flank in flanks)))
+
+
+def draw_fields(flanks: Sequence[Flank], fields: Mapping[str, FloatArray], scale: Scale, text: str) -> Figure:
+    """One row of maps a field (n_contact,), one column a flank, all in one colour scale."""
+    figure, panels = plot.new_panels(len(fields), len(flanks), len(fields) * (map_height(flanks) + 0.62))
+    largest = max(float(np.nanmax(values, initial=0.0)) for values in fields.values())
+    norm = Normalize(0.0, scale(largest).item() or 1.0)
+    for row, (label, values) in zip(panels, fields.items(), strict=True):
+        for panel, flank in zip(row, flanks, strict=True):
+            draw_field(panel, flank, scale(values[flank.pairs]), norm)
+            panel.set_title(f"{flank.surface}, {label}")
+    plot.label_outer(panels)
+    plot.add_colour_bar(figure, panels, norm, scale.label(text), fraction=0.05)
+    return figure
+
+
+def draw_field(panel: Axes, flank: Flank, values: NDArray[Any], norm: Normalize, **look: Any) -> None:
+    """One field (n,) of a flank: cells of its grid, or dots at its pairs."""
+    if flank.cells is not None:
+        cells = flank.cells
+        plot.add_map(panel, 1e3 * cells.x_edges, 1e3 * cells.y_edges, values[cells.pair], norm, **look)
+        # cells as they are in the flank, unless it is so slender that too little would be seen
+        panel.set_aspect("equal" if flank.height_over_width > (_LOW if plot.is_narrow() else _SLENDER) else "auto")
+    elif flank.seen is not None:
+        look = {"edgecolors": "0.3", "linewidths": 0.4, "s": 160 if look else 60, **look}
+        panel.grid(visible=False)
+        x, y = 1e3 * flank.seen.T
+        panel.scatter(x, y, c=values, norm=norm, label="pairs", **look)
+        panel.margins(0.12)
+        panel.set_aspect("equal", adjustable="datalim")
+    panel.set_xlabel(f"{flank.directions[0]} (mm)")
+    panel.set_ylabel(textwrap.fill(f"{flank.directions[1]} (mm)", _LABEL_WIDTH, break_on_hyphens=False))
+
+
+# --- depth and pressure ---
 
 
 def _worn_depth(result: Result) -> FloatArray | None:
     """Wear depths (n_contact,), m, of the shown point at its last count; None where nothing is worn."""
-    depth = last_depth(result, result.shown) if has_depths(result) else np.zeros(1)
-    return depth if len(result.cycles) > 1 and float(depth.max()) > NO_DEPTH else None
+    depth = contact.last_depth(result, result.shown)
+    return depth if len(result.cycles) > 1 and float(depth.max()) > contact.NO_DEPTH else None
 
 
 def draw_depths(result: Result) -> Drawn:
     """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
-    if not has_depths(result):
+    if not contact.has_depths(result):
         return result.lacks("wear_depth")
     if _worn_depth(result) is None or result.dataset.sizes["contact"] == 1:
         return None
     course, pairs = course_axis(result), result.dataset["contact"].values
     choice = choose(result, [course] if course else [], _MOST_SERIES)
-    series = {label: last_depth(result, point) for point, label in choice}
+    series = {label: contact.last_depth(result, point) for point, label in choice}
     series = {label: depth for label, depth in series.items() if not np.isnan(depth).all()}
     figure, panel = plot.new_panel(3.3)
     scale, apart = scale_for("m", *series.values()), 0.8 / len(series) if len(pairs) <= _MANY_PAIRS else 0.0
@@ -79,32 +243,32 @@ def _name_surfaces(panel: Axes, result: Result) -> None:
 
 def draw_pressure(result: Result) -> Drawn:
     """Mean pressure on each flank at the first and the last cycle count (Figs. 10, 11)."""
-    shown, scar = result.shown, find_scar(result)
+    shown, scar = result.shown, contact.find_scar(result)
     if scar is None and result.dataset.sizes["contact"] == 1:
         return None
-    kept = sorted({0, result.last_reached(shown)})
-    fields = {result.cycle_label(cycle): result.at("mean_pressure", shown, cycle).values for cycle in kept}
+    ends = sorted({0, result.last_reached(shown)})
+    fields = {result.cycle_label(cycle): result.at("mean_pressure", shown, cycle).values for cycle in ends}
     scale = scale_for("Pa", *fields.values())
-    flanks, said = most_of_flanks(result, *fields.values())
+    flanks, how = most_of_flanks(result, *fields.values())
     if scar is not None:
-        figure, panel, said = _draw_scar(scar, fields, scale, "mean pressure")
+        figure, panel, how = _draw_scar(scar, fields, scale, "mean pressure")
         plot.set_from_zero(panel)
     elif flanks:
         figure = draw_fields(flanks, fields, scale, "mean pressure")
     else:
         return "The file has no positions of the contact pairs."
     largest = [labelled(largest_pair(result, values, scale), label) for label, values in fields.items()]
-    return figure, f"Mean over a period. Largest: {', '.join(largest)}", said
+    return figure, f"Mean over a period. Largest: {', '.join(largest)}", how
 
 
 def draw_profile(result: Result) -> Drawn:
     """Wear depth on each flank at the last cycle count: map, and lines along it (Fig. 12); or the scar."""
-    depth, scar = _worn_depth(result), find_scar(result)
+    depth, scar = _worn_depth(result), contact.find_scar(result)
     if depth is None:
         return None
     if scar is not None:
         return _draw_scar_depth(result, scar, depth)
-    flanks, said = most_of_flanks(result, depth)
+    flanks, how = most_of_flanks(result, depth)
     if not flanks:
         # without positions there is nothing that the wear depth per pair does not show
         return None
@@ -113,7 +277,7 @@ def draw_profile(result: Result) -> Drawn:
         figure = _draw_profiles(flanks, depth, scale)
     else:
         figure = draw_fields(flanks, {when: depth}, scale, "wear depth")
-    return figure, f"After {when}. Deepest: {largest_pair(result, depth, scale)}", said
+    return figure, f"After {when}. Deepest: {largest_pair(result, depth, scale)}", how
 
 
 def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -> Figure:
@@ -139,7 +303,7 @@ def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -
 
 
 def _draw_scar(
-    scar: Scar, fields: Mapping[str, FloatArray], scale: Scale, text: str, error: FloatArray | None = None
+    scar: contact.Scar, fields: Mapping[str, FloatArray], scale: Scale, text: str, error: FloatArray | None = None
 ) -> tuple[Figure, Axes, str]:
     """Fields (n_contact,) along x through the middle, the last with its errors; the panel, and a sentence."""
     (figure, panel), along, pairs = plot.new_panel(3.4), scale_for("m", scar.x), scar.pairs
@@ -151,20 +315,20 @@ def _draw_scar(
     return figure, panel, "The contact is symmetric: one part is computed, the whole is drawn, along x"
 
 
-def _draw_scar_depth(result: Result, scar: Scar, after: FloatArray) -> Drawn:
+def _draw_scar_depth(result: Result, scar: contact.Scar, after: FloatArray) -> Drawn:
     """Depth over x before and after wear, downwards as the surface sinks, with a measured one where there is one."""
     shown, measured, last = result.shown, result.measured, result.last_reached(result.shown)
     scale, known = scale_for("m", after, *([measured.depth] if measured else [])), result.has("wear_depth_error")
     error = result.at("wear_depth_error", shown, last).values if known else None
-    fields = {"before": np.nan_to_num(depths(result, shown)[0]), f"after {result.cycle_label(last)}": after}
-    figure, panel, said = _draw_scar(scar, fields, scale, "depth", error)
+    fields = {"before": np.nan_to_num(contact.depths(result, shown)[0]), f"after {result.cycle_label(last)}": after}
+    figure, panel, how = _draw_scar(scar, fields, scale, "depth", error)
     if measured is not None:
         # a measured profile may have piled-up edges above the surface
         at, depth = scale_for("m", scar.x)(measured.x), scale(measured.depth)
         panel.plot(at, depth, color=COLOURS[2], linewidth=1.2, label="measured")
     panel.invert_yaxis()
     deepest = f"After {result.cycle_label(last)}. Deepest: {scale.show(float(np.nanmax(after)))}"
-    return figure, deepest, said, f"Measured: {measured.name}" if measured else ""
+    return figure, deepest, how, f"Measured: {measured.name}" if measured else ""
 
 
 def draw_numbers(result: Result) -> Drawn:
@@ -187,4 +351,5 @@ def draw_numbers(result: Result) -> Drawn:
             panel.text(x, y, f"{name:.0f}", ha="center", va="center", fontsize=8, clip_on=False)
         panel.set_title(flank.surface)
     plot.label_outer(panels)
-    return figure, f"As along the dimension contact: {len(names)} pairs", flanks[0].origin
+    origin = _ORIGIN if flanks[0].directions in JOINT_WORDS.values() else ""
+    return figure, f"As along the dimension contact: {len(names)} pairs", origin

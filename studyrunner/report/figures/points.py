@@ -14,9 +14,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
 from solver.outcome import Outcome
-from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn, Table, as_sentences
-from studyrunner.report.panels import COLOURS, FloatArray
+from studyrunner.report import drawing as plot
+from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sentences
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
 from studyrunner.result.opening import describe_outcome
 from studyrunner.result.view import NO_VOLUME, Result
@@ -248,8 +247,8 @@ def draw_outcomes(result: Result) -> Drawn:
     course = find_course(result)
     if course is None or (result.dataset["outcome"].values == Outcome.CONVERGED).all():
         return None
-    choice = choose(result, [course.axis], _MOST_ROWS)
-    field = np.array([course.read(result, "outcome", point) for point in choice.points])
+    choice = course.choose(_MOST_ROWS)
+    field = course.read("outcome", *choice.points)
     present = np.unique(field).astype(int).tolist()
     others = itertools.cycle(_OTHERS)
     cells = {number: _CONVERGED_COLOUR if number == Outcome.CONVERGED else next(others) for number in present}

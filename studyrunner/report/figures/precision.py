@@ -13,9 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import Drawn
-from studyrunner.report.panels import FloatArray, add_legend, line_style, new_panels, set_log
-from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.report.drawing import Drawn, FloatArray, add_legend, line_style, new_panels, set_log
+from studyrunner.result.view import NO_VOLUME, OWN_STEPS, Result
 from studyrunner.units import show_number, show_percent
 
 KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
@@ -27,8 +26,8 @@ QUANTITIES = {"volume": "final worn volume", "response": "response at the end"}
 RESOLVED = 3.0
 """An error counts from so many times the uncertainty of the reference on."""
 
-_ROUND_OFF = 1e-12
-_AUTO, _OWN_STEPS, _EXPLICIT = "auto", ("adaptive", "final"), "explicit"
+_SMALLEST = 1e-12  # relative error that double precision shows
+_AUTO, _EXPLICIT = "auto", "explicit"
 _COMPARED = (
     *("computed", "run_time", "worn_volume", "response_amplitude", "exact_worn_volume", "exact_response_amplitude"),
     *("error_estimate", "response_error", "harmonics_used"),
@@ -75,7 +74,7 @@ class ComparedPoint:
 
     def is_clear(self, quantity: str) -> NDArray[np.bool_]:
         """Which errors (n_setting,) are clearly more than round-off and the uncertainty of the reference."""
-        least = max(RESOLVED * self.uncertainty[quantity], _ROUND_OFF)
+        least = max(RESOLVED * self.uncertainty[quantity], _SMALLEST)
         return np.asarray((self.errors[quantity] >= least) & np.isfinite(self.errors[quantity]))
 
     def front(self, quantity: str, scheme: str | None = None) -> list[int]:
@@ -162,13 +161,13 @@ def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:
     axes = ([read(key, value) for value in result.dataset[key].values] for key in keys)
     for place, given in enumerate(itertools.product(*axes)):
         setting = Setting(**dict(zip(keys, given, strict=True)))  # type: ignore[arg-type]
-        if setting.scheme in _OWN_STEPS or (setting.scheme == _EXPLICIT and by_depth):
+        if setting.scheme in OWN_STEPS or (setting.scheme == _EXPLICIT and by_depth):
             setting = setting._replace(step=None)
         if result.cycles[-1] == 0.0:
             # only unworn states: no scheme takes a step
             setting = setting._replace(scheme=None, step=None)
         automatic = [getattr(setting, key) or solver.get(key, _AUTO) for key in ("harmonics", "samples")]
-        if setting.scheme not in _OWN_STEPS and _AUTO not in automatic:
+        if setting.scheme not in OWN_STEPS and _AUTO not in automatic:
             setting = setting._replace(rtol=None)
         found.setdefault(setting, place)
     return found
@@ -214,7 +213,7 @@ def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, lines: Mapping
     """lines: look of each scheme. markers: of each setting."""
     errors, time, clear = point.errors[quantity], point.time, point.is_clear(quantity)
     least = RESOLVED * point.uncertainty[quantity]
-    bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > _ROUND_OFF) & np.isfinite(errors)])
+    bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > _SMALLEST) & np.isfinite(errors)])
     drawn, known = np.maximum(errors, bottom), np.isfinite(errors)
     for scheme, look in lines.items():
         rows = point.front(quantity, scheme)

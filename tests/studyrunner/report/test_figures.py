@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 from studies.scene import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing
-from studyrunner.report.figures.flanks import find_flanks
+from studyrunner.report.figures.pairs import find_flanks
 from studyrunner.result.view import Result
 from tests.studyrunner.report.cases import check_print, dovetail_file, draw_figure, numbers_of, values_of, with_mesh
 from tests.studyrunner.report.test_precision import finest_file

@@ -12,7 +12,7 @@ from studyrunner.report import contents
 from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Missing, Table
-from studyrunner.report.page.page import write_page
+from studyrunner.report.page import write_page
 from studyrunner.result.view import open_for_report
 from studyrunner.summary.answer import certainty_of
 from studyrunner.units import scale_for

@@ -95,7 +95,6 @@ def test_the_faces_near_the_contact_are_kept(tmp_path):
 
 def test_the_figures_of_the_dovetail(result, surface):
     worn, numbers = draw_figure(result, "worn_root"), draw_figure(result, "pair_numbers")
-    assert draw_figure(result, "whole_disk").figure.axes
     depth = result.at("wear_depth", result.shown, -1).values
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
     assert f"{surface.exaggeration(float(depth.max())):g} times" in worn.caption.replace("\u00a0", "")

@@ -10,8 +10,8 @@ import pytest
 
 from studies.scene import SurfaceMesh
 from studyrunner.report.contents import draw_report
-from studyrunner.report.figures.flanks import find_flanks
-from studyrunner.report.page.page import build_page_data, build_root_numbers
+from studyrunner.report.figures.pairs import find_flanks
+from studyrunner.report.page import build_page_data, build_root_numbers
 from studyrunner.report.root import read_root
 from studyrunner.report.vtu import find_writer
 from studyrunner.result.opening import check_dataset
@@ -129,7 +129,7 @@ def test_the_measured_profile_is_drawn_beside_it(tmp_path):
     ("text", "place"),
     [
         ("x,depth\n1,2\n", "line 1"),
-        ("x_mm,depth_um\n1,deep\n", "row 2"),
+        ("x_mm,depth_um\n1,deep\n", "finite"),
         ("x_mm,depth_um\n", "row"),
         ("x_mm,depth_um\n1,nan\n", "finite"),
     ],

@@ -31,6 +31,7 @@ from studyrunner.result.pairs import axes_of_scenes, of_shown_scene, pairs_of_sc
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.summary.answer import summarise
+from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_number, units_of
 from studyrunner.user_error import show_text
@@ -46,10 +47,12 @@ _MOST_VALUES = 12
 def write_page(result: Result, items: Iterable[Item], path: Path) -> str:
     """Write the page, and beside it the files of each drawing, into a folder that exists; what is there, in words.
 
-    An older page is replaced when the new one is complete. Raises OSError where something cannot be written.
+    An older page is replaced when the new one is complete. Raises OSError where something cannot be written, and
+    KeyboardInterrupt where the process is ended from outside.
     """
     counts, parts = Counter[str](), list[Any]()
     for item in items:
+        raise_ending()
         counts[type(item).__name__] += 1
         parts.append(_save(item, path.parent) if isinstance(item, Drawing) else item)
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
@@ -81,9 +84,9 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
     from plotly.offline import get_plotlyjs
 
     blocks: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
-    loader = PackageLoader("studyrunner.report.page", ".")
+    loader = PackageLoader("studyrunner.report", "browser")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
-    notes, own = list[str](), resources.files("studyrunner.report.page") / "browser"
+    notes, own = list[str](), resources.files("studyrunner.report") / "browser"
     data = build_page_data(result, DATA_LIMIT, notes)
     if data is not None:
         data["root"] = build_root_numbers(result, notes)
