@@ -107,7 +107,7 @@ def _report(options: argparse.Namespace) -> int:
     began = time.monotonic()
     from studyrunner.report.contents import draw_report
     from studyrunner.report.page import write_page
-    from studyrunner.report.vtu import SERIES, find_writer
+    from studyrunner.report.root import SERIES, find_writer
     from studyrunner.result.opening import reading_errors
     from studyrunner.result.pairs import read_profile
     from studyrunner.result.view import open_for_report

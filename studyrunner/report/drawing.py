@@ -160,17 +160,18 @@ def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
     """A legend below all panels of these handles, by default of each label, if there are two; the figure grows."""
     if handles is None:
         handles = [handle for panel in figure.axes for handle in panel.get_legend_handles_labels()[0]]
-    found = {str(handle.get_label()): handle for handle in reversed(handles)}
-    found = {label: found[label] for label in dict.fromkeys(str(handle.get_label()) for handle in handles)}
-    if len(found) < 2:
+    by_label = dict[str, Artist]()
+    for handle in handles:
+        by_label.setdefault(str(handle.get_label()), handle)
+    if len(by_label) < 2:
         return
     room = int(_CHARACTERS * figure.get_figwidth())
-    labels = [textwrap.fill(label, room - _MARK) for label in found]
+    labels = [textwrap.fill(label, room - _MARK) for label in by_label]
     longest = max(len(line) for text in labels for line in text.split("\n")) + _MARK
     n_rows = math.ceil(len(labels) / max(1, room // longest))
     n_lines = n_rows + sum(text.count("\n") for text in labels)
     figure.set_figheight(figure.get_figheight() + _LEGEND_ROW * n_lines)
-    figure.legend(list(found.values()), labels, loc="outside lower center", ncols=math.ceil(len(labels) / n_rows))
+    figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=math.ceil(len(labels) / n_rows))
 
 
 def set_from_zero(panel: Axes, largest: float | None = None) -> None:

@@ -86,14 +86,15 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
     blocks: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
     loader = PackageLoader("studyrunner.report", "browser")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
-    notes, own = list[str](), resources.files("studyrunner.report") / "browser"
-    data = build_page_data(result, DATA_LIMIT, notes)
+    notes, browser = list[str](), resources.files("studyrunner.report") / "browser"
+    data, scripts = build_page_data(result, DATA_LIMIT, notes), list[str]()
     if data is not None:
         data["root"] = build_root_numbers(result, notes)
+        scripts = [get_plotlyjs(), "\n".join(browser.joinpath(name).read_text("utf-8") for name in _SCRIPTS)]
     return environment.get_template("page.html").render(
         title=result.dataset.attrs.get("title") or show_text(result.path.stem),
         file=show_text(result.path.name),
-        css=own.joinpath("page.css").read_text("utf-8"),
+        css=browser.joinpath("page.css").read_text("utf-8"),
         answer=summarise(result).rows,
         facts=_facts(result),
         study=result.dataset.attrs.get("study"),
@@ -102,19 +103,13 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
         notes=notes,
         # nothing in it ends the script element that it stands in
         data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c") if data else "",
-        scripts=[get_plotlyjs(), "\n".join(own.joinpath(name).read_text("utf-8") for name in _SCRIPTS)] if data else [],
+        scripts=scripts,
     )
 
 
 def _facts(result: Result) -> list[tuple[str, str]]:
     """Names and values: points, axes, contact pairs, versions."""
-    ends = {
-        "computed to the end": result.computed,
-        "ended early with values up to there": result.has_values & ~result.computed,
-        "without a result": ~result.has_values,
-    }
-    ended = ", ".join(f"{np.count_nonzero(where)} {words}" for words, where in ends.items() if where.any())
-    facts = [("points", f"{result.computed.size}: {ended}")]
+    facts = [("points", f"{result.computed.size}, {np.count_nonzero(result.computed)} computed to the end")]
     for name in result.axes:
         axis = result.dataset[name]
         numbers, units = axis.dtype.kind in "fiu", units_of(axis)
@@ -195,8 +190,8 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
 
 def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
     """Numbers of the file that belong to points of the study, unread; loops of those pairs alone that have some."""
-    found = {**result.dataset.data_vars, **(result.blocks.data_vars if result.blocks is not None else {})}
-    for name, array in found.items():
+    blocks = {} if result.blocks is None else result.blocks.data_vars
+    for name, array in {**result.dataset.data_vars, **blocks}.items():
         if array.dtype.kind not in "iuf" or not set(result.axes) & set(array.dims) or not array.size:
             continue
         if "phase" in array.dims:
@@ -312,7 +307,7 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
     seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
     of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": surface.flank}
     pairs = pairs_of_scene(result, shown)[surface.pairs]
-    of_contact = {"nodes": surface.own, "pairs": pairs, "normals": surface.normals}
+    of_contact = {"nodes": surface.contact_nodes, "pairs": pairs, "normals": surface.normals}
     directions = [{"eye": view.to_eye, "up": view.up} for view in views]
     return {
         **{name: encode_floats(values) for name, values in (of_faces | {"seen": np.asarray(seen)}).items()},

@@ -82,17 +82,21 @@ def open_result(path: str | Path) -> xr.Dataset:
     opened = _open(path)[0]
     # without axes of one value, which would leave no room for the words where the dataset is printed
     result = opened.assign_coords({ENDED: outcome_words(opened["outcome"]).squeeze(drop=True)})
-    loops = [name for name in LOOPS if name in opened]
-    asked = study_tables(opened.attrs).get("outputs", {}).get("loops")
-    pairs = [pair for pair in opened["contact"].values.tolist() if isinstance(asked, list) and pair in asked]
-    if loops and pairs:
+    names, pairs = [name for name in LOOPS if name in opened], pairs_with_loops(opened)
+    if names and pairs:
         others = [name for name, array in result.coords.items() if "contact" in array.dims and name != "contact"]
-        own = result[loops].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
-        own["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are stored, see outputs.loops"
-        result = result.drop_vars(loops).assign(own.data_vars)
+        loops = result[names].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
+        loops["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are stored, see outputs.loops"
+        result = result.drop_vars(names).assign(loops.data_vars)
     result.encoding = opened.encoding
     result.set_close(opened.close)
     return result
+
+
+def pairs_with_loops(dataset: xr.Dataset) -> list[int]:
+    """Contact pairs of a file whose loops its study has asked for."""
+    listed = study_tables(dataset.attrs).get("outputs", {}).get("loops")
+    return [pair for pair in dataset["contact"].values.tolist() if isinstance(listed, list) and pair in listed]
 
 
 def open_known(path: str | Path) -> xr.Dataset:
@@ -132,9 +136,9 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
     """
     history, blocks = dataset, None
     if "response" in dataset.coords:
-        own = np.char.endswith(dataset["response"].values.astype(str), "]")
-        if own.any() and not own.all():
-            history = history.isel(response=np.flatnonzero(~own))
+        has_unit = np.char.endswith(dataset["response"].values.astype(str), "]")
+        if has_unit.any() and not has_unit.all():
+            history = history.isel(response=np.flatnonzero(~has_unit))
     if "block" in dataset.dims:
         renamed = history.rename({name: new for name, new in _LIKE_CYCLES.items() if name in history.variables})
         of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
@@ -295,10 +299,10 @@ def _check_values(dataset: xr.Dataset) -> None:
         _need(((quad >= 0) & (quad < n_nodes)).all(), "mesh_quad", "nodes that there are not")
 
 
-def _attributes(found: Mapping[str, Any]) -> dict[str, Any]:
+def _attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes without control characters, in one line but for texts of several."""
-    cleaned = {name: value if name == "flag_values" else _line(value) for name, value in found.items()}
-    return cleaned | {name: show_text(_decoded(found[name])) for name in _LONG if name in found}
+    cleaned = {name: value if name == "flag_values" else _line(value) for name, value in attributes.items()}
+    return cleaned | {name: show_text(_decoded(attributes[name])) for name in _LONG if name in attributes}
 
 
 @functools.lru_cache(maxsize=4096)  # most messages are the same

@@ -44,10 +44,9 @@ class Result:
     """A result file, each point one combination of the axes. Arrays of points have the shape of the axes.
 
     dataset: read lazily; a variable that was read as a whole stays in memory. fixed: axes of which this holds one value
-    of several. blocks: of missions what belongs to single blocks; in `dataset` missions then
-    have the name of cycles. chosen: values of axes of the point that figures of a single point show. measured: a worn
-    profile to compare with. recomputed: of the worn joint of the shown point, by `studyrunner.worn_joint`.
-    no_worn_response: why its response curve is not among them.
+    of several. blocks: of missions what belongs to single blocks; in `dataset` missions then have the name of cycles.
+    chosen: values of axes of the shown point. measured: a worn profile to compare with. recomputed: of the worn joint
+    of the shown point, by `studyrunner.worn_joint`. no_worn_response: why its response curve is not among them.
     """
 
     path: Path
@@ -116,9 +115,8 @@ class Result:
 
     def lacks(self, *names: str) -> str:
         """Sentence that says which of these variables to ask for; empty where the file has all."""
-        missing = [
-            name for name in names if not self.has(name) and name not in (() if self.blocks is None else self.blocks)
-        ]
+        there = {*self.dataset.variables, *(self.blocks or ())}
+        missing = [name for name in names if name not in there]
         return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
 
     def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
@@ -229,9 +227,9 @@ class Result:
         numbers = np.asarray(self.dataset["cycle"].values, dtype=float)
         if not self.has("cycle_count"):
             return numbers
-        own = np.asarray(self.at("cycle_count", point).values, dtype=float)
-        ascend = own.size > 1 and not np.isinf(own).any() and (np.diff(own[~np.isnan(own)]) > 0.0).all()
-        return own if ascend else numbers
+        counts = np.asarray(self.at("cycle_count", point).values, dtype=float)
+        ascend = counts.size > 1 and not np.isinf(counts).any() and (np.diff(counts[~np.isnan(counts)]) > 0.0).all()
+        return counts if ascend else numbers
 
     def last_reached(self, point: Point) -> int:
         """Index of the last cycle count at which a point holds values: one at its target has none after it."""
@@ -251,13 +249,11 @@ class Result:
         Where nothing is worn the one with the largest response at first. Other points count only where there is none.
         """
         everywhere = has_slow_time = np.ones(self.computed.shape, np.bool_)
-        measures = [everywhere.astype(float)]
-        if self.has_modes:
-            measures.insert(0, self.of_points("modal_amplitude"))
-        elif self.has("response_amplitude"):
-            measures.insert(0, self.of_points("response_amplitude", 0).max(axis=-1))
+        measures = [self.of_points("modal_amplitude")] if self.has_modes else []
         if not self.has_modes and self.has("worn_volume"):
-            measures.insert(0, self.worn)
+            measures.append(self.worn)
+        if not self.has_modes and self.has("response_amplitude"):
+            measures.append(self.of_points("response_amplitude", 0).max(axis=-1))
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.of_points("cycle_count", -1))
         wanted = everywhere
@@ -266,7 +262,7 @@ class Result:
         best = self.best_known
         sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, everywhere)
         points = next(each & wanted for each in sets if (each & wanted).any())
-        for measure in measures:
+        for measure in (*measures, everywhere):
             known = np.where(points & np.isfinite(measure), measure, 0.0)
             if known.max() > 0.0:
                 break
@@ -292,11 +288,9 @@ class Result:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
         named = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
         followed = f"the {self.followed}" if self.followed else ""
-        return ", ".join(
-            (name == "frequency" and followed) or show_value(self.dataset[name], point[name])
-            for name in self.axes
-            if name in named and name in point
-        )
+        names = [name for name in self.axes if name in named and name in point]
+        values = {name: show_value(self.dataset[name], point[name]) for name in names}
+        return ", ".join((name == "frequency" and followed) or value for name, value in values.items())
 
 
 def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -> Result:

@@ -105,8 +105,8 @@ def _of_wear(result: Result, point: dict[str, int]) -> Iterator[Finding]:
         yield Finding("input", "input", ranking)
     yield _deepest(result, point, at, f" in the sample that wears most ({where})" if volumes else "")
     if result.blocks is not None and "block_worn_volume" in result.blocks:
-        own = result.blocks["block_worn_volume"].isel(point).isel(cycle=at)
-        shares = dict(zip(own["block"].values.tolist(), (own.values / volume).tolist(), strict=True))
+        worn = result.blocks["block_worn_volume"].isel(point).isel(cycle=at)
+        shares = dict(zip(worn["block"].values.tolist(), (worn.values / volume).tolist(), strict=True))
         text = ", ".join(f"{name} {show_percent(share)}" for name, share in shares.items())
         yield Finding("blocks", "blocks", f"share of the wear: {text}", shares)
 
@@ -144,9 +144,10 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
         text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in place)}) mm"
     text, share = text + where, math.nan
     if result.has("contact_surface", "contact_area", "contact_edge"):
-        own, edge = pairs.surface == surface, result.at("contact_edge", point).values != 0
-        if edge[own].any() and depths[own].any():
-            share, of_area = (each[own & edge].sum() / each[own].sum() for each in (depths * pairs.area, pairs.area))
+        on_it = pairs.surface == surface
+        edge = on_it & (result.at("contact_edge", point).values != 0)
+        if edge.any() and depths[on_it].any():
+            share, of_area = (each[edge].sum() / each[on_it].sum() for each in (depths * pairs.area, pairs.area))
             if share > max(_SHARE, of_area):
                 text += f"; {show_percent(share)} of the wear of {surface} is in edge pairs:"
                 text += " valid if the real contact ends there, else extend the model"
@@ -231,15 +232,15 @@ def mode_ranges(result: Result) -> Iterator[Finding]:
     for index, number in enumerate(result.dataset["mode"].values.tolist()):
         computed = result.computed.take(index, axis=axis)
         values: dict[str, Any] = {"n_found": int(computed.sum())}
-        said = []
+        ranges = []
         for name, (factor, digits, unit) in shown.items():
             if result.has(name) and computed.any():
-                own = result.dataset[name].values.take(index, axis=axis)[computed]
-                values[name] = [float(own.min()), float(own.max())]
+                of_mode = result.dataset[name].values.take(index, axis=axis)[computed]
+                values[name] = [float(of_mode.min()), float(of_mode.max())]
                 texts = dict.fromkeys(f"{factor * each:.{digits}g}" for each in values[name])
-                said.append(f"{name.replace('_', ' ')} {' to '.join(texts)}{unit}")
-        text = ", ".join(said) + (f" over {over}" if said and over else "")
-        if not said or not computed.all():
+                ranges.append(f"{name.replace('_', ' ')} {' to '.join(texts)}{unit}")
+        text = ", ".join(ranges) + (f" over {over}" if ranges and over else "")
+        if not ranges or not computed.all():
             text += f"{', ' if text else ''}found at {values['n_found']} of {count(computed.size, 'point')}"
         yield Finding(f"mode {number}", f"mode {number}", text, values)
 
@@ -250,14 +251,13 @@ def shortest_life(result: Result) -> Finding | None:
     if not isinstance(until, dict) or not result.has("cycles_to_target"):
         return None
     (quantity, target), *_ = until.items()
-    found = result.computed & ~result.ended(Outcome.SENSITIVE)
+    ended = result.computed & ~result.ended(Outcome.SENSITIVE)
     lives, errors = (result.dataset[name].values for name in ("cycles_to_target", "cycles_to_target_error"))
-    unknown = found & (errors > SENSITIVE_ERROR * lives)
-    n_beyond, n_unsure = int(np.count_nonzero(found & np.isnan(lives))), int(np.count_nonzero(unknown))
-    lives = np.where(found & ~unknown, lives, np.nan)
-    reaches = (
-        f"{quantity.replace('_', ' ')} {_show(target, {'wear_depth': 'm', 'worn_volume': 'm3'}.get(quantity, '1'))}"
-    )
+    unknown = ended & (errors > SENSITIVE_ERROR * lives)
+    n_beyond, n_unsure = int(np.count_nonzero(ended & np.isnan(lives))), int(np.count_nonzero(unknown))
+    lives = np.where(ended & ~unknown, lives, np.nan)
+    units = {"wear_depth": "m", "worn_volume": "m3"}.get(quantity, "1")
+    reaches = f"{quantity.replace('_', ' ')} {_show(target, units)}"
     unsure = f"the life of {count(n_unsure, 'point')} is not known" if n_unsure else ""
     values = {"target": target, "count": math.nan, "n_beyond": n_beyond, "n_unsure": n_unsure}
     if np.isnan(lives).all():

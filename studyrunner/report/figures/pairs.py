@@ -341,13 +341,13 @@ def draw_numbers(result: Result) -> Drawn:
     figure, panels = plot.new_panels(len(flanks), 1, min(height * len(flanks), 8.0))
     for panel, flank in zip(panels[:, 0], flanks, strict=True):
         # the colour says nothing: cells without one
-        plain, own = ListedColormap(["#ffffff00"]), names[flank.pairs].astype(float)
-        draw_field(panel, flank, own, Normalize(0.0, max(own.max(), 1.0)), cmap=plain, edgecolors="0.6")
+        plain, numbers = ListedColormap(["#ffffff00"]), names[flank.pairs].astype(float)
+        draw_field(panel, flank, numbers, Normalize(0.0, max(numbers.max(), 1.0)), cmap=plain, edgecolors="0.6")
         places = np.asarray(flank.seen)
         if flank.cells is not None:
             middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (flank.cells.x_edges, flank.cells.y_edges)]
             places[flank.cells.pair] = np.stack(np.meshgrid(*middles), axis=-1)
-        for name, (x, y) in zip(own, 1e3 * places, strict=True):
+        for name, (x, y) in zip(numbers, 1e3 * places, strict=True):
             panel.text(x, y, f"{name:.0f}", ha="center", va="center", fontsize=8, clip_on=False)
         panel.set_title(flank.surface)
     plot.label_outer(panels)

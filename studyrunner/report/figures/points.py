@@ -66,17 +66,16 @@ def draw_trends(result: Result) -> Drawn:
 
 def _find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArray]]:
     """Label, unit, values and errors (axes...) in the end of what every point has."""
-    found = []
+    quantities = []
     if result.has("worn_volume") and len(result.cycles) > 1:
         worn = np.where(result.computed, result.worn, np.nan)
-        found.append(("worn volume\nin the end", "m3", worn, result.errors * worn))
+        quantities.append(("worn volume\nin the end", "m3", worn, result.errors * worn))
     if result.has("response_amplitude"):
-        last = result.dataset.isel(response=0, cycle=-1).transpose(*result.axes, ...)
-        amplitude = np.where(result.computed, last["response_amplitude"].values, np.nan)
-        wrong = last["response_error"].values if result.has("response_error") else np.nan
-        units = str(last["response_amplitude"].attrs.get("units", "m"))
-        found.append((f"response\nof {result.responses[0]}", units, amplitude, wrong * amplitude))
-    return found
+        amplitude = np.where(result.computed, result.of_points("response_amplitude", -1)[..., 0], np.nan)
+        error = result.of_points("response_error", -1) if result.has("response_error") else np.nan
+        units = str(result.dataset["response_amplitude"].attrs.get("units", "m"))
+        quantities.append((f"response\nof {result.responses[0]}", units, amplitude, error * amplitude))
+    return quantities
 
 
 def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, errors: FloatArray) -> None:
@@ -199,8 +198,8 @@ def draw_exceedance(result: Result) -> Drawn:
             value, interval = (_ends(point, f"{name}{each}", dimension) for each in ("", "_interval"))
             panel.fill_between(at, *interval.T, color=style["color"], alpha=0.18, lw=0.0)
             for bound in (_LOWEST, _HIGHEST) if (np.ptp(value, axis=1) > 0.0).any() else (_LOWEST,):
-                own = {"color": style["color"], "linestyle": style["linestyle"]}
-                panel.plot(at, value[:, bound], **own, label="_" if bound else label or "samples")
+                look = {name: style[name] for name in ("color", "linestyle")}
+                panel.plot(at, value[:, bound], **look, label="_" if bound else label or "samples")
         panel.set(xlabel=scale.label(words), ylabel="probability of more", ylim=(0.0, 1.02))
         panel.set_xlim(0.0, scale(last[dimension].values[-1]).item())
     plot.label_outer(panels)
@@ -234,8 +233,8 @@ def draw_deciding_inputs(result: Result) -> Drawn:
         panel.set_ylabel("share of the variance" if shares else "rank correlation")
         panel.grid(visible=False, axis="x")
     plot.label_outer(panels)
-    said = [(label, describe_ranking(point)) for label, point in zip(labels, shown, strict=True)]
-    decides = (f"{label}: {says}" if label else says[0].upper() + says[1:] for label, says in said if says)
+    rankings = [(label, describe_ranking(point)) for label, point in zip(labels, shown, strict=True)]
+    decides = (f"{label}: {text}" if label else text[0].upper() + text[1:] for label, text in rankings if text)
     return figure, as_sentences(*decides), _n_samples(last), left_out
 
 

@@ -16,6 +16,7 @@ from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray
 from studyrunner.report.figures.pairs import JOINT_WORDS
 from studyrunner.report.selection import Course, choose, find_course, labelled
+from studyrunner.result.opening import pairs_with_loops
 from studyrunner.result.pairs import last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
 from studyrunner.units import scale_for
@@ -54,8 +55,8 @@ def draw_responses(result: Result) -> Drawn:
     """Amplitude of the first harmonic over frequency, a panel a response: of the new and of the shown worn joint."""
     course, curves = find_course(result, "frequency"), result.recomputed.get("response")
     if course is None and curves is None:
-        said = "The study has one frequency: give several under [axes] frequency"
-        return f"{result.no_worn_response or said}."
+        remedy = "The study has one frequency: give several under [axes] frequency"
+        return f"{result.no_worn_response or remedy}."
     if course is not None and result.cycles[0] != 0.0:
         return "The file holds no new joint: add 0 to slow_time.outputs."
     lines, failed, left_out = _new_joint(result, course) if course else ([], np.zeros((0, 0), np.bool_), "")
@@ -99,15 +100,15 @@ def _new_joint(result: Result, course: Course) -> tuple[list[_Line], NDArray[np.
     lines, failed = [], []
     for place, (point, label) in enumerate(choice):
         others = {name: index for name, index in point.items() if name != "frequency"}
-        own = unworn.isel(others, missing_dims="ignore").transpose("frequency", "response").values[course.index]
-        failed.append(np.isnan(own[:, 0]))
+        values = unworn.isel(others, missing_dims="ignore").transpose("frequency", "response").values[course.index]
+        failed.append(np.isnan(values[:, 0]))
         at = course.values
         if result.has("branch"):
             jumps = np.flatnonzero(np.diff(course.read("branch", point)[0]) != 0) + 1
-            at, own = np.insert(at, jumps, np.nan), np.insert(own, jumps, np.nan, axis=0)
+            at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan, axis=0)
         text = label if _BEFORE in result.varying else ", ".join(filter(None, (label, "new joint")))
         # the second colour is that of the worn joint
-        lines.append(_Line(text, at, own, course.line_style(place + (place > 0))))
+        lines.append(_Line(text, at, values, course.line_style(place + (place > 0))))
     if result.has("exact_response_amplitude"):
         exact = course.read("exact_response_amplitude", result.shown)[0, :, 0]
         lines += [_Line("exact", course.values, exact, _EXACT)] if np.isfinite(exact).any() else []
@@ -118,9 +119,9 @@ def _recomputed(curves: xr.Dataset) -> list[_Line]:
     """Lines computed again, of the worn joint and where it is there of the new one."""
     lines = []
     for cycle in range(curves.sizes["cycle"]):
-        is_new, own = curves.sizes["cycle"] > 1 and cycle == 0, curves.isel(cycle=cycle)
+        is_new, curve = curves.sizes["cycle"] > 1 and cycle == 0, curves.isel(cycle=cycle)
         label, look = ("new joint", plot.line_style(0)) if is_new else (str(curves.attrs["title"]), _WORN)
-        values, error = (own[f"response_{each}"].values for each in ("amplitude", "error"))
+        values, error = (curve[f"response_{each}"].values for each in ("amplitude", "error"))
         lines.append(_Line(label, curves["frequency"].values, values, look, error))
     return lines
 
@@ -134,11 +135,11 @@ def draw_after_wear(result: Result) -> Drawn:
     choice = course.choose(_MOST_LINES)
     fields = course.read("response_amplitude", *choice.points)[..., 0]
     scale, (figure, panel) = scale_for("m", fields), plot.new_panel(3.4)
-    own = [f"each after its own {result.cycle_label(cycle)}" for cycle in (0, -1)]
-    new = "new joint" if result.cycles[0] == 0.0 else own[0]
+    first, last = (f"each after its own {result.cycle_label(cycle)}" for cycle in (0, -1))
+    new = "new joint" if result.cycles[0] == 0.0 else first
     panel.plot(course.values, scale(fields[0, :, 0]), color="0.5", linewidth=1.0, label=new)
     for number, (label, field) in enumerate(zip(choice.labels, fields, strict=True)):
-        look = course.line_style(number) | {"linestyle": "none", "label": ", ".join(filter(None, (label, own[1])))}
+        look = course.line_style(number) | {"linestyle": "none", "label": ", ".join(filter(None, (label, last)))}
         panel.plot(course.values, scale(field[:, -1]), **look)
     plot.set_from_zero(panel)
     panel.set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
@@ -175,11 +176,9 @@ def find_loops(result: Result, point: Point) -> list[int]:
     """Contact pairs whose loops the file holds at a point: those that the study asked for, without those of NaN."""
     if not result.has("loop_displacement", "loop_force"):
         return []
-    listed = result.study.get("outputs", {}).get("loops")
-    pairs = [int(pair) for pair in result.dataset["contact"].values]
-    wanted = [pair for pair in pairs if pair in listed] if isinstance(listed, list) and listed else pairs
-    force = result.at("loop_force", point, 0).sel(contact=wanted)
-    return [pair for pair in wanted if force.sel(contact=pair).notnull().any()]
+    pairs = pairs_with_loops(result.dataset) or result.dataset["contact"].values.tolist()
+    force = result.at("loop_force", point, 0).sel(contact=pairs)
+    return [pair for pair in pairs if force.sel(contact=pair).notnull().any()]
 
 
 def draw_loops(result: Result, name: str) -> Drawn:
@@ -198,8 +197,8 @@ def draw_loops(result: Result, name: str) -> Drawn:
         source = result.dataset[["loop_displacement", "loop_force"]].isel(result.shown)
     else:
         deepest = max(worn, key=lambda pair: worn[pair])
-        said = f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
-        return said if name == "fretting_loops" else None
+        remedy = f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
+        return remedy if name == "fretting_loops" else None
     pairs = sorted(sorted(there, key=lambda pair: -worn.get(pair, 0.0))[:_MOST_PAIRS])
     others = ", ".join(str(pair) for pair in there if pair not in pairs)
     how = how or (f"The file also holds loops of the pairs {textwrap.shorten(others, 40)}" if others else "")

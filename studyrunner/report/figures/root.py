@@ -80,9 +80,10 @@ def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale:
     figure, (panels,) = plot.new_panels(1, len(ratios), 3.4, width_ratios=ratios)
     norm = Normalize(0.0, scale(float(of_pairs.max())).item() or 1.0)
     at_nodes = np.full(len(nodes), np.nan)
-    at_nodes[surface.own] = scale(of_pairs[surface.pairs])
-    colours, own = rgb(surface.bodies, surface.body), surface.flank >= 0
-    colours[own] = mpl.colormaps[mpl.rcParams["image.cmap"]](norm(at_nodes[surface.faces[own]].mean(axis=1)))[:, :3]
+    at_nodes[surface.contact_nodes] = scale(of_pairs[surface.pairs])
+    colours, touch = rgb(surface.bodies, surface.body), surface.flank >= 0
+    of_faces = at_nodes[surface.faces[touch]].mean(axis=1)
+    colours[touch] = mpl.colormaps[mpl.rcParams["image.cmap"]](norm(of_faces))[:, :3]
     for panel, view in zip(panels, [views[-1], *close_ups], strict=True):
         faces = surface.faces[view.faces]
         paint_faces(panel, nodes, faces, colours[view.faces], view)
@@ -103,21 +104,21 @@ def draw_sector(result: Result) -> Drawn:
         view = from_aslant(nodes, len(faces))
         paint_faces(panels[0], nodes, faces, rgb(tuple(names.tolist()), body), view)
         draw_scale_bar(panels[0], nodes, view)
-    panel, own = panels[-1], result.dataset["natural_frequency"].transpose("nodal_diameter", "mode")
-    for number, mode in enumerate(own.values.T):
+    panel, modes = panels[-1], result.dataset["natural_frequency"].transpose("nodal_diameter", "mode")
+    for number, mode in enumerate(modes.values.T):
         style = {"linewidth": 0.8, "markersize": 3.5, "marker": plot.line_style(number)["marker"], "color": "0.35"}
         style |= {"markerfacecolor": COLOURS[0], "label": f"_mode {number + 1}"}
-        panel.plot(own["nodal_diameter"].values, mode, **style)
-    plot.set_from_zero(panel, float(np.nanmax(own.values)))
+        panel.plot(modes["nodal_diameter"].values, mode, **style)
+    plot.set_from_zero(panel, float(np.nanmax(modes.values)))
     panel.set(xlabel="nodal diameter", ylabel="natural frequency (Hz)")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    said = f"With the joint stuck, {own.sizes['mode']} modes, the lowest at {np.nanmin(own.values):.4g} Hz"
+    text = f"With the joint stuck, {modes.sizes['mode']} modes, the lowest at {np.nanmin(modes.values):.4g} Hz"
     of = f"Of the sector at {result.describe(result.shown, result.fixed)}" if result.fixed else ""
     diameter = result.study.get("scene", {}).get("nodal_diameter")
     if not isinstance(diameter, int) or "frequency" not in result.dataset.coords:
-        return figure, said, of
+        return figure, text, of
     ends = [float(end(result.dataset["frequency"].values)) for end in (np.min, np.max)]
     star: dict[str, Any] = {"marker": "*", "markersize": 11, "label": "this study", "clip_on": False, "zorder": 5}
     panel.plot([diameter, diameter], ends, color=COLOURS[1], **star)
     span = " to ".join(dict.fromkeys(f"{each:.6g}" for each in ends))
-    return figure, f"{said}. Star: this study, {span} Hz at nodal diameter {diameter}", of
+    return figure, f"{text}. Star: this study, {span} Hz at nodal diameter {diameter}", of

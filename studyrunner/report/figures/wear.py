@@ -62,8 +62,8 @@ def draw_history(result: Result) -> Drawn:
     panel.set_xlim(0.0, panel.dataLim.xmax or None)  # 0: a target before the second count
     panel.set_ylabel(scale.label("worn volume"))
     plot.set_from_zero(panel, highest if wears else 0.0)
-    said = f"Worn {_at_the_end(result)}: {', '.join(ends)}" if wears else "Nothing is worn at the stored counts"
-    return figure, said, choice.sentence
+    text = f"Worn {_at_the_end(result)}: {', '.join(ends)}" if wears else "Nothing is worn at the stored counts"
+    return figure, text, choice.sentence
 
 
 def draw_excitation(result: Result) -> Drawn:
@@ -233,11 +233,10 @@ def draw_blocks(result: Result, names: Mapping[str, str]) -> Drawn:
         unit = str(blocks[name].attrs.get("units", "1"))
         scale = Scale(100.0, "%") if unit == "1" else scale_for(unit, values)
         for place, block in enumerate(blocks["block"].values):
-            own = scale(values[:, place])
-            error = blocks[wrong].values[:, place] * own if wrong in blocks else None
-            plot.add_line(
-                panel, result.cycles, own, error, band=True, label=str(block), **plot.line_style(place, own.size)
-            )
+            line = scale(values[:, place])
+            error = blocks[wrong].values[:, place] * line if wrong in blocks else None
+            look = plot.line_style(place, line.size) | {"label": str(block)}
+            plot.add_line(panel, result.cycles, line, error, band=True, **look)
         plot.set_from_zero(panel, float(np.nanmax(scale(values), initial=0.0)))
         panel.set_ylabel(scale.label(words))
     panels[-1, 0].set(xlabel="missions", xlim=(0.0, result.cycles[-1]))
