@@ -35,8 +35,6 @@ CAPTIONS = {
     "final_worn_volume": f"{_OTHERS}. Bars: estimated errors; of a point that ended early, what was worn by then",
     "worn_volume_map": f"{_OTHERS}. Hatched: no result",
     "wear_rate_map": f"{_OTHERS}. Hatched: no result",
-    "response_after_own_wear": "Each mark is another joint, which wore at its own frequency: the marks are no response"
-    " curve. That they are low where the new joint resonates does not mean that wear protects",
     "excitation_frequency": _BANDS,
     "trends": "Bars: estimated errors",
     "wear_depth": "Of both surfaces together",
@@ -136,12 +134,6 @@ FIGURES = (
         needs=("worn_volume", "wear_rate"),
     ),
     Entry("frequency_response", "Frequency response of one joint, new and worn", response.draw_responses, **_RESPONSE),
-    Entry(
-        "response_after_own_wear",
-        "Response of different joints, each after wear at its own frequency",
-        response.draw_after_wear,
-        **_RESPONSE,
-    ),
     Entry(
         "excitation_frequency",
         "Frequency of an excitation that follows the resonance",

@@ -1,7 +1,8 @@
 """The one factory of results: datasets in memory, of any axes and pairs, made from the tables of variables.
 
-`build_file` has numbers that all differ, `make_result` smooth ones, `sample_file` samples, `mesh_file` scenes that
-differ in their pairs. `made_result` is of a study; `build_dataset`, `write_dataset` are the plain twin of the writer.
+`build_file` has numbers that all differ, `smooth_result` smooth ones, `sample_file` samples, `mesh_file` scenes that
+differ in their pairs, `result_of_study` the axes of a study; `build_dataset`, `write_dataset` are the plain twin of the
+writer.
 """
 
 import math
@@ -136,7 +137,7 @@ def _about(name: str) -> dict[str, object]:
 # --- smooth ones, for figures ---
 
 
-def make_result(
+def smooth_result(
     *,
     frequency: Sequence[float] = (200.0, 201.0, 202.0, 204.0),
     wear_coefficient: Sequence[float] = (1.1e-11,),
@@ -279,7 +280,7 @@ def mesh_file() -> xr.Dataset:
 # --- of a study ---
 
 
-def made_result(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Index], object]) -> xr.Dataset:
+def result_of_study(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Index], object]) -> xr.Dataset:
     """A result of a study whose points are all computed to the end, without wear, slip and errors.
 
     given: for variables by name, from the index of a point along the axes to its values.

@@ -18,7 +18,7 @@ from studyrunner.report.figures.pairs import JOINT_WORDS
 from studyrunner.report.selection import Course, choose, find_course, labelled
 from studyrunner.result.opening import pairs_with_loops
 from studyrunner.result.pairs import last_depth
-from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
+from studyrunner.result.view import NO_MOTION, Point, Result
 from studyrunner.units import scale_for
 
 _MOST_LINES, _MOST_RESPONSES, _MOST_MODES, _MOST_PAIRS = 3, 3, 6, 3
@@ -124,27 +124,6 @@ def _recomputed(curves: xr.Dataset) -> list[_Line]:
         values, error = (curve[f"response_{each}"].values for each in ("amplitude", "error"))
         lines.append(_Line(label, curves["frequency"].values, values, look, error))
     return lines
-
-
-def draw_after_wear(result: Result) -> Drawn:
-    """Amplitude of each point after its own wear, beside that of the new joint; nothing where no point wears."""
-    course = find_course(result, "frequency")
-    wears = not result.has("worn_volume") or float(np.nanmax(result.worn, initial=0.0)) > NO_VOLUME
-    if course is None or len(result.cycles) == 1 or not wears:
-        return None
-    choice = course.choose(_MOST_LINES)
-    fields = course.read("response_amplitude", *choice.points)[..., 0]
-    scale, (figure, panel) = scale_for("m", fields), plot.new_panel(3.4)
-    first, last = (f"each after its own {result.cycle_label(cycle)}" for cycle in (0, -1))
-    new = "new joint" if result.cycles[0] == 0.0 else first
-    panel.plot(course.values, scale(fields[0, :, 0]), color="0.5", linewidth=1.0, label=new)
-    for number, (label, field) in enumerate(zip(choice.labels, fields, strict=True)):
-        look = course.line_style(number) | {"linestyle": "none", "label": ", ".join(filter(None, (label, last)))}
-        panel.plot(course.values, scale(field[:, -1]), **look)
-    plot.set_from_zero(panel)
-    panel.set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
-    course.set_axis(panel)
-    return figure, choice.sentence
 
 
 def draw_mode(result: Result, name: str) -> Drawn:

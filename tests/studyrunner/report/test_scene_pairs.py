@@ -19,7 +19,7 @@ from studyrunner.result.view import Result
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure, with_mesh
 from tests.studyrunner.report.test_page import decode
-from tests.studyrunner.results import flank_positions, make_result, mesh_file, sample_file
+from tests.studyrunner.results import flank_positions, mesh_file, sample_file, smooth_result
 
 FEW = 12
 LAST_DEPTH = "wear_depth_last"
@@ -89,7 +89,7 @@ Y = 1e-5 * np.array([1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0]
 
 
 def half_space(model):
-    result = make_result()
+    result = smooth_result()
     x, y = (np.linspace(0.5, 11.5, 12) * 1e-5, np.zeros(12)) if model == "cylinder_on_flat" else (X, Y)
     places = {"contact_x": ("contact", x), "contact_y": ("contact", y), "contact_z": ("contact", np.zeros(12))}
     study = f'[study]\nname = "s"\n[scene]\nmodel = "{model}"\n'
