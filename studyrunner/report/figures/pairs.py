@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,127 +21,23 @@ from studyrunner.result.view import Result
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for
 
-JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
-"""The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
-
 _ORIGIN = "Axial 0 is the leading edge, up the flank 0 the inner end"
-_LONE, _SLIM = 1e-3, 0.2  # m; width of a single row of pairs, or this part of its length where that is less
-_STRAIGHT = 0.999
 _MOST_FLANKS, _SLENDER, _LOW, _LABEL_WIDTH = 3, 0.12, 0.4, 14
 _MOST_SERIES, _MOST_PROFILES = 4, 5
 _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _LONGEST_NAME = 150, 4, 120, 20
 
 
-# --- where the pairs of each surface lie ---
-
-
-@dataclass(frozen=True)
-class Cells:
-    """A grid of pairs. x (n_x,), y (n_y,): m, rising from 0; y towards the line farther from the origin. pair (n_y,
-    n_x): index along the pairs of the flank. x_edges (n_x + 1,), y_edges (n_y + 1,): of the cells, m.
-    """
-
-    x: FloatArray
-    y: FloatArray
-    pair: NDArray[np.intp]
-    x_edges: FloatArray
-    y_edges: FloatArray
-
-
-@dataclass(frozen=True)
-class Flank:
-    """One contact surface. pairs (n,): indices along `contact`. area (n,): m2.
-
-    cells: of the grid on which they lie; None where they lie on none. seen (n, 2): positions in the plane of the
-    surface, m; None where the file has no positions. directions: what the two directions are called.
-    """
-
-    surface: str
-    pairs: NDArray[np.intp]
-    area: FloatArray
-    cells: Cells | None = None
-    seen: FloatArray | None = None
-    directions: tuple[str, str] = ("", "")
-
-    @property
-    def height_over_width(self) -> float:
-        """Of the surface as it is drawn."""
-        return 0.75 if self.cells is None else float(np.ptp(self.cells.y_edges) / np.ptp(self.cells.x_edges))
-
-
-def find_flanks(result: Result) -> tuple[Flank, ...]:
-    """The contact surfaces of a file, in order of first appearance; a single one where the file has no labels."""
-    pairs = contact.contact_pairs(result, result.shown)
-    area = np.where(np.isfinite(pairs.area), pairs.area, 1.0)
-    words, flanks = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model"))), []
-    for surface in dict.fromkeys(pairs.surface.tolist()):
-        members = np.flatnonzero(pairs.surface == surface)
-        flank, position = Flank(surface or "contact", members, area[members]), pairs.position[members]
-        if np.isfinite(position).all():
-            centred, cells = position - position.mean(axis=0), None
-            _, _, plane = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
-            largest = np.argmax(np.abs(np.round(plane, 6)), axis=1)[:, None]
-            plane = plane * np.sign(np.take_along_axis(plane, largest, axis=1))
-            seen = centred @ plane[:2].T
-            with contextlib.suppress(ValueError):
-                cells = _build_cells(contact.find_grid(position), flank.area) if len(position) > 1 else None
-            if cells is not None:
-                first, across = position[cells.pair[0]], position[cells.pair[:, 0]]
-                plane = np.stack([first[-1] - first[0], across[-1] - across[0]])
-            named = words if words and (cells is None or len(cells.x) > 1) else (_name(plane[0]), _name(plane[1]))
-            flank = replace(flank, cells=cells, seen=seen, directions=named)
-        flanks.append(flank)
-    return tuple(flanks)
-
-
-def _name(direction: FloatArray) -> str:
-    """An axis of the mesh, or the components of a direction."""
-    unit = direction / (float(np.linalg.norm(direction)) or 1.0)
-    axis = int(np.argmax(np.abs(unit)))
-    along = f"along ({', '.join(f'{each + 0.0:.2g}' for each in unit)})" if unit.any() else "across"
-    return "xyz"[axis] if unit[axis] > _STRAIGHT else along
-
-
-def _build_cells(grid: contact.Grid, area: FloatArray) -> Cells:
-    """Cells about halfway between the pairs, as wide as the areas of their lines say."""
-    x, y, pair = grid.along, grid.across[-1] - grid.across[::-1], grid.pair[::-1]
-    total, lone = float(area.sum()), min(_LONE, _SLIM * float(max(x[-1], y[-1])))
-    x_share, y_share = (np.r_[0.0, np.cumsum(area[pair].sum(axis=axis))] / total for axis in (0, 1))
-    x_length, y_length = _length(x, x_share), _length(y, y_share)
-    if len(x) == len(y) == 2:
-        x_length, y_length = np.sqrt(total / (x[1] * y[1])) * np.array([x[1], y[1]])
-    elif 2 in (len(x), len(y)):
-        x_length, y_length = np.fmin([x_length, y_length], [total / y_length, total / x_length])
-    return Cells(x, y, pair, _edges(x, x_share, x_length, lone), _edges(y, y_share, y_length, lone))
-
-
-def _length(at: FloatArray, share: FloatArray) -> float:
-    """Length, m, of lines at rising positions (n,) whose cells have shares (n + 1,) of the area up to them; or NaN."""
-    return float(np.polyfit(share[1:-1], 0.5 * (at[1:] + at[:-1]), 1)[0]) if len(at) > 2 else np.nan
-
-
-def _edges(at: FloatArray, share: FloatArray, length: float, lone: float) -> FloatArray:
-    """Edges (n + 1,) of cells. lone: width of a single one, m."""
-    if len(at) == 1:
-        return lone * np.array([-0.5, 0.5])
-    if len(at) == 2:
-        # at most as if a third line stood on each side
-        length = float(np.clip(np.nan_to_num(length, nan=np.inf), at[1], 2.0 * at[1]))
-    start = float(np.mean(0.5 * (at[1:] + at[:-1]) - length * share[1:-1]))
-    return np.asarray(start + length * share)
-
-
 # --- maps ---
 
 
-def most_of_flanks(result: Result, *values: FloatArray) -> tuple[tuple[Flank, ...], str]:
+def most_of_flanks(result: Result, *values: FloatArray) -> tuple[tuple[contact.Flank, ...], str]:
     """Surfaces with the largest values (n_contact,), as many as fit, none without positions; how they are drawn."""
-    flanks = find_flanks(result)
+    flanks = contact.find_flanks(result)
     if any(flank.seen is None for flank in flanks):
         return (), ""
     largest = [max(float(np.nanmax(value[flank.pairs])) for value in values) for flank in flanks]
     drawn = tuple(flanks[number] for number in sorted(np.argsort(largest)[::-1][:_MOST_FLANKS]))
-    on_grid = all(flank.cells is not None for flank in drawn)
+    on_grid = all(flank.grid is not None for flank in drawn)
     how = "One cell is one contact pair, as large as its area"
     how = how if on_grid else "The pairs lie on no grid: one dot is one contact pair"
     others = len(flanks) - len(drawn)
@@ -155,12 +49,12 @@ def largest_pair(result: Result, values: FloatArray, scale: Scale) -> str:
     return f"{scale.show(float(np.nanmax(values)))} at pair {result.dataset['contact'].values[np.nanargmax(values)]}"
 
 
-def map_height(flanks: Sequence[Flank]) -> float:
+def map_height(flanks: Sequence[contact.Flank]) -> float:
     """Height of a row of maps of flanks side by side, inches."""
     return 6.0 / len(flanks) * min(1.2, max(0.28, max(flank.height_over_width for flank in flanks)))
 
 
-def draw_fields(flanks: Sequence[Flank], fields: Mapping[str, FloatArray], scale: Scale, text: str) -> Figure:
+def draw_fields(flanks: Sequence[contact.Flank], fields: Mapping[str, FloatArray], scale: Scale, text: str) -> Figure:
     """One row of maps a field (n_contact,), one column a flank, all in one colour scale."""
     figure, panels = plot.new_panels(len(fields), len(flanks), len(fields) * (map_height(flanks) + 0.62))
     largest = max(float(np.nanmax(values, initial=0.0)) for values in fields.values())
@@ -174,11 +68,11 @@ def draw_fields(flanks: Sequence[Flank], fields: Mapping[str, FloatArray], scale
     return figure
 
 
-def draw_field(panel: Axes, flank: Flank, values: NDArray[Any], norm: Normalize, **look: Any) -> None:
+def draw_field(panel: Axes, flank: contact.Flank, values: NDArray[Any], norm: Normalize, **look: Any) -> None:
     """One field (n,) of a flank: cells of its grid, or dots at its pairs."""
-    if flank.cells is not None:
-        cells = flank.cells
-        plot.add_map(panel, 1e3 * cells.x_edges, 1e3 * cells.y_edges, values[cells.pair], norm, **look)
+    if flank.grid is not None and flank.edges is not None:
+        x_edges, y_edges = flank.edges
+        plot.add_map(panel, 1e3 * x_edges, 1e3 * y_edges, values[flank.grid.pair], norm, **look)
         # cells as they are in the flank, unless it is so slender that too little would be seen
         panel.set_aspect("equal" if flank.height_over_width > (_LOW if plot.is_narrow() else _SLENDER) else "auto")
     elif flank.seen is not None:
@@ -273,28 +167,28 @@ def draw_profile(result: Result) -> Drawn:
         # without positions there is nothing that the wear depth per pair does not show
         return None
     when, scale = result.cycle_label(result.last_reached(result.shown)), scale_for("m", depth)
-    if all(flank.cells is not None for flank in flanks):
+    if all(flank.grid is not None for flank in flanks):
         figure = _draw_profiles(flanks, depth, scale)
     else:
         figure = draw_fields(flanks, {when: depth}, scale, "wear depth")
     return figure, f"After {when}. Deepest: {largest_pair(result, depth, scale)}", how
 
 
-def _draw_profiles(flanks: tuple[Flank, ...], depth: FloatArray, scale: Scale) -> Figure:
+def _draw_profiles(flanks: tuple[contact.Flank, ...], depth: FloatArray, scale: Scale) -> Figure:
     """A map of each flank, and under it the depth along its first direction, downwards as the surface sinks."""
     inches = map_height(flanks)
     figure, panels = plot.new_panels(2, len(flanks), inches + 3.3, sharex="col", height_ratios=(inches, 2.0))
     deepest = scale(float(np.nanmax(depth))).item() or 1.0
     norm = Normalize(0.0, deepest)
     for (above, panel), flank in zip(panels.T, flanks, strict=True):
-        values, cells = scale(depth[flank.pairs]), flank.cells
-        assert cells is not None
+        values, grid = scale(depth[flank.pairs]), flank.grid
+        assert grid is not None
         draw_field(above, flank, values, norm)
         above.set_title(flank.surface)
-        n_rows = len(cells.y)
+        n_rows = len(grid.across)
         for number, row in enumerate(np.unique(np.linspace(0, n_rows - 1, min(n_rows, _MOST_PROFILES)).round())):
-            label = f"{1e3 * cells.y[int(row)]:.3g} mm {flank.directions[1]}"
-            panel.plot(1e3 * cells.x, values[cells.pair[int(row)]], label=label, **plot.line_style(number))
+            label = f"{1e3 * grid.across[int(row)]:.3g} mm {flank.directions[1]}"
+            panel.plot(1e3 * grid.along, values[grid.pair[int(row)]], label=label, **plot.line_style(number))
         panel.set(xlim=above.get_xlim(), ylim=(1.06 * deepest, -0.04 * deepest))
         panel.set(xlabel=f"{flank.directions[0]} (mm)", ylabel=scale.label("wear depth"))
     plot.label_outer(panels)
@@ -306,8 +200,9 @@ def _draw_scar(
     scar: contact.Scar, fields: Mapping[str, FloatArray], scale: Scale, text: str, error: FloatArray | None = None
 ) -> tuple[Figure, Axes, str]:
     """Fields (n_contact,) along x through the middle, the last with its errors; the panel, and a sentence."""
-    (figure, panel), along, pairs = plot.new_panel(3.4), scale_for("m", scar.x), scar.pairs
-    at = along(scar.x)
+    (x, pairs), (figure, panel) = scar, plot.new_panel(3.4)
+    along = scale_for("m", x)
+    at = along(x)
     for number, (label, values) in enumerate(fields.items()):
         wrong = scale(error[pairs]) if error is not None and number == len(fields) - 1 else None
         plot.add_line(panel, at, scale(values[pairs]), wrong, band=True, label=label, **plot.line_style(number))
@@ -324,7 +219,7 @@ def _draw_scar_depth(result: Result, scar: contact.Scar, after: FloatArray) -> D
     figure, panel, how = _draw_scar(scar, fields, scale, "depth", error)
     if measured is not None:
         # a measured profile may have piled-up edges above the surface
-        at, depth = scale_for("m", scar.x)(measured.x), scale(measured.depth)
+        at, depth = scale_for("m", scar[0])(measured.x), scale(measured.depth)
         panel.plot(at, depth, color=COLOURS[2], linewidth=1.2, label="measured")
     panel.invert_yaxis()
     deepest = f"After {result.cycle_label(last)}. Deepest: {scale.show(float(np.nanmax(after)))}"
@@ -333,7 +228,7 @@ def _draw_scar_depth(result: Result, scar: contact.Scar, after: FloatArray) -> D
 
 def draw_numbers(result: Result) -> Drawn:
     """The number of each pair where it lies on its surface (Fig. 3b); nothing without positions, or with many pairs."""
-    flanks, names = find_flanks(result), result.dataset["contact"].values
+    flanks, names = contact.find_flanks(result), result.dataset["contact"].values
     placed = all(flank.seen is not None for flank in flanks)
     if not placed or len(names) == 1 or len(flanks) > _MOST_NUMBERED or len(names) > _MOST_NUMBERS * len(flanks):
         return None
@@ -344,12 +239,12 @@ def draw_numbers(result: Result) -> Drawn:
         plain, numbers = ListedColormap(["#ffffff00"]), names[flank.pairs].astype(float)
         draw_field(panel, flank, numbers, Normalize(0.0, max(numbers.max(), 1.0)), cmap=plain, edgecolors="0.6")
         places = np.asarray(flank.seen)
-        if flank.cells is not None:
-            middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (flank.cells.x_edges, flank.cells.y_edges)]
-            places[flank.cells.pair] = np.stack(np.meshgrid(*middles), axis=-1)
+        if flank.grid is not None and flank.edges is not None:
+            middles = [0.5 * (edges[1:] + edges[:-1]) for edges in flank.edges]
+            places[flank.grid.pair] = np.stack(np.meshgrid(*middles), axis=-1)
         for name, (x, y) in zip(numbers, 1e3 * places, strict=True):
             panel.text(x, y, f"{name:.0f}", ha="center", va="center", fontsize=8, clip_on=False)
         panel.set_title(flank.surface)
     plot.label_outer(panels)
-    origin = _ORIGIN if flanks[0].directions in JOINT_WORDS.values() else ""
+    origin = _ORIGIN if flanks[0].directions in contact.JOINT_WORDS.values() else ""
     return figure, f"As along the dimension contact: {len(names)} pairs", origin

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray
-from studyrunner.report.figures.pairs import JOINT_WORDS
 from studyrunner.report.selection import Course, choose, find_course, labelled
 from studyrunner.result.opening import pairs_with_loops
-from studyrunner.result.pairs import last_depth
+from studyrunner.result.pairs import JOINT_WORDS, last_depth
 from studyrunner.result.view import NO_MOTION, Point, Result
 from studyrunner.units import scale_for
 

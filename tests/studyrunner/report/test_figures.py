@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 from studies.scene import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing
-from studyrunner.report.figures.pairs import find_flanks
+from studyrunner.result.pairs import find_flanks
 from studyrunner.result.view import Result
 from tests.studyrunner.report.cases import check_print, dovetail_file, draw_figure, numbers_of, values_of, with_mesh
 from tests.studyrunner.report.test_precision import finest_file
@@ -257,11 +257,10 @@ def test_outcomes_are_words_and_the_worst_certificate_is_named_with_its_place():
 def test_a_flank_is_as_large_as_it_is(density):
     """40 mm long and 7 mm high: pairs at its edges own a half or a quarter of a cell."""
     for flank in find_flanks(Result(Path("dovetail.nc"), dovetail_file(density))):
-        assert flank.cells is not None
-        np.testing.assert_allclose(flank.cells.x_edges[[0, -1]], [0.0, 0.04], atol=1e-6)
-        np.testing.assert_allclose(flank.cells.y_edges[[0, -1]], [0.0, 0.007], atol=1e-6)
-        cells = np.outer(np.diff(flank.cells.y_edges), np.diff(flank.cells.x_edges))
-        np.testing.assert_allclose(cells, flank.area[flank.cells.pair], rtol=1e-3)
+        for edges, length in zip(flank.edges, (0.04, 0.007), strict=True):
+            np.testing.assert_allclose(edges[[0, -1]], [0.0, length], atol=1e-6)
+        cells = np.outer(*(np.diff(edges) for edges in flank.edges[::-1]))
+        np.testing.assert_allclose(cells, flank.area[flank.grid.pair], rtol=1e-3)
 
 
 def test_the_most_worn_of_many_loops_are_shown_about_their_means_and_one_tangent_has_no_path():
