@@ -12,7 +12,7 @@ import json
 import math
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -145,6 +145,8 @@ _FIRST = ("worn_volume", "natural_frequency", "response_amplitude")
 _COLOURED = ("worn_cycle", "scheme", "sweep", "cycle", "mode")
 _LINES = 10
 
+_Arrays = dict[str, xr.DataArray]
+
 
 def encode_floats(values: ArrayLike) -> str:
     """Numbers as base64 of little-endian 32 bit floats, the last index fastest; NaN stays NaN."""
@@ -160,20 +162,18 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
     """
     if not result.has_values.any():
         return None
-    if result.has_values.size > _MOST_POINTS:
-        notes.append(
-            f"The study has {result.has_values.size} points, more than the {_MOST_POINTS} that can be picked here."
-        )
+    if (n_points := result.has_values.size) > _MOST_POINTS:
+        notes.append(f"The study has {n_points} points, more than the {_MOST_POINTS} that can be picked here.")
         return None
     if result.has("cycle_count"):
         notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
     shown = dict(result.shown)
     last = 0 if result.has_modes else result.last_reached(shown)
     floats = math.inf if result.has_modes else limit / _CHARACTERS_A_FLOAT
-    arrays, kept = _fit(dict(_arrays(result)), floats, notes)
+    arrays, counts = _fit(_arrays(result), floats, notes)
     used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])
     if not result.has_modes:
-        shown["cycle"] = int(np.abs(kept - last).argmin())
+        shown["cycle"] = int(np.abs(counts - last).argmin())
     outcomes = np.unique(result.dataset["outcome"].values).tolist()
     messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
     return {
@@ -188,24 +188,21 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
     }
 
 
-def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
+def _arrays(result: Result) -> _Arrays:
     """Numbers of the file that belong to points of the study, unread; loops of those pairs alone that have some."""
-    blocks = {} if result.blocks is None else result.blocks.data_vars
+    arrays, blocks = _Arrays(), {} if result.blocks is None else result.blocks.data_vars
     for name, array in {**result.dataset.data_vars, **blocks}.items():
-        if array.dtype.kind not in "iuf" or not set(result.axes) & set(array.dims) or not array.size:
-            continue
         if "phase" in array.dims:
             phases = slice(None, None, -(-array.sizes["phase"] // _MOST_PHASES))
-            array = array.sel(contact=find_loops(result, result.shown)).isel(phase=phases)
-            array = array.rename(contact=_LOOPS)
-        if array.size:
-            yield str(name), array
+            pairs = find_loops(result, result.shown)
+            array = array.sel(contact=pairs).isel(phase=phases).rename(contact=_LOOPS)
+        if array.dtype.kind in "iuf" and set(result.axes) & set(array.dims) and array.size:
+            arrays[str(name)] = array
+    return arrays
 
 
-def _fit(
-    arrays: dict[str, xr.DataArray], floats: float, notes: list[str]
-) -> tuple[dict[str, xr.DataArray], NDArray[np.intp]]:
-    """Variables that fit, at the counts that are kept, and places of these: the first, the last, and some between."""
+def _fit(arrays: _Arrays, floats: float, notes: list[str]) -> tuple[_Arrays, NDArray[np.intp]]:
+    """Variables that fit, at as many counts as fit, and places of these: the first, the last, and some between."""
     cycles = {name: array.sizes.get("cycle", 1) for name, array in arrays.items()}
     small = {name: array.size // cycles[name] * min(2, cycles[name]) for name, array in arrays.items()}
     n_cycles = max(cycles.values(), default=1)
@@ -216,15 +213,15 @@ def _fit(
     # a variable along the cycles takes as much at each of them
     each = sum(array.size / n_cycles for array in arrays.values() if "cycle" in array.dims)
     others = sum(array.size for array in arrays.values() if "cycle" not in array.dims)
-    keep = n_cycles if each * n_cycles + others <= floats else max(min(2, n_cycles), int((floats - others) / each))
-    kept = np.unique(np.linspace(0, n_cycles - 1, keep).round().astype(np.intp))
-    if keep < n_cycles:
-        notes.append(f"On this page are {len(kept)} of {n_cycles} counts.")
-        arrays = {name: array.isel(cycle=kept, missing_dims="ignore") for name, array in arrays.items()}
-    return arrays, kept
+    most = n_cycles if each * n_cycles + others <= floats else max(min(2, n_cycles), int((floats - others) / each))
+    counts = np.unique(np.linspace(0, n_cycles - 1, most).round().astype(np.intp))
+    if most < n_cycles:
+        notes.append(f"On this page are {len(counts)} of {n_cycles} counts.")
+        arrays = {name: array.isel(cycle=counts, missing_dims="ignore") for name, array in arrays.items()}
+    return arrays, counts
 
 
-def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
+def _encode(array: xr.DataArray, arrays: _Arrays) -> dict[str, Any]:
     """A variable: `data` in SI times `factor` in `unit`, `error` the variable of its error, `words` of its values."""
     name, attributes = str(array.name), array.attrs
     values = array.values.astype(float)
@@ -246,7 +243,7 @@ def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str
     }
 
 
-def _dimension(result: Result, name: str, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
+def _dimension(result: Result, name: str, arrays: _Arrays) -> dict[str, Any]:
     """A dimension with its values: numbers, or words."""
     axis = next(array for array in arrays.values() if name in array.dims)[name]
     label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
@@ -272,7 +269,7 @@ def _coordinates(result: Result, dims: set[str]) -> Iterator[dict[str, Any]]:
             yield {"name": str(name), "dim": along[0], "label": label, "unit": scale.unit, "data": data}
 
 
-def _start(result: Result, arrays: Mapping[str, xr.DataArray]) -> dict[str, str]:
+def _start(result: Result, arrays: _Arrays) -> dict[str, str]:
     """What is shown first: a variable over the axis that figures are drawn over, or over slow time."""
     wears = result.has("worn_volume") and bool(np.nanmax(result.worn) > NO_VOLUME)
     usual = [name for name in _FIRST if name in arrays and (wears or name != "worn_volume")]
@@ -299,16 +296,14 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
     if whole is None:
         return None
     surface = whole.near_contact(_MOST_FACES)
-    if len(surface.faces) < len(whole.faces):
-        notes.append(
-            f"In three dimensions are {len(surface.faces)} of {len(whole.faces)} faces, those near the contact."
-        )
+    n_shown, n_faces = len(surface.faces), len(whole.faces)
+    if n_shown < n_faces:
+        notes.append(f"In three dimensions are {n_shown} of {n_faces} faces, those near the contact.")
     views, shown = find_views(surface), result.shown
     seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
     of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": surface.flank}
     pairs = pairs_of_scene(result, shown)[surface.pairs]
     of_contact = {"nodes": surface.contact_nodes, "pairs": pairs, "normals": surface.normals}
-    directions = [{"eye": view.to_eye, "up": view.up} for view in views]
     return {
         **{name: encode_floats(values) for name, values in (of_faces | {"seen": np.asarray(seen)}).items()},
         "bodies": list(surface.bodies),
@@ -317,7 +312,12 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
         "well_seen": surface.well_seen,
         "scene": {name: shown[name] for name in axes_of_scenes(result)},
         "views": [
-            {"title": view.title, "body": view.body, **{name: np.round(each, 6).tolist() for name, each in way.items()}}
-            for view, way in zip(views, directions, strict=True)
+            {
+                "title": each.title,
+                "body": each.body,
+                "eye": each.to_eye.round(6).tolist(),
+                "up": each.up.round(6).tolist(),
+            }
+            for each in views
         ],
     }

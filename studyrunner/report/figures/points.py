@@ -275,7 +275,7 @@ def list_certificates(result: Result) -> Drawn:
     rows = []
     for name, words in CERTIFICATE.items():
         if result.has(name) and "cycle" in result.dataset[name].dims:
-            values = result.dataset[name].transpose(*result.axes, "cycle").values
+            values = result.of_points(name)
             values = np.where(result.computed[..., None] & np.isfinite(values), values, 0.0)
             *place, cycle = map(int, np.unravel_index(int(np.argmax(values)), values.shape))
             point = result.point_at(place)
