@@ -53,8 +53,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("result", metavar="OUT.nc", type=Path, help="result file of run-study")
     add("-o", dest="folder", metavar="FOLDER", type=Path, help="where to write (default: OUT-report, here)")
     which = "the point that root, maps, loops and --vtu show (default: the most worn one)"
-    add("--point", metavar="AXIS=VALUE,...", type=_read_point, default={}, help=which)
-    add("--loops", metavar="PAIR,...", type=_read_pairs, default=(), help="compute fretting loops of these pairs")
+    add("--point", metavar="AXIS=VALUE,...", type=axis_values, default={}, help=which)
+    add("--loops", metavar="PAIR,...", type=pair_numbers, default=(), help="compute fretting loops of these pairs")
     scar = "measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)"
     add("--measured", metavar="PROFILE.csv", type=Path, help=scar)
     add("--no-compute", help="draw what the file holds, without the response of a worn joint", **flag)
@@ -62,21 +62,15 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(list(arguments))
 
 
-def _read_point(text: str) -> dict[str, str]:
-    """Values of axes, as text. Raises UserError."""
-    parts = [part.strip().partition("=") for part in text.split(",") if part.strip()]
-    for name, equals, _ in parts:
-        if not equals:
-            raise UserError("command line", "--point", name, "give AXIS=VALUE, as frequency=211.75")
-    return {name.strip(): value.strip() for name, _, value in parts}
+def axis_values(text: str) -> dict[str, str]:
+    """Values of axes, as text, from AXIS=VALUE,... ValueError: it is none."""
+    pairs = (part.split("=") for part in text.split(","))
+    return {name.strip(): value.strip() for name, value in pairs}
 
 
-def _read_pairs(text: str) -> tuple[int, ...]:
-    """Numbers of contact pairs. Raises UserError."""
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError:
-        raise UserError("command line", "--loops", text, "give numbers of contact pairs, as 25,26") from None
+def pair_numbers(text: str) -> tuple[int, ...]:
+    """Numbers of contact pairs, from PAIR,... ValueError: it is none."""
+    return tuple(int(part) for part in text.split(","))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

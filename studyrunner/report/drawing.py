@@ -73,8 +73,9 @@ def new_panels(
     if narrow:
         usual = np.array(ratios.get("height_ratios", np.ones(n_rows)), dtype=float)
         usual *= height / np.sum(usual)
-        own = np.minimum(np.maximum(0.45 * n_columns * usual, np.minimum(usual, _LOW)), np.maximum(usual, _HIGH))
-        heights = np.tile(np.maximum(own, _LEAST), n_columns)
+        narrow_rows = 0.45 * n_columns * usual
+        narrow_rows = np.minimum(np.maximum(narrow_rows, np.minimum(usual, _LOW)), np.maximum(usual, _HIGH))
+        heights = np.tile(np.maximum(narrow_rows, _LEAST), n_columns)
         height, shape, ratios = float(heights.sum()), (len(heights), 1), {"height_ratios": heights.tolist()}
         sharex, sharey = sharex is True, sharey is True
     figure = Figure(figsize=(width, height), layout="constrained")

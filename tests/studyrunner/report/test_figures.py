@@ -155,7 +155,7 @@ def test_pressure_and_depth_of_the_pairs_are_maps_and_profiles():
         expected = grid_of(result, "wear_depth", 1e6, pairs, -1)
         np.testing.assert_allclose(rows[:, 2], expected.ravel(), rtol=1e-8)
         for line, row in zip(panel.get_lines(), expected, strict=True):
-            np.testing.assert_allclose(line.get_data(), [[0.0, 10.0, 20.0], row], atol=1e-9)
+            np.testing.assert_allclose(line.get_data(), [[0.0, 20.0, 40.0], row], atol=1e-9)
         assert panel.yaxis_inverted()
 
 
