@@ -105,6 +105,9 @@ def _overrides(result: Result) -> dict[str, Any]:
         elif name != "worn_cycle" and not (name == "frequency" and result.followed):
             keys[f"axes.{name}"] = float(value) if name == "rtol" else value
     if result.followed:
+        if not result.has("excitation_frequency"):
+            remedy = result.lacks("excitation_frequency").removesuffix(".")
+            raise UserError(str(result.path), "excitation_frequency", None, remedy)
         keys["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
     return keys | _ALONE
 

@@ -70,6 +70,8 @@ def draw_excitation(result: Result) -> Drawn:
     """Frequency of an excitation that follows the resonance; nothing where the study gives the frequency."""
     if not result.followed or len(result.cycles) == 1:
         return None
+    if not result.has("excitation_frequency"):
+        return result.lacks("excitation_frequency")
     choice, (figure, panel) = choose(result, [], _MOST_LINES), plot.new_panel(3.4)
     _draw_over_cycles(result, panel, "excitation_frequency", choice, Scale(1.0, "Hz"))
     panel.set_ylabel("frequency (Hz)")

@@ -17,9 +17,10 @@ from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing
 from studyrunner.result.pairs import find_flanks
 from studyrunner.result.view import Result
+from studyrunner.study.study_file import read_study
 from tests.studyrunner.report.cases import check_print, dovetail_file, draw_figure, numbers_of, values_of, with_mesh
 from tests.studyrunner.report.test_precision import finest_file
-from tests.studyrunner.results import fail, sample_file, smooth_result
+from tests.studyrunner.results import fail, result_of_study, sample_file, smooth_result
 
 ALL_DRAWINGS = (
     "final_worn_volume worn_volume worn_volume_map wear_rate_map frequency_response wear_depth worn_profile"
@@ -296,6 +297,13 @@ def test_samples_are_those_of_the_file():
     bars = draw_figure(result, "deciding_inputs").figure.axes[0]
     names = [text.get_text().replace("\n", " ") for text in bars.get_xticklabels()]
     assert names[int(np.argmax([patch.get_height() for patch in bars.patches]))] == "wear coefficient"
+
+
+def test_a_followed_frequency_that_the_file_does_not_hold_is_asked_for():
+    given = ("axes.frequency='resonance'", "loading.between=[180, 230]", "outputs.variables=['worn_volume']")
+    items = list(draw_report(Result(Path("followed.nc"), result_of_study(read_study("sdof_slider", given)))))
+    (missing,) = [item for item in items if item.name == "excitation_frequency"]
+    assert "excitation_frequency" in missing.sentence
 
 
 # --- files ---
