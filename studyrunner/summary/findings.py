@@ -196,7 +196,7 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     case = " in this case" if wears else f", most at {where_is(result, point)}"
     text = f"{name}{case if result.computed.size > 1 else ''}: amplitude {new}"
     if wears:
-        elsewhere = " (its resonance may lie elsewhere)" if both[1] < both[0] else ""
+        elsewhere = " (its resonance may lie elsewhere)" if both[1] < both[0] and not result.followed else ""
         text += f" when new, {worn} when worn{elsewhere}"
     frequency, peak = _peak(result, point, of)
     if math.isfinite(frequency):
