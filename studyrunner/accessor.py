@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from solver.outcome import Outcome
 from studyrunner.result.opening import ENDED, outcome_words
 from studyrunner.result.pairs import find_grid
 from studyrunner.statistics.study_statistics import worn_volume_statistics
@@ -19,8 +20,14 @@ from studyrunner.study.text import read_toml
 from studyrunner.summary.answer import Summary, summary
 from studyrunner.user_error import UserError
 
-_NOT_COMPUTED = 13  # `Outcome.NOT_COMPUTED` of the solver, which results are read without
 _PAIRS = ("contact", "contact_x", "contact_y", "contact_z", "contact_surface")
+
+
+def _require(dataset: xr.Dataset, *names: str) -> None:
+    """Raises ValueError where a dataset lacks variables."""
+    if missing := [name for name in names if name not in dataset]:
+        remedy = "give a result of a study that asks for it by [outputs] variables"
+        raise ValueError(f"The dataset holds no {' and no '.join(missing)}: {remedy}.")
 
 
 class FretwearAccessor:
@@ -34,14 +41,11 @@ class FretwearAccessor:
 
         Dimensions of `response_amplitude`; NaN where a point failed. ValueError: the file holds no amplitude or phase.
         """
-        names = ("response_amplitude", "response_phase")
-        if missing := [name for name in names if name not in self._dataset]:
-            raise ValueError(f"The result holds no {' and no '.join(missing)}: ask for it by [outputs] variables.")
-        amplitude, phase = (self._dataset[name] for name in names)
+        _require(self._dataset, "response_amplitude", "response_phase")
         # a damaged file may hold anything
         with np.errstate(invalid="ignore"):
-            response = (amplitude * np.exp(1j * phase)).rename("response")
-        return response.assign_attrs(units="m", long_name="first harmonic of the response")
+            response = self._dataset["response_amplitude"] * np.exp(1j * self._dataset["response_phase"])
+        return response.rename("response").assign_attrs(units="m", long_name="first harmonic of the response")
 
     def summary(self) -> Summary:
         """What came out: where the joint wears most, how much, how deep, how well that is known, what failed.
@@ -49,17 +53,16 @@ class FretwearAccessor:
         `print` shows it as the last lines of a run do, `.values` has the numbers. ValueError: no result of a study,
         or one without a dimension of its variables.
         """
-        dataset = self._dataset
-        if "study" not in dataset.attrs or "outcome" not in dataset:
-            raise ValueError("this dataset is no result of a study: give one of open_result or run_study")
+        _require(self._dataset, "outcome", "contact")
         for name in ("cycle", "mission", "contact", "response"):
-            if name in dataset.coords and name not in dataset.dims:
+            if name in self._dataset.coords and name not in self._dataset.dims:
                 raise ValueError(f"{name} is no dimension of this dataset: select with a list, as isel({name}=[0])")
         return summary(self._dataset)
 
     @property
     def surfaces(self) -> tuple[str, ...]:
         """Labels of the surfaces of the joint, in the order in which they first appear."""
+        _require(self._dataset, "contact_surface")
         return tuple(dict.fromkeys(str(label) for label in self._dataset["contact_surface"].values))
 
     def worn_volume_statistics(
@@ -80,10 +83,10 @@ class FretwearAccessor:
         beginning with the line farther from the origin, so that a flank of a disk is followed inwards. `contact`,
         (across, along): the pairs. ValueError: the variable is none of pairs, or the pairs do not lie on a grid.
         """
+        _require(self._dataset, name, *_PAIRS)
         if "contact" not in self._dataset[name].dims:
-            raise ValueError(
-                f"{name} does not belong to contact pairs, but to {', '.join(map(str, self._dataset[name].dims))}."
-            )
+            dimensions = ", ".join(map(str, self._dataset[name].dims))
+            raise ValueError(f"{name} does not belong to contact pairs, but to {dimensions}.")
         members = np.flatnonzero(self._dataset["contact_surface"].values == surface)
         if members.size == 0:
             raise ValueError(f"There is no surface {surface!r} in the result; it has {', '.join(self.surfaces)}.")
@@ -100,7 +103,8 @@ class FretwearAccessor:
         return values.transpose(..., "across", "along")
 
     def outcomes(self) -> xr.DataArray:
-        """How each point ended, as a word of `flag_meanings`; the sentence of each word is in `outcome.sentences`."""
+        """How each point ended, in a word; the sentence of each word is in `outcome.sentences`."""
+        _require(self._dataset, "outcome")
         return outcome_words(self._dataset["outcome"])
 
     def loop(self, contact: int) -> xr.Dataset:
@@ -111,10 +115,10 @@ class FretwearAccessor:
         hold the loop.
         """
         names = {"loop_displacement": "displacement", "loop_force": "force"}
-        found = self._dataset[[name for name in names if name in self._dataset]]
-        axis = "loop_contact" if "loop_contact" in found.dims else "contact"
-        if axis in found.dims and contact in found[axis].values:
-            loop = found.sel({axis: contact}).rename(names)
+        loops = self._dataset[[name for name in names if name in self._dataset]]
+        axis = "loop_contact" if "loop_contact" in loops.dims else "contact"
+        if axis in loops.dims and contact in loops[axis].values:
+            loop = loops.sel({axis: contact}).rename(names)
             if loop["force"].notnull().any():
                 first = loop.isel(phase=[0]).assign_coords(phase=loop["phase"][:1] + 2.0 * math.pi)
                 closed = xr.concat(
@@ -141,6 +145,8 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
     """
     if not datasets:
         raise ValueError("There are no results to join.")
+    for dataset in datasets:
+        _require(dataset, "outcome", *_PAIRS)
     in_words = all(ENDED in dataset.coords for dataset in datasets)
     datasets = [dataset.drop_vars(ENDED, errors="ignore") for dataset in datasets]
     if dim is not None:
@@ -159,7 +165,9 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
                 raise ValueError(f"The results have different contact pairs: see {each}.")
     models = {name: array for one in datasets for name, array in one.data_vars.items()}
     gaps: dict[Any, Any] = {name: {"f": math.nan}.get(array.dtype.kind, 0) for name, array in models.items()}
-    gaps |= {name: "" for name, array in models.items() if array.dtype.kind in "OU"} | {"outcome": _NOT_COMPUTED}
+    gaps |= {name: "" for name, array in models.items() if array.dtype.kind in "OU"} | {
+        "outcome": int(Outcome.NOT_COMPUTED)
+    }
     texts = [d for d in axes if first[d].dtype.kind in "OU"]
     as_they_come = {d: list(dict.fromkeys(text for one in datasets for text in one[d].values.tolist())) for d in texts}
     parts = [part.sel(as_they_come) for part in xr.align(*datasets, join="outer", fill_value=gaps)]
@@ -169,7 +177,7 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
         if set(axes) <= set(model.dims):
             taken = blank = xr.full_like(next(part[name] for part in parts if name in part), gaps[name])
             for part in parts:
-                taken = part.get(name, blank).where(part["outcome"] != _NOT_COMPUTED, taken)
+                taken = part.get(name, blank).where(part["outcome"] != Outcome.NOT_COMPUTED, taken)
             model = taken.transpose(*model.dims).assign_attrs(model.attrs)
         joined = joined.assign({name: model})
     common = {key: text for key, text in first.attrs.items() if all(one.attrs.get(key) == text for one in datasets)}
@@ -186,9 +194,9 @@ def _with_axis(dataset: xr.Dataset, key: str) -> xr.Dataset:
         raise ValueError(str(error)) from None
     *table, name = key.split(".")
     tables = {title: keys for title, keys in study.items() if isinstance(keys, dict)}
-    found = [keys[name] for title, keys in tables.items() if name in keys and title in (table or study)]
-    if len(found) != 1 or name in dataset.dims:
+    values = [keys[name] for title, keys in tables.items() if name in keys and title in (table or study)]
+    if len(values) != 1 or name in dataset.dims:
         raise ValueError(f"{key} is not one value in the study of {dataset.attrs.get('title')!r}.")
     expanded = [each for each, array in dataset.data_vars.items() if not str(each).startswith("mesh_")]
-    axis = xr.Variable(name, np.array(found), {"long_name": name.replace("_", " ")})
+    axis = xr.Variable(name, np.array(values), {"long_name": name.replace("_", " ")})
     return dataset.assign({each: dataset[each].expand_dims({name: 1}) for each in expanded}).assign_coords({name: axis})

@@ -68,14 +68,14 @@ def compute_worn_joint(
     with result.dataset:
         if result.has_modes or result.blocks is not None:
             raise UserError(str(path), "kind of study", None, "give a result of wear histories")
-        shown, common = result.shown, _overrides(result)
+        shown, states = result.shown, dict[str, xr.Dataset]()
         last = result.last_reached(shown)
         title = f"worn by {result.cycle_label(last)} at {result.describe(shown, ('frequency', *result.varying))}"
-        given, found = {**common, "scene.worn": _depths(result, shown, last)}, {}
+        keys = {**_overrides(result), "scene.worn": _depths(result, shown, last)}
         if loops:
-            asked = {**given, "outputs.variables": ["response_amplitude"], "outputs.loops": list(loops)}
-            states = _run(result, asked, folder / "worn_joint_loops.nc", progress)
-            found["loops"] = states[["loop_displacement", "loop_force"]].rename(loop_contact="contact")
+            of_loops = {"outputs.variables": ["response_amplitude"], "outputs.loops": list(loops)}
+            computed = _run(result, keys | of_loops, folder / "worn_joint_loops.nc", progress)
+            states["loops"] = computed[["loop_displacement", "loop_force"]].rename(loop_contact="contact")
         if response:
             others = {name: at for name, at in shown.items() if name not in ("frequency", "frequency_ratio")}
             frequencies = result.dataset["frequency"].isel(others, missing_dims="ignore").values.tolist()
@@ -87,31 +87,34 @@ def compute_worn_joint(
                 raise UserError(str(path), "axes.frequency", frequencies[0], remedy)
             if "frequency" in result.varying:
                 # the curve of the new joint is in the file
-                given["scene.worn"] = _depths(result, shown, last, only_last=True)
-            asked = {**given, "axes.frequency_ratio": None, "axes.frequency": frequencies}
-            asked["outputs.variables"] = ["response_amplitude", "response_error"]
-            states = _run(result, asked, folder / "worn_joint_response.nc", progress)
-            found["response"] = states[["response_amplitude", "response_error"]].transpose("cycle", "frequency", ...)
-    return {name: each.assign_attrs(title=title, how=_HOW) for name, each in found.items()}
+                keys["scene.worn"] = _depths(result, shown, last, only_last=True)
+            variables = ["response_amplitude", "response_error"]
+            keys |= {"axes.frequency_ratio": None, "axes.frequency": frequencies, "outputs.variables": variables}
+            computed = _run(result, keys, folder / "worn_joint_response.nc", progress)
+            states["response"] = computed[variables].transpose("cycle", "frequency", ...)
+    return {name: each.assign_attrs(title=title, how=_HOW) for name, each in states.items()}
 
 
 def _overrides(result: Result) -> dict[str, Any]:
     """Keys of a study of the shown point alone, new and without wear."""
-    shown, given = result.shown, dict[str, Any]()
+    shown, keys = result.shown, dict[str, Any]()
     for name in result.axes:
         value = result.dataset[name].values[shown[name]].item()
         if name == "sample":
-            given |= _drawn_inputs(result, shown)
+            keys |= _drawn_inputs(result, shown)
         elif name != "worn_cycle" and not (name == "frequency" and result.followed):
-            given[f"axes.{name}"] = float(value) if name == "rtol" else value
+            keys[f"axes.{name}"] = float(value) if name == "rtol" else value
     if result.followed:
-        given["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
-    return given | _ALONE
+        if not result.has("excitation_frequency"):
+            remedy = result.lacks("excitation_frequency").removesuffix(".")
+            raise UserError(str(result.path), "excitation_frequency", None, remedy)
+        keys["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
+    return keys | _ALONE
 
 
 def _drawn_inputs(result: Result, shown: Mapping[str, int]) -> dict[str, Any]:
     """Keys of the study with what the shown sample has drawn. Raises UserError where each pair has drawn its own."""
-    found = {}
+    keys = {}
     for coordinate, drawn in result.dataset.coords.items():
         name = str(coordinate).removeprefix(DRAWN)
         if str(coordinate).startswith(DRAWN) and name not in WearSection.AXES:
@@ -119,8 +122,8 @@ def _drawn_inputs(result: Result, shown: Mapping[str, int]) -> dict[str, Any]:
             if value.ndim:
                 remedy = "give a result whose samples draw no value for each pair"
                 raise UserError(str(result.path), f"scatter.{name}", Verbatim("drawn for each pair"), remedy)
-            found[f"{'axes' if name in AxesSection.model_fields else 'scene'}.{name}"] = float(value)
-    return found
+            keys[f"{'axes' if name in AxesSection.model_fields else 'scene'}.{name}"] = float(value)
+    return keys
 
 
 def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: bool = False) -> dict[str, Any]:
@@ -130,11 +133,11 @@ def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: b
     depth = depths(result, shown)[:, pairs_of_scene(result, shown)]
     if result.has("worn_depth"):
         depth = depth + result.dataset["worn_depth"].isel(shown, missing_dims="ignore").values
-    kept = [last] if only_last or last == 0 or np.isnan(depth[0]).any() else [0, last]
-    cycles = result.cycles[kept]
+    places = [last] if only_last or last == 0 or np.isnan(depth[0]).any() else [0, last]
+    cycles = result.cycles[places]
     if not np.isfinite(cycles).all():
         return {"depth": [depth[last].tolist()]}
-    return {"depth": depth[kept].tolist(), "cycle": cycles.tolist()}
+    return {"depth": depth[places].tolist(), "cycle": cycles.tolist()}
 
 
 def _run(result: Result, overrides: Mapping[str, object], output: Path, progress: bool) -> xr.Dataset:
@@ -142,10 +145,9 @@ def _run(result: Result, overrides: Mapping[str, object], output: Path, progress
     study = read_study(result.path, overrides)
     output.parent.mkdir(parents=True, exist_ok=True)
     with run_study(study, output, overwrite=True, progress=progress) as dataset:
-        points = dataset["outcome"].dims
-        single = [axis for axis in points if axis not in ("worn_cycle", "frequency") or dataset.sizes[axis] == 1]
-        kept = dataset.load().isel({axis: 0 for axis in single if axis != "worn_cycle"}, drop=True)
-    states = kept.isel(cycle=0, drop=True)
+        axes = [axis for axis in dataset["outcome"].dims if axis != "worn_cycle"]
+        single = [axis for axis in axes if axis != "frequency" or dataset.sizes[axis] == 1]
+        states = dataset.load().isel(dict.fromkeys((*single, "cycle"), 0), drop=True)
     if "worn_cycle" not in states.dims:
         states = states.expand_dims(worn_cycle=[result.cycles[-1]])
     return states.rename(worn_cycle="cycle")

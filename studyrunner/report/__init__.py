@@ -1,1 +1,1 @@
-"""Figures and the HTML page of a result file. Reads the file alone: no study, no scene, no solver."""
+"""Figures and the HTML page of a result file. Reads the file alone: no study, no scene."""

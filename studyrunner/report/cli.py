@@ -7,17 +7,16 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from studyrunner.system.process import keep_talking, raise_ending, take_endings
+from studyrunner.system.process import keep_talking, take_endings
 from studyrunner.user_error import StorageError, UserError
 
 if TYPE_CHECKING:
-    from studyrunner.report.drawing import Item
     from studyrunner.result.view import Result
 
 WRITTEN, UNEXPECTED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # exit statuses
@@ -54,8 +53,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("result", metavar="OUT.nc", type=Path, help="result file of run-study")
     add("-o", dest="folder", metavar="FOLDER", type=Path, help="where to write (default: OUT-report, here)")
     which = "the point that root, maps, loops and --vtu show (default: the most worn one)"
-    add("--point", metavar="AXIS=VALUE,...", type=_read_point, default={}, help=which)
-    add("--loops", metavar="PAIR,...", type=_read_pairs, default=(), help="compute fretting loops of these pairs")
+    add("--point", metavar="AXIS=VALUE,...", type=axis_values, default={}, help=which)
+    add("--loops", metavar="PAIR,...", type=pair_numbers, default=(), help="compute fretting loops of these pairs")
     scar = "measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)"
     add("--measured", metavar="PROFILE.csv", type=Path, help=scar)
     add("--no-compute", help="draw what the file holds, without the response of a worn joint", **flag)
@@ -63,21 +62,15 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(list(arguments))
 
 
-def _read_point(text: str) -> dict[str, str]:
-    """Values of axes, as text. Raises UserError."""
-    parts = [part.strip().partition("=") for part in text.split(",") if part.strip()]
-    for name, equals, _ in parts:
-        if not equals:
-            raise UserError("command line", "--point", name, "give AXIS=VALUE, as frequency=211.75")
-    return {name.strip(): value.strip() for name, _, value in parts}
+def axis_values(text: str) -> dict[str, str]:
+    """Values of axes, as text, from AXIS=VALUE,... ValueError: it is none."""
+    pairs = (part.split("=") for part in text.split(","))
+    return {name.strip(): value.strip() for name, value in pairs}
 
 
-def _read_pairs(text: str) -> tuple[int, ...]:
-    """Numbers of contact pairs. Raises UserError."""
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError:
-        raise UserError("command line", "--loops", text, "give numbers of contact pairs, as 25,26") from None
+def pair_numbers(text: str) -> tuple[int, ...]:
+    """Numbers of contact pairs, from PAIR,... ValueError: it is none."""
+    return tuple(int(part) for part in text.split(","))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -107,8 +100,8 @@ def _report(options: argparse.Namespace) -> int:
     # Loaded late: help and mistakes on the command line do not wait for the libraries that draw.
     began = time.monotonic()
     from studyrunner.report.contents import draw_report
-    from studyrunner.report.page.page import write_page
-    from studyrunner.report.vtu import SERIES, find_writer
+    from studyrunner.report.page import write_page
+    from studyrunner.report.root import SERIES, find_writer
     from studyrunner.result.opening import reading_errors
     from studyrunner.result.pairs import read_profile
     from studyrunner.result.view import open_for_report
@@ -119,22 +112,19 @@ def _report(options: argparse.Namespace) -> int:
     with result.dataset, reading_errors(str(options.result)):
         write_series = find_writer(result) if options.vtu else None
         folder = options.folder or Path(f"{options.result.stem}-report")
-        _make_folder(folder)
+        with _writing_errors(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            trial = folder / f".index.html.{os.getpid()}.partial"
+            trial.touch()
+            trial.unlink()
         result, page = _compute(result, folder, options), folder / "index.html"
         with _writing_errors(folder):
-            shown = write_page(result, _until_ended(draw_report(result)), page)
+            shown = write_page(result, draw_report(result), page)
             n_files = write_series(folder) if write_series else 0
     print(f"{page}: {shown}, {format_seconds(time.monotonic() - began)}; open it in a browser")
     if options.vtu:
         print(f"{folder / SERIES}: time series of {count(n_files, 'VTU file')}; open it in ParaView")
     return WRITTEN
-
-
-def _until_ended(items: Iterable[Item]) -> Iterator[Item]:
-    """The items, until the process is ended from outside."""
-    for item in items:
-        raise_ending()
-        yield item
 
 
 def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Result:
@@ -151,15 +141,6 @@ def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Resul
             # a report of what there is, where the scene is gone or the file has no depths
             why = str(error)
     return replace(result, recomputed=recomputed, no_worn_response=why)
-
-
-def _make_folder(folder: Path) -> None:
-    """The folder, after a try whether files can be written into it. Raises UserError."""
-    with _writing_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        trial = folder / f".index.html.{os.getpid()}.partial"
-        trial.touch()
-        trial.unlink()
 
 
 @contextmanager

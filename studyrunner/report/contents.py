@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, as_sentences, style
+from studyrunner.report import drawing as plot
+from studyrunner.report.drawing import Drawing, Drawn, Item, Missing, Table, as_sentences
 from studyrunner.report.figures import pairs, points, precision, response, root, wear
-from studyrunner.report.panels import add_legend
 from studyrunner.report.selection import course_axis
 from studyrunner.result.pairs import OF_PAIRS, of_shown_scene
 from studyrunner.result.view import Result
@@ -35,8 +35,6 @@ CAPTIONS = {
     "final_worn_volume": f"{_OTHERS}. Bars: estimated errors; of a point that ended early, what was worn by then",
     "worn_volume_map": f"{_OTHERS}. Hatched: no result",
     "wear_rate_map": f"{_OTHERS}. Hatched: no result",
-    "response_after_own_wear": "Each mark is another joint, which wore at its own frequency: the marks are no response"
-    " curve. That they are low where the new joint resonates does not mean that wear protects",
     "excitation_frequency": _BANDS,
     "trends": "Bars: estimated errors",
     "wear_depth": "Of both surfaces together",
@@ -78,7 +76,7 @@ class Entry:
         title = self.title.format(slow=result.counted, over=axis.replace("_", " ")).removesuffix(" (table)")
         shown = of_shown_scene(result, self.scene) if self.scene else result
         needs = (*self.needs, *(self.of if isinstance(self.of, dict) else ()))
-        drawn = result.lacks(*needs) or self._drawn(shown, WIDTH)
+        drawn = result.lacks(*needs) or self._drawn(shown, plot.WIDTH)
         if drawn is None:
             return None
         if isinstance(drawn, str):
@@ -90,14 +88,14 @@ class Entry:
             return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, how))
         figure, *notes = drawn
         caption = as_sentences(*notes, how)
-        return Drawing(self.name, title, caption, figure, lambda: cast("Any", self._drawn(shown, COLUMN_WIDTH))[0])
+        return Drawing(self.name, title, caption, figure, lambda: cast("Any", self._drawn(shown, plot.COLUMN_WIDTH))[0])
 
     def _drawn(self, result: Result, width: float) -> Drawn:
         # the style is that of the whole process: the caller does not run with it
-        with style(width):
+        with plot.style(width):
             drawn = self.draw(result) if self.of is None else self.draw(result, self.of)
             if isinstance(drawn, tuple) and not drawn[0].legends:
-                add_legend(drawn[0])
+                plot.add_legend(drawn[0])
         return drawn
 
 
@@ -128,29 +126,11 @@ FIGURES = (
     Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, needs=_WORN, at="course"),
     Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, needs=_WORN),
     Entry("worn_volume_map", "Worn volume over {over} and {slow}", wear.draw_map, "worn_volume", needs=_WORN),
-    Entry(
-        "wear_rate_map",
-        "Wear rate over {over} and {slow}",
-        wear.draw_map,
-        "wear_rate",
-        needs=("worn_volume", "wear_rate"),
-    ),
+    Entry("wear_rate_map", "Wear rate over {over} and {slow}", wear.draw_map, "wear_rate", needs=(*_WORN, "wear_rate")),
     Entry("frequency_response", "Frequency response of one joint, new and worn", response.draw_responses, **_RESPONSE),
-    Entry(
-        "response_after_own_wear",
-        "Response of different joints, each after wear at its own frequency",
-        response.draw_after_wear,
-        **_RESPONSE,
-    ),
-    Entry(
-        "excitation_frequency",
-        "Frequency of an excitation that follows the resonance",
-        wear.draw_excitation,
-        kinds=_OF_WEAR,
-    ),
+    Entry("excitation_frequency", "Frequency of the followed resonance", wear.draw_excitation, kinds=_OF_WEAR),
     Entry("trends", "Trends along the axes of the study", points.draw_trends),
     Entry("worn_root", "The worn root", root.draw_root, **_ONE),
-    Entry("whole_disk", "The whole disk", root.draw_disk, scene=OF_PAIRS),
     Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, **_ONE),
     Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, **_ONE),
     Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, needs=("mean_pressure",), **_LOOPS),

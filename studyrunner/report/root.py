@@ -1,18 +1,23 @@
-"""The mesh of a scene in three dimensions: outer faces of the bodies, the contact pairs on them, and views of both.
+"""The mesh of a scene in three dimensions: outer faces of bodies, contact pairs on them, views of both, and VTU files.
 
 A result file holds outer faces and positions of pairs, but not which face belongs to which pair: faces all of whose
 corners are nodes at which pairs stand are in contact. Where the meshes of two bodies do not match, those are the faces
 of one of them.
 
-By hand: `mplot3d` leaves a wide margin, and draws both sides of a face alike.
+By hand: `mplot3d` leaves a wide margin, and draws both sides of a face alike; the PVD file is a few lines.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,10 +28,17 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from studyrunner.result.pairs import contact_pairs
+from studyrunner.result.pairs import contact_pairs, depths, has_depths, of_shown_scene
 from studyrunner.result.view import Result
+from studyrunner.user_error import UserError, Verbatim
 
 MESH = ("mesh_x", "mesh_y", "mesh_z", "mesh_quad")
+
+FIELDS = ("wear_depth", "mean_pressure", "slip_range", "open_fraction")
+"""Variables of the contact pairs that the files hold at the nodes in contact, where the result has them."""
+
+SERIES = "root.pvd"
+"""Name of the PVD file; the VTU files are in the folder vtu beside it."""
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -50,8 +62,8 @@ class RootSurface:
 
     nodes (n_nodes, 3): m. faces (n_faces, 4): nodes anticlockwise from outside; triangles repeat their last one.
     body (n_faces,): index into `bodies`, whose faces hang together by their nodes. flank (n_faces,): index into
-    `flanks`, the labels of the contact surfaces, -1 for faces not in contact. own (n_own,): nodes of the faces in
-    contact, ascending; pairs (n_own,): the contact pair at each, normals (n_own, 3): unit vectors out of the body.
+    `flanks`, the labels of the contact surfaces, -1 for faces not in contact. contact_nodes (n,): nodes of the faces in
+    contact, ascending; pairs (n,): the contact pair at each, normals (n, 3): unit vectors out of the body.
     """
 
     nodes: Floats
@@ -60,32 +72,32 @@ class RootSurface:
     bodies: tuple[str, ...]
     flank: Places
     flanks: tuple[str, ...]
-    own: Places
+    contact_nodes: Places
     pairs: Places
     normals: Floats
 
     def worn(self, depth: Floats, factor: float) -> Floats:
         """Nodes (n_nodes, 3), m, with the wear depth (n_contact,), m, times a factor taken off both surfaces."""
         worn = self.nodes.copy()
-        worn[self.own] -= factor * np.nan_to_num(depth[self.pairs])[:, None] * self.normals
+        worn[self.contact_nodes] -= factor * np.nan_to_num(depth[self.pairs])[:, None] * self.normals
         return worn
 
     def near_contact(self, most_faces: int) -> RootSurface:
         """The surface with at most so many faces: those in contact, and those nearest to them."""
         if len(self.faces) <= most_faces:
             return self
-        distance, _ = cKDTree(self.nodes[self.own]).query(self.nodes[self.faces].mean(axis=1))
+        distance, _ = cKDTree(self.nodes[self.contact_nodes]).query(self.nodes[self.faces].mean(axis=1))
         order = np.argsort(np.where(self.flank >= 0, -1.0, distance), kind="stable")
         kept = np.sort(order[: max(most_faces, int((self.flank >= 0).sum()))])
         used, places = np.unique(self.faces[kept], return_inverse=True)
-        faces, own = places.reshape(-1, _CORNERS), np.searchsorted(used, self.own)
+        faces, touching = places.reshape(-1, _CORNERS), np.searchsorted(used, self.contact_nodes)
         of_faces: dict[str, Any] = {"faces": faces, "body": self.body[kept], "flank": self.flank[kept]}
-        return replace(self, nodes=self.nodes[used], own=own, **of_faces)
+        return replace(self, nodes=self.nodes[used], contact_nodes=touching, **of_faces)
 
     @property
     def well_seen(self) -> float:
         """Depth, m, that is well seen beside the size of the contact surfaces."""
-        return _DEEPEST * float(np.linalg.norm(np.ptp(self.nodes[self.own], axis=0)))
+        return _DEEPEST * float(np.linalg.norm(np.ptp(self.nodes[self.contact_nodes], axis=0)))
 
     def exaggeration(self, deepest: float) -> float:
         """Factor 1, 2 or 5 times a power of ten with which a depth, m, is well seen; 1 where nothing is worn."""
@@ -116,9 +128,9 @@ def read_root(result: Result) -> RootSurface | None:
     _, component = connected_components(joined, directed=False)
     _, first, body = np.unique(component[faces[:, 0]], return_index=True, return_inverse=True)
     body = np.argsort(np.argsort(first))[body].astype(np.int64)
-    found, own, at, normals = _find_contact_faces(nodes, faces, pairs.position, flank)
+    flank, touching, at, normals = _find_contact_faces(nodes, faces, pairs.position, flank)
     names = _name_bodies(body, parts)
-    return RootSurface(nodes, faces, body, names, found, flanks, own, at, normals) if own.size else None
+    return RootSurface(nodes, faces, body, names, flank, flanks, touching, at, normals) if touching.size else None
 
 
 def read_mesh(result: Result) -> tuple[Floats, Places, NDArray[np.str_]]:
@@ -148,16 +160,16 @@ def face_normals(nodes: Floats, faces: Places) -> Floats:
 def _find_contact_faces(
     nodes: Floats, faces: Places, positions: Floats, flank: Places
 ) -> tuple[Places, Places, Places, Floats]:
-    """`flank`, `own`, `pairs` and `normals` of a surface. flank (n_contact,): contact surface of each pair."""
+    """`flank`, `contact_nodes`, `pairs`, `normals` of a surface. flank (n_contact,): contact surface of each pair."""
     distance, nearest = cKDTree(positions).query(nodes)
     stands = distance <= _SAME * np.linalg.norm(np.ptp(nodes, axis=0))
-    found = np.where(stands[faces].all(axis=1), flank[nearest[faces[:, 0]]], -1)
-    found[(flank[nearest[faces]] != found[:, None]).any(axis=1)] = -1
-    touching, normals = faces[found >= 0], np.zeros_like(nodes)
+    of_faces = np.where(stands[faces].all(axis=1), flank[nearest[faces[:, 0]]], -1)
+    of_faces[(flank[nearest[faces]] != of_faces[:, None]).any(axis=1)] = -1
+    touching, normals = faces[of_faces >= 0], np.zeros_like(nodes)
     np.add.at(normals, touching, face_normals(nodes, touching)[:, None, :])
-    own = np.unique(touching)
-    normals = normals[own] / np.maximum(np.linalg.norm(normals[own], axis=1, keepdims=True), 1e-300)
-    return found, own, nearest[own], normals
+    used = np.unique(touching)
+    normals = normals[used] / np.maximum(np.linalg.norm(normals[used], axis=1, keepdims=True), 1e-300)
+    return of_faces, used, nearest[used], normals
 
 
 # --- from where it is looked at ---
@@ -167,8 +179,7 @@ def _find_contact_faces(
 class View:
     """Faces that are seen and the direction they are seen from.
 
-    title: in words. faces (n_faces,): which are seen. to_eye, up (3,): unit vectors. body: the one in the view, -1 for
-    all.
+    title: in words. faces (n_faces,): which are seen. to_eye, up (3,): unit vectors. body: the one in the view, or -1.
     """
 
     title: str
@@ -177,28 +188,20 @@ class View:
     up: Floats
     body: int = -1
 
-    @property
-    def frame(self) -> tuple[Floats, Floats, Floats]:
-        """Unit vectors to the right and upwards on paper, and to the eye."""
-        up = self.up - (self.up @ self.to_eye) * self.to_eye
-        up /= np.linalg.norm(up)
-        return np.cross(up, self.to_eye), up, self.to_eye
-
     def seen(self, places: Floats) -> Floats:
         """Places (..., 3), m, on paper (..., 2), mm."""
-        right, up, _ = self.frame
-        return 1e3 * np.stack([places @ right, places @ up], axis=-1)
+        up = self.up - (self.up @ self.to_eye) * self.to_eye
+        up /= np.linalg.norm(up)
+        return 1e3 * np.stack([places @ np.cross(up, self.to_eye), places @ up], axis=-1)
 
 
 def find_views(surface: RootSurface) -> tuple[View, ...]:
     """Close-ups of the contact surfaces of the outermost body, then the whole."""
     up, contact = _upwards(surface.nodes), surface.flank >= 0
     # outermost by where it is along the direction upwards
-    height = {
-        body: float((surface.nodes[np.unique(surface.faces[surface.body == body])] @ up).mean())
-        for body in np.unique(surface.body[contact]).tolist()
-    }
-    outer = max(height, key=lambda body: height[body])
+    bodies = np.unique(surface.body[contact]).tolist()
+    nodes = [surface.nodes[np.unique(surface.faces[surface.body == body])] for body in bodies]
+    outer = bodies[int(np.argmax([(each @ up).mean() for each in nodes]))]
     flanks = np.unique(surface.flank[(surface.body == outer) & contact]).tolist()[:_MOST_CLOSE_UPS]
     return (*(_close_up(surface, outer, flank, up) for flank in flanks), from_aslant(surface.nodes, len(surface.faces)))
 
@@ -213,9 +216,9 @@ def from_aslant(nodes: Floats, n_faces: int) -> View:
 
 def _close_up(surface: RootSurface, body: int, flank: int, up: Floats) -> View:
     """The faces of a body around its contact surfaces, without those that stand before the one looked at."""
-    own = surface.body == body
-    inside = surface.nodes[np.unique(surface.faces[own & (surface.flank >= 0)])]
-    looked_at = own & (surface.flank == flank)
+    of_body = surface.body == body
+    inside = surface.nodes[np.unique(surface.faces[of_body & (surface.flank >= 0)])]
+    looked_at = of_body & (surface.flank == flank)
     normal = face_normals(surface.nodes, surface.faces[looked_at]).sum(axis=0)
     normal /= max(float(np.linalg.norm(normal)), 1e-300)
     size = float(np.linalg.norm(np.ptp(inside, axis=0)))
@@ -232,7 +235,7 @@ def _close_up(surface: RootSurface, body: int, flank: int, up: Floats) -> View:
         aside, up = np.cross(other, normal), other
     to_eye = normal + _ASLANT * aside / np.linalg.norm(aside) + _FROM_ABOVE * up
     title = f"{surface.bodies[body]}: {surface.flanks[flank] or 'contact'}"
-    return View(title, own & near & behind | looked_at, to_eye / np.linalg.norm(to_eye), up, body)
+    return View(title, of_body & near & behind | looked_at, to_eye / np.linalg.norm(to_eye), up, body)
 
 
 def _upwards(nodes: Floats) -> Floats:
@@ -256,7 +259,7 @@ def rgb(names: tuple[str, ...], which: Places) -> Floats:
     return np.array([to_rgb(colour) for colour in body_colours(names)])[which]
 
 
-def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View, *, lines: float = 0.2) -> None:
+def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View) -> None:
     """Faces (n, 4) with colours (n, 3) as seen in a view, in mm; inner sides, where a mesh is cut, are grey."""
     order = np.argsort(nodes[faces].mean(axis=1) @ view.to_eye, kind="stable")
     normals = face_normals(nodes, faces)
@@ -265,10 +268,8 @@ def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view
     painted = PolyCollection(
         list(view.seen(nodes)[faces[order]]),
         facecolors=lit[order],
-        edgecolors="0.25" if lines else "none",
-        linewidths=lines,
-        # smooth edges of neighbouring faces would let what is behind them shine through
-        antialiaseds=lines > 0.0,
+        edgecolors="0.25",
+        linewidths=0.2,
         rasterized=True,
     )
     panel.add_collection(painted)
@@ -289,3 +290,59 @@ def draw_scale_bar(panel: Axes, nodes: Floats, view: View) -> None:
     panel.plot([low[0], low[0] + length], [bottom, bottom], color="0.1", linewidth=2.5, label="_")
     panel.text(middle, bottom - 0.02 * size, f"{length:g} mm", ha="center", va="top")
     panel.set_ylim(bottom - 0.1 * size, high[1] + 0.02 * size)
+
+
+# --- for ParaView ---
+
+
+def find_writer(result: Result) -> Callable[[Path], int]:
+    """What writes the series into a folder. Raises UserError without the library, or without anything to draw."""
+    if find_spec("meshio") is None:
+        remedy = "install the library: pip install meshio"
+        raise UserError("command line", "--vtu", Verbatim("needs meshio, which is not installed"), remedy)
+    result = of_shown_scene(result)
+    surface = None if result.has_modes else read_root(result)
+    if surface is None:
+        remedy = "leave it out: the result has no mesh, no positions of its contact pairs, or no slow time"
+        raise UserError("command line", "--vtu", Verbatim("nothing to draw"), remedy)
+    return partial(write_series, result, surface)
+
+
+def write_series(result: Result, surface: RootSurface, folder: Path) -> int:
+    """Writes `SERIES` and `vtu/root_<number>.vtu`, one for each cycle count at which the shown point holds values.
+
+    Points are those of the mesh before wear, m. At the points: `FIELDS` with their units in the name, as
+    "wear_depth (m)", NaN where there is no contact; "worn_displacement (m)", of 3 components, from there to the worn
+    surface, which ParaView's filter "Warp By Vector" exaggerates. Of the faces: `body` and `contact_surface`, numbers
+    in the order of the file, -1 where there is no contact. The time of the series is the cycle count.
+
+    Returns the number of VTU files. Raises OSError where a file cannot be written.
+    """
+    import meshio
+
+    shown, at_points = result.shown, dict[str, Floats]()
+    fields = {"wear_depth": depths(result, shown)} if has_depths(result) else {}
+    fields |= {name: result.at(name, shown).values for name in FIELDS if name not in fields and result.has(name)}
+    units = {name: str(result.dataset[name].attrs.get("units", "1")) if result.has(name) else "m" for name in fields}
+    at_faces = {"body": [surface.body], "contact_surface": [surface.flank]}
+    (folder / "vtu").mkdir(exist_ok=True)
+    for old in (folder / "vtu").glob("root_*.vtu"):
+        old.unlink()
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    collection = ElementTree.SubElement(root, "Collection")
+    known = np.flatnonzero(np.all([np.isfinite(values).all(axis=1) for values in fields.values()], axis=0))
+    for place, number in enumerate(known.tolist()):
+        for field, values in fields.items():
+            at_nodes = np.full(len(surface.nodes), np.nan)
+            at_nodes[surface.contact_nodes] = values[number][surface.pairs]
+            at_points[field if units[field] == "1" else f"{field} ({units[field]})"] = at_nodes
+        if "wear_depth" in fields:
+            at_points["worn_displacement (m)"] = surface.worn(fields["wear_depth"][number], 1.0) - surface.nodes
+        # a triangle is a quadrilateral that repeats its last node
+        mesh = meshio.Mesh(surface.nodes, [("quad", surface.faces)], point_data=at_points, cell_data=at_faces)
+        name, count = f"vtu/root_{place:04d}.vtu", repr(float(result.cycles[number]))
+        meshio.vtu.write(folder / name, mesh)
+        ElementTree.SubElement(collection, "DataSet", timestep=count, group="", part="0", file=name)
+    ElementTree.indent(root)
+    ElementTree.ElementTree(root).write(folder / SERIES, encoding="utf-8", xml_declaration=True)
+    return len(known)

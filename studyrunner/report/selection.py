@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from studyrunner.report.panels import FloatArray, line_style, set_log
+from studyrunner.report.drawing import FloatArray, line_style, set_log
 from studyrunner.result.view import Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.units import Scale, scale_for, units_of
@@ -61,26 +62,30 @@ class Course:
     logarithmic: whether to draw it so, as what spans decades is.
     """
 
+    result: Result
     axis: str
     index: NDArray[np.intp]
     values: FloatArray
     label: str
     logarithmic: bool
 
-    def read(self, result: Result, name: str, point: Mapping[str, int]) -> FloatArray:
-        """A variable along the course, at a point whose index along it does not matter: (n, what follows the axes)."""
-        where = {axis: place for axis, place in point.items() if axis != self.axis}
-        values = result.dataset[name].isel(where).transpose(self.axis, ...).values
-        return np.asarray(values, dtype=float)[self.index]
+    def choose(self, limit: int, **options: Any) -> Choice:
+        """`choose` with a line over the course for each combination of the other axes."""
+        return choose(self.result, [self.axis], limit, **options)
 
-    def along(self, result: Result, flags: NDArray[np.bool_], point: Mapping[str, int]) -> NDArray[np.bool_]:
-        """Flags (axes...) of points along the course (n,)."""
-        index = tuple(slice(None) if name == self.axis else point[name] for name in result.axes)
-        return np.asarray(flags[index][self.index])
+    def read(self, values: str | NDArray[Any], *points: Mapping[str, int]) -> FloatArray:
+        """A variable, or values (axes...), along the course: (n_points, n, what follows the axes).
 
-    def at(self, result: Result, place: int) -> str:
+        points: of which the index along the course does not matter.
+        """
+        array = self.result.dataset[values] if isinstance(values, str) else xr.DataArray(values, dims=self.result.axes)
+        others = [{name: index for name, index in point.items() if name != self.axis} for point in points]
+        lines = [array.isel(each).transpose(self.axis, ...).values[self.index] for each in others]
+        return np.array(lines, dtype=float)
+
+    def at(self, place: int) -> str:
         """A place of the course in words."""
-        return result.describe({self.axis: int(self.index[place])}, [self.axis])
+        return self.result.describe({self.axis: int(self.index[place])}, [self.axis])
 
     @property
     def edges(self) -> FloatArray:
@@ -91,8 +96,8 @@ class Course:
 
     def line_style(self, number: int) -> dict[str, Any]:
         """Style of a line over the course: a marker at each point, small where there are many."""
-        found = line_style(number)
-        return found | {"markersize": 0.5 * found["markersize"]} if self.values.size > _MANY else found
+        style = line_style(number)
+        return style | {"markersize": 0.5 * style["markersize"]} if self.values.size > _MANY else style
 
     def set_axis(self, panel: Axes) -> None:
         """Label and scale of a horizontal axis."""
@@ -119,7 +124,7 @@ def find_course(result: Result, axis: str | None = None) -> Course | None:
     scale, index = scale_for(units_of(result.dataset[axis]), values), np.argsort(values, kind="stable")
     shown = scale(values[index])
     text = "excitation frequency" if axis == "frequency" else axis.replace("_", " ")
-    return Course(axis, index, shown, scale.label(text), axis != "frequency" and spans_decades(shown))
+    return Course(result, axis, index, shown, scale.label(text), axis != "frequency" and spans_decades(shown))
 
 
 def spans_decades(rising: FloatArray) -> bool:

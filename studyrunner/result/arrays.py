@@ -32,20 +32,17 @@ _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "
 def attributes(name: str, entry: Variable) -> dict[str, object]:
     """Attributes of a variable of the file."""
     content = "coordinate" if name in COORDINATES else entry.content
-    found: dict[str, object] = {"units": entry.units, "long_name": entry.long_name, "coverage_content_type": content}
-    comment = entry.comment
-    if name in ASKED and "cycle" in entry.dimensions and not entry.dtype.startswith("float"):
-        comment = " ".join(filter(None, (comment, "0 where there is no result, see last_cycle.")))
-    if comment:
-        found["comment"] = comment
-    if entry.flags:
-        found["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
-        found["flag_meanings"] = " ".join(entry.flags)
+    about: dict[str, object] = {"units": entry.units, "long_name": entry.long_name, "coverage_content_type": content}
+    has_gaps = name in ASKED and "cycle" in entry.dimensions and not entry.dtype.startswith("float")
+    gaps = "0 where there is no result, see last_cycle." if has_gaps else ""
+    if comment := f"{entry.comment} {gaps}".strip():
+        about["comment"] = comment
+    if flags := [outcome.meaning for outcome in Outcome] if name == "outcome" else entry.flags:
+        about["flag_values"] = np.array(list(Outcome) if name == "outcome" else range(len(flags)), dtype=entry.dtype)
+        about["flag_meanings"] = " ".join(flags)
     if name == "outcome":
-        found["flag_values"] = np.array(list(Outcome), dtype=entry.dtype)
-        found["flag_meanings"] = " ".join(flag.meaning for flag in Outcome)
-        found["sentences"] = "\n".join(flag.sentence for flag in Outcome)
-    return found
+        about["sentences"] = "\n".join(outcome.sentence for outcome in Outcome)
+    return about
 
 
 def small_arrays(

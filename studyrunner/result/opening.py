@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.text import check_result_file, read_toml
-from studyrunner.user_error import UserError, Verbatim, show_text
+from studyrunner.user_error import UserError, Verbatim, WrongValueError, show_text
 from studyrunner.variables import (
     ASKED,
     CERTIFICATE,
@@ -46,8 +47,8 @@ _LARGEST_NUMBER = 1e30
 _INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", "sweep_rate", *CERTIFICATE)
 """Ends of the names of variables that may be infinite: errors not known, after any cycle, rates without damping."""
 _LONGEST = 400  # characters of a text
-_LONG = ("study", "sentences", "flag_meanings")
-_OF_VARIABLES = ("units", "long_name", "flag_meanings", "sentences", "flag_values")  # attributes for the report
+_LONG = ("study", "flag_meanings")
+_OF_VARIABLES = ("units", "long_name", "flag_meanings", "flag_values")  # attributes for the report
 _REMEDY = "give a result file of run-study that is whole"
 
 _OF_SCENE = SCENE["mesh"] | SCENE["natural_frequency"]
@@ -63,8 +64,6 @@ _LIKE_CYCLES = {
     "missions_to_target": "cycles_to_target",
     "missions_to_target_error": "cycles_to_target_error",
 }
-
-_Need = Callable[[object, str, str], None]
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -83,17 +82,21 @@ def open_result(path: str | Path) -> xr.Dataset:
     opened = _open(path)[0]
     # without axes of one value, which would leave no room for the words where the dataset is printed
     result = opened.assign_coords({ENDED: outcome_words(opened["outcome"]).squeeze(drop=True)})
-    loops = [name for name in LOOPS if name in opened]
-    asked = study_tables(opened.attrs).get("outputs", {}).get("loops")
-    pairs = [pair for pair in opened["contact"].values.tolist() if isinstance(asked, list) and pair in asked]
-    if loops and pairs:
+    names, pairs = [name for name in LOOPS if name in opened], pairs_with_loops(opened)
+    if names and pairs:
         others = [name for name, array in result.coords.items() if "contact" in array.dims and name != "contact"]
-        own = result[loops].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
-        own["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are stored, see outputs.loops"
-        result = result.drop_vars(loops).assign(own.data_vars)
+        loops = result[names].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
+        loops["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are stored, see outputs.loops"
+        result = result.drop_vars(names).assign(loops.data_vars)
     result.encoding = opened.encoding
     result.set_close(opened.close)
     return result
+
+
+def pairs_with_loops(dataset: xr.Dataset) -> list[int]:
+    """Contact pairs of a file whose loops its study has asked for."""
+    listed = study_tables(dataset.attrs).get("outputs", {}).get("loops")
+    return [pair for pair in dataset["contact"].values.tolist() if isinstance(listed, list) and pair in listed]
 
 
 def open_known(path: str | Path) -> xr.Dataset:
@@ -133,9 +136,9 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
     """
     history, blocks = dataset, None
     if "response" in dataset.coords:
-        own = np.char.endswith(dataset["response"].values.astype(str), "]")
-        if own.any() and not own.all():
-            history = history.isel(response=np.flatnonzero(~own))
+        has_unit = np.char.endswith(dataset["response"].values.astype(str), "]")
+        if has_unit.any() and not has_unit.all():
+            history = history.isel(response=np.flatnonzero(~has_unit))
     if "block" in dataset.dims:
         renamed = history.rename({name: new for name, new in _LIKE_CYCLES.items() if name in history.variables})
         of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
@@ -146,40 +149,31 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
     return history, blocks
 
 
-def find_value(dataset: xr.Dataset, name: str, text: str) -> float | str:
-    """The value of an axis as it is in a file, from its text on the command line. Raises UserError."""
-    axes = [str(axis) for axis in dataset["outcome"].dims]
-    remedy = f"give one of the axes {', '.join(axes)}"
-    if name in axes:
-        values = dataset[name].values.tolist()
-        for value in values:
-            with suppress(TypeError, ValueError):
-                if value == text or math.isclose(value, float(text), rel_tol=1e-9):
-                    return value  # type: ignore[no-any-return]
-        remedy = f"give one of the values of {name}: {', '.join(map(str, values[:12]))}"
-        remedy += ", ..." if len(values) > 12 else ""
-    raise UserError("command line", "--point", f"{name}={text}", remedy)
-
-
 @contextmanager
 def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
     """Turns errors of the libraries about a damaged file into UserError; every: all errors, of a block that reads."""
     try:
         yield
-    except UserError:
-        raise
+    except WrongValueError as error:
+        raise UserError(source, str(error.key), error.value, error.remedy) from None
     except Exception as error:
-        if every or (isinstance(error, OSError | RuntimeError) and "NetCDF:" in str(error)):
+        of_library = isinstance(error, OSError | RuntimeError) and "NetCDF:" in str(error)
+        if (every or of_library) and not isinstance(error, UserError):
             raise UserError(source, "the file", Verbatim("damaged"), _REMEDY) from error
         raise
 
 
+def describe_outcome(number: int) -> tuple[str, str]:
+    """Word and sentence of an outcome; the number, where it is one of a later version."""
+    if number not in list(Outcome):
+        return f"outcome_{number}", f"outcome {number}"
+    return Outcome(number).meaning, Outcome(number).sentence
+
+
 def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
-    """How each point ended, as a word of the attribute `flag_meanings` of `outcome`."""
-    numbers = np.atleast_1d(outcome.attrs.get("flag_values", ())).tolist()
-    words = dict(zip(numbers, str(outcome.attrs.get("flag_meanings", "")).split(), strict=False))
-    named = [words.get(number, f"outcome_{number}") for number in outcome.values.ravel().tolist()]
-    values = np.array(named, dtype=np.str_).reshape(outcome.shape)
+    """How each point ended, in a word."""
+    words = [describe_outcome(number)[0] for number in outcome.values.ravel().tolist()]
+    values = np.array(words, dtype=np.str_).reshape(outcome.shape)
     attributes = {"units": "1", "long_name": "how the computation of the point ended, in a word"}
     return xr.DataArray(values, outcome.coords, outcome.dims, attrs=attributes)
 
@@ -192,35 +186,28 @@ def study_tables(attributes: Mapping[str, object]) -> dict[str, dict[str, object
     return {}
 
 
+# --- the check of a file ---
+
+
 def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     """Variables of a file that the report knows, their texts cleaned. Only coordinates, texts and the mesh are read.
 
     source: name of the file for the user. Raises UserError where a variable is missing, or has a wrong shape or type.
     """
-
-    def need(right: object, name: str, found: str) -> None:
-        if not right:
-            raise UserError(source, name, Verbatim(found), _REMEDY)
-
-    slow = "mission" if "mission" in dataset.dims else "cycle"
-    lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
-    if lacking:
-        raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
-    axes = tuple(map(str, dataset["outcome"].dims))
-    _check_sizes(need, dataset, axes, slow)
-    known = _known_variables(need, dataset, axes, slow)
-    checked = dataset.drop_vars([name for name in dataset.variables if name not in known]).copy()
-    for name, (dimensions, entry) in known.items():
-        _check_variable(need, name, dataset.variables[name], dimensions, entry)
-        if name in COORDINATES or name.startswith(DRAWN):
-            checked = checked.set_coords(name)
-        variable = checked.variables[name]
-        if variable.dtype.kind in "OSU":
-            need(variable.size <= _MOST_NAMES, name, f"shape {variable.shape}")
-            texts = np.array([_line(each) for each in variable.values.flat], np.str_).reshape(variable.shape)
-            put = checked.assign_coords if name in checked.coords else checked.assign
-            checked = put({name: xr.Variable(variable.dims, texts, variable.attrs)})
-    _check_values(need, checked, axes, slow)
+    with reading_errors(source):
+        known = _known_variables(dataset)
+        checked = dataset.drop_vars([name for name in dataset.variables if name not in known]).copy()
+        for name, (dimensions, entry) in known.items():
+            _check_variable(name, dataset.variables[name], dimensions, entry)
+            if name in COORDINATES or name.startswith(DRAWN):
+                checked = checked.set_coords(name)
+            variable = checked.variables[name]
+            if variable.dtype.kind in "OSU":
+                _need(variable.size <= _MOST_NAMES, name, f"shape {variable.shape}")
+                texts = np.array([_line(each) for each in variable.values.flat], np.str_).reshape(variable.shape)
+                put = checked.assign_coords if name in checked.coords else checked.assign
+                checked = put({name: xr.Variable(variable.dims, texts, variable.attrs)})
+        _check_values(checked)
     checked.attrs = _attributes(checked.attrs)
     for variable in checked.variables.values():
         variable.attrs = _attributes({name: variable.attrs[name] for name in _OF_VARIABLES if name in variable.attrs})
@@ -228,90 +215,94 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     return checked
 
 
-def _check_sizes(need: _Need, dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
-    sizes = {str(name): size for name, size in dataset.sizes.items()}
+def _need(right: object, name: str, wrong: str) -> None:
+    if not right:
+        raise WrongValueError(Verbatim(wrong), _REMEDY, name)
+
+
+def _slow_time(dataset: xr.Dataset) -> str:
+    return "mission" if "mission" in dataset.dims else "cycle"
+
+
+def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Variable | None]]:
+    """Of each variable that the report knows its dimensions and what it is, None for the values of an axis."""
+    slow, sizes = _slow_time(dataset), {str(name): size for name, size in dataset.sizes.items()}
+    if lacking := [name for name in ("outcome", slow, "contact") if name not in dataset.variables]:
+        raise WrongValueError(None, f"holds no {' and no '.join(lacking)}; {_REMEDY}", "OUT.nc")
+    axes = tuple(map(str, dataset["outcome"].dims))
     for name in (*axes, slow, "contact"):
-        need(0 < sizes.get(name, 0) <= _MOST_NAMES, name, f"{sizes.get(name, 0)} values")
-        need(name.isidentifier() and name in dataset.variables, name, "no values along the dimension of this name")
+        _need(0 < sizes.get(name, 0) <= _MOST_NAMES, name, f"{sizes.get(name, 0)} values")
+        _need(name.isidentifier() and name in dataset.variables, name, "no values along the dimension of this name")
     n_points = math.prod(sizes[name] for name in axes)
     n_values = n_points * math.prod(sizes.get(name, 1) for name in (slow, "response", "block"))
     is_small = n_points <= _MOST_POINTS and n_values <= _MOST_VALUES
-    need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
-
-
-def _known_variables(
-    need: _Need, dataset: xr.Dataset, axes: Sequence[str], slow: str
-) -> dict[str, tuple[tuple[str, ...], Variable | None]]:
-    """Of each variable that the report knows its dimensions and what it is, None for the values of an axis."""
+    _need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
     with_axes = ASKED | OF_A_HISTORY | LOOPS | COUNTS | SCENE["exact"]
     if slow == "mission":
         with_axes = OF_MISSIONS | OF_A_MISSION
     elif "modal_amplitude" in axes:
         with_axes = OF_MODES | OF_A_MODE_POINT
-    found: dict[str, tuple[tuple[str, ...], Variable | None]] = {}
+    known: dict[str, tuple[tuple[str, ...], Variable | None]] = {}
     for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
         # what is of the scene, or drawn, has those axes along which it differs
         along = tuple(axis for axis in axes if axis in variable.dims)
         if name in dataset.dims:
-            found[name] = (name,), None
+            known[name] = (name,), None
         elif name.startswith(DRAWN) or (name == "frequency" and "frequency_ratio" in axes):
-            found[name] = (*along, *(each for each in ("contact",) if each in variable.dims)), _DRAWN_VALUES
+            known[name] = (*along, *(each for each in ("contact",) if each in variable.dims)), _DRAWN_VALUES
             is_along = {SAMPLE, "frequency_ratio"} & set(along)
-            need(is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
+            _need(is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
         elif name in with_axes:
-            found[name] = (*axes, *with_axes[name].dimensions), with_axes[name]
+            known[name] = (*axes, *with_axes[name].dimensions), with_axes[name]
         elif name in _OF_SCENE:
-            found[name] = (*along, *_OF_SCENE[name].dimensions), _OF_SCENE[name]
-    return found
+            known[name] = (*along, *_OF_SCENE[name].dimensions), _OF_SCENE[name]
+    return known
 
 
-def _check_variable(
-    need: _Need, name: str, variable: xr.Variable, dimensions: tuple[str, ...], entry: Variable | None
-) -> None:
+def _check_variable(name: str, variable: xr.Variable, dimensions: tuple[str, ...], entry: Variable | None) -> None:
     """Dimensions and type; entry None: of an axis, which has finite numbers or texts."""
-    need(variable.dims == dimensions, name, f"dimensions {', '.join(map(str, variable.dims))}")
+    _need(variable.dims == dimensions, name, f"dimensions {', '.join(map(str, variable.dims))}")
     kind = variable.dtype.kind
     if entry is not None:
         right = "OSU" if entry.is_text else "iuf" if entry.dtype.startswith("float") else "iu"
-        need(kind in right, name, f"type {variable.dtype}")
+        _need(kind in right, name, f"type {variable.dtype}")
     elif kind in "iuf":
-        need(name not in _WORDS, name, "numbers in place of words")
-        need(np.isfinite(variable.values).all(), name, "a value that is no finite number")
+        _need(name not in _WORDS, name, "numbers in place of words")
+        _need(np.isfinite(variable.values).all(), name, "a value that is no finite number")
     elif name in COORDINATES and name not in _TEXTS:
         # the values of an axis with numbers and "auto" are texts
         with suppress(ValueError):
             if np.isfinite([float(each) for each in variable.values if each != "auto"]).all():
                 return
-        need(False, name, "texts in place of numbers")
+        _need(False, name, "texts in place of numbers")
     if entry is _DRAWN_VALUES:
         # NaN of pairs that a scene does not have
-        need(variable.size <= _MOST_VALUES, name, f"shape {variable.shape}")
+        _need(variable.size <= _MOST_VALUES, name, f"shape {variable.shape}")
         right = (np.abs(variable.values) < _LARGEST_NUMBER) | (np.isnan(variable.values) & ("contact" in dimensions))
-        need(right.all(), name, "a value that is no finite number")
+        _need(right.all(), name, "a value that is no finite number")
 
 
-def _check_values(need: _Need, dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
-    """Tests the values that lead to other values: cycles or missions, pairs, flags and mesh."""
+def _check_values(dataset: xr.Dataset) -> None:
+    """Tests the values that lead to other values: cycles or missions, pairs and mesh."""
+    slow = _slow_time(dataset)
     # worn joints whose modes are sought stand in any order
-    counts = np.sort(dataset[slow].values) if slow in axes else dataset[slow].values
+    counts = np.sort(dataset[slow].values) if slow in dataset["outcome"].dims else dataset[slow].values
     rising = counts.dtype.kind in "iuf" and counts[0] >= 0 and (np.diff(counts) > 0).all()
-    need(rising, slow, "no counts in ascending order")
+    _need(rising, slow, "no counts in ascending order")
     pairs = dataset["contact"].values
     differ = pairs.dtype.kind in "iu" and len(set(pairs.tolist())) == pairs.size
-    need(differ, "contact", "no whole numbers that differ")
-    flags = np.atleast_1d(dataset["outcome"].attrs.get("flag_values", np.zeros(0, int)))
-    need(flags.dtype.kind in "iu", "outcome:flag_values", "no whole numbers")
+    _need(differ, "contact", "no whole numbers that differ")
     nodes = [dataset[name].values for name in ("mesh_x", "mesh_y", "mesh_z") if name in dataset]
-    need(all(np.isfinite(each).all() for each in nodes), "mesh_x", "no finite number, here or beside it")
+    _need(all(np.isfinite(each).all() for each in nodes), "mesh_x", "no finite number, here or beside it")
     if "mesh_quad" in dataset:
         quad, n_nodes = dataset["mesh_quad"].values, min((each.size for each in nodes), default=0)
-        need(((quad >= 0) & (quad < n_nodes)).all(), "mesh_quad", "nodes that there are not")
+        _need(((quad >= 0) & (quad < n_nodes)).all(), "mesh_quad", "nodes that there are not")
 
 
-def _attributes(found: Mapping[str, Any]) -> dict[str, Any]:
+def _attributes(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes without control characters, in one line but for texts of several."""
-    cleaned = {name: value if name == "flag_values" else _line(value) for name, value in found.items()}
-    return cleaned | {name: show_text(_decoded(found[name])) for name in _LONG if name in found}
+    cleaned = {name: value if name == "flag_values" else _line(value) for name, value in attributes.items()}
+    return cleaned | {name: show_text(_decoded(attributes[name])) for name in _LONG if name in attributes}
 
 
 @functools.lru_cache(maxsize=4096)  # most messages are the same

@@ -1,11 +1,11 @@
-"""Contact pairs of one scene: where they lie, how deep they are worn, and the grid in which those of a flank stand.
+"""Contact pairs of one scene: where they lie, how deep they are worn, the grid and the cells of those of a surface.
 
-Where the scenes of a study differ in their pairs, a figure shows one scene. Of a cylinder or a sphere on a flat a part
-of the contact is computed: the whole of it can be compared with a measured profile.
+Where the scenes of a study differ in their pairs, a figure shows one scene.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from collections.abc import Collection
@@ -24,26 +24,36 @@ from studyrunner.user_error import UserError, Verbatim
 NO_DEPTH = 1e-15
 """Wear depth, m, below which it is round-off: far less than an atom."""
 
+Floats = NDArray[np.float64]
+Places = NDArray[np.intp]
+Scar = tuple[Floats, Places]
+"""Places x (n,), m, ascending, and the pairs (n,) at them, index along `contact`."""
+
+JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
+"""The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
+
 OF_PAIRS = (*(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)), *SCENE["mesh"])
 """Variables that say where the pairs are."""
 
 _EXISTS = "contact_exists"
 _ALIGNED = 0.05  # of the smallest distance between two pairs: pairs are on a line of the grid if they miss it by less
+_LONE, _SLIM = 1e-3, 0.2  # m; width of a single row of pairs, or this part of its length where that is less
+_STRAIGHT = 0.999
 _MIRRORED = ("cylinder_on_flat", "sphere_on_flat")
 """Bundled scenes with pairs of one half, x > 0, or one quarter, x > 0 and y > 0, of the contact."""
 
 _UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
-_HEADER = re.compile(r"\s*(x|depth)\s*[_(\[ ]\s*(m|mm|um|µm)\s*[)\]]?\s*", re.IGNORECASE)
+_COLUMN = re.compile(r"(x|depth)_?(m|mm|um|µm)", re.IGNORECASE)  # as `genfromtxt` writes the names of columns
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """The contact pairs of one point. position (n, 3): m, and area (n,): m2, NaN where the file has none. surface (n,):
-    labels, "contact" where the file has none.
+    """The contact pairs of one point. position (n, 3): m, area (n,): m2, surface (n,): labels; NaN, or "contact", where
+    the file has none.
     """
 
-    position: NDArray[np.float64]
-    area: NDArray[np.float64]
+    position: Floats
+    area: Floats
     surface: NDArray[np.str_]
 
 
@@ -54,17 +64,36 @@ class Grid:
     across (n_across,), along (n_along,): m, distances from the first line of the grid, which is at 0.
     """
 
-    pair: NDArray[np.intp]
-    across: NDArray[np.float64]
-    along: NDArray[np.float64]
+    pair: Places
+    across: Floats
+    along: Floats
+
+    def upwards(self) -> Grid:
+        """The same grid from its last line on."""
+        return Grid(self.pair[::-1], self.across[-1] - self.across[::-1], self.along)
 
 
 @dataclass(frozen=True)
-class Scar:
-    """The line through the middle of the whole contact. x (n,): m, ascending. pairs (n,): index along `contact`."""
+class Flank:
+    """One contact surface. pairs (n,): indices along `contact`. area (n,): m2.
 
-    x: NDArray[np.float64]
-    pairs: NDArray[np.intp]
+    grid: on which they lie, the line farthest from the origin last; None where they lie on none. edges: of its cells
+    along (n_along + 1,) and across (n_across + 1,), m. seen (n, 2): positions in the plane of the surface, m; None
+    where the file has no positions. directions: what the two directions, along and across, are called.
+    """
+
+    surface: str
+    pairs: Places
+    area: Floats
+    grid: Grid | None = None
+    edges: tuple[Floats, Floats] | None = None
+    seen: Floats | None = None
+    directions: tuple[str, str] = ("", "")
+
+    @property
+    def height_over_width(self) -> float:
+        """Of the surface as it is drawn."""
+        return 0.75 if self.edges is None else float(np.ptp(self.edges[1]) / np.ptp(self.edges[0]))
 
 
 @dataclass(frozen=True)
@@ -72,8 +101,8 @@ class Profile:
     """A measured profile. name: of its file. x, depth (n,): m, depth positive where material is missing."""
 
     name: str
-    x: NDArray[np.float64]
-    depth: NDArray[np.float64]
+    x: Floats
+    depth: Floats
 
 
 # --- the pairs of one scene ---
@@ -83,8 +112,8 @@ def contact_pairs(result: Result, point: Point) -> Pairs:
     """Where the pairs of a point are."""
 
     def read(name: str, missing: object) -> NDArray[Any]:
-        found = result.at(name, point).values if result.has(name) else missing
-        return np.broadcast_to(np.asarray(found), (result.dataset.sizes["contact"],))
+        values = result.at(name, point).values if result.has(name) else missing
+        return np.broadcast_to(np.asarray(values), (result.dataset.sizes["contact"],))
 
     position = np.stack([read(f"contact_{axis}", np.nan) for axis in "xyz"], axis=1).astype(float)
     surface = read("contact_surface", "contact").astype(np.str_)
@@ -93,8 +122,8 @@ def contact_pairs(result: Result, point: Point) -> Pairs:
 
 def axes_of_scenes(result: Result, names: Collection[str] = OF_PAIRS) -> tuple[str, ...]:
     """Axes along which variables of the scene differ; none where the file has one scene."""
-    found = {axis for name in names if result.has(name) for axis in result.dataset[name].dims}
-    return tuple(axis for axis in result.axes if axis in found)
+    differ = {axis for name in names if result.has(name) for axis in result.dataset[name].dims}
+    return tuple(axis for axis in result.axes if axis in differ)
 
 
 def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
@@ -111,7 +140,7 @@ def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
     return replace(result, dataset=dataset, fixed=(*result.fixed, *(axis for axis in axes if axis in result.varying)))
 
 
-def pairs_of_scene(result: Result, point: Point) -> NDArray[np.intp]:
+def pairs_of_scene(result: Result, point: Point) -> Places:
     """Places along `contact` of the pairs that the scene of a point has."""
     if not result.has(_EXISTS):
         return np.arange(result.dataset.sizes["contact"])
@@ -123,26 +152,26 @@ def has_depths(result: Result) -> bool:
     return result.has("wear_depth") or result.has("wear_depth_last")
 
 
-def depths(result: Result, point: Point) -> NDArray[np.float64]:
+def depths(result: Result, point: Point) -> Floats:
     """Wear depth (n_cycles, n_contact), m, of one point; NaN at the counts of which the file holds none."""
     if result.has("wear_depth"):
         return np.asarray(result.at("wear_depth", point).values, dtype=float)
-    found = np.full((len(result.cycles), result.dataset.sizes["contact"]), np.nan)
-    found[result.last_reached(point)] = last_depth(result, point)
-    return found
+    depth = np.full((len(result.cycles), result.dataset.sizes["contact"]), np.nan)
+    depth[result.last_reached(point)] = result.at("wear_depth_last", point).values
+    return depth
 
 
-def last_depth(result: Result, point: Point) -> NDArray[np.float64]:
-    """Wear depth (n_contact,), m, of one point at the last count that it has reached."""
-    if result.has("wear_depth"):
-        return np.asarray(result.at("wear_depth", point, result.last_reached(point)).values, dtype=float)
-    return np.asarray(result.at("wear_depth_last", point).values, dtype=float)
+def last_depth(result: Result, point: Point) -> Floats:
+    """Wear depth (n_contact,), m, of one point at the last count that it has reached; 0 where the file has none."""
+    if not has_depths(result):
+        return np.zeros(result.dataset.sizes["contact"])
+    return np.asarray(depths(result, point)[result.last_reached(point)])
 
 
 # --- the grid in which the pairs of a flank lie ---
 
 
-def find_grid(position: NDArray[np.float64]) -> Grid:
+def find_grid(position: Floats) -> Grid:
     """The grid in which points (n, 3), m, lie, in any order and any orientation: equal straight lines side by side.
 
     The lines may be unequally spaced, shifted and on a curved surface. ValueError: the points are no such grid.
@@ -155,7 +184,7 @@ def find_grid(position: NDArray[np.float64]) -> Grid:
     if spacing <= 1e-9 * np.ptp(position, axis=0).max():
         raise ValueError("two of its contact pairs are in one place.")
     away = position - position[0]
-    found: list[tuple[float, float, int, NDArray[np.float64], NDArray[np.intp]]] = []
+    grids: list[tuple[float, float, int, Floats, Places]] = []
     # A line of the grid through the first point passes through others. Far ones give its direction best and come first.
     tried = np.zeros(len(away), dtype=np.bool_)
     for other in np.argsort(-np.linalg.norm(away, axis=1), kind="stable")[:-1]:
@@ -167,10 +196,10 @@ def find_grid(position: NDArray[np.float64]) -> Grid:
         lines = _parallel_lines(position, direction, _ALIGNED * spacing)
         if lines is not None:
             length = np.ptp(position[lines[0]] @ direction) / spacing
-            found.append((round(float(length), 1), round(abs(float(direction[2])), 6), -len(found), direction, lines))
-    if not found:
+            grids.append((round(float(length), 1), round(abs(float(direction[2])), 6), -len(grids), direction, lines))
+    if not grids:
         raise ValueError("its contact pairs do not lie on a grid.")
-    *_, direction, lines = max(found, key=lambda each: each[:3])
+    *_, direction, lines = max(grids, key=lambda each: each[:3])
     decimals = 6 - math.floor(math.log10(spacing))  # two flanks of one shape get the same coordinates
     centre = position[lines].mean(axis=1)
     centre -= np.outer(centre @ direction, direction)
@@ -191,9 +220,7 @@ def find_grid(position: NDArray[np.float64]) -> Grid:
     )
 
 
-def _parallel_lines(
-    position: NDArray[np.float64], direction: NDArray[np.float64], tolerance: float
-) -> NDArray[np.intp] | None:
+def _parallel_lines(position: Floats, direction: Floats, tolerance: float) -> Places | None:
     """Points (n_lines, n_points_a_line) on lines of a direction, in its order; None if the lines are not all equal."""
     along = position @ direction
     across = position - np.outer(along, direction)
@@ -207,44 +234,106 @@ def _parallel_lines(
     counts = np.unique(first, return_counts=True)[1]
     if np.any(counts != counts[0]):
         return None
-    lines: NDArray[np.intp] = np.lexsort((along, first)).reshape(len(counts), counts[0])
+    lines: Places = np.lexsort((along, first)).reshape(len(counts), counts[0])
     from_first = along[lines] - along[lines[:, :1]]
     return lines if np.all(np.ptp(from_first, axis=0) <= tolerance) else None
+
+
+# --- the surfaces, and the cells of their pairs ---
+
+
+def find_flanks(result: Result) -> tuple[Flank, ...]:
+    """The contact surfaces of a file, in order of first appearance; a single one where the file has no labels."""
+    pairs = contact_pairs(result, result.shown)
+    area = np.where(np.isfinite(pairs.area), pairs.area, 1.0)
+    words, flanks = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model"))), []
+    for surface in dict.fromkeys(pairs.surface.tolist()):
+        members = np.flatnonzero(pairs.surface == surface)
+        flank, position = Flank(surface or "contact", members, area[members]), pairs.position[members]
+        if np.isfinite(position).all():
+            centred, grid, edges = position - position.mean(axis=0), None, None
+            _, _, plane = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
+            largest = np.argmax(np.abs(np.round(plane, 6)), axis=1)[:, None]
+            plane = plane * np.sign(np.take_along_axis(plane, largest, axis=1))
+            seen = centred @ plane[:2].T
+            with contextlib.suppress(ValueError):
+                grid = find_grid(position).upwards() if len(position) > 1 else None
+            if grid is not None:
+                first, across = position[grid.pair[0]], position[grid.pair[:, 0]]
+                plane, edges = np.stack([first[-1] - first[0], across[-1] - across[0]]), _cell_edges(grid, flank.area)
+            named = words if words and (grid is None or len(grid.along) > 1) else (_name(plane[0]), _name(plane[1]))
+            flank = replace(flank, grid=grid, edges=edges, seen=seen, directions=named)
+        flanks.append(flank)
+    return tuple(flanks)
+
+
+def _name(direction: Floats) -> str:
+    """An axis of the mesh, or the components of a direction."""
+    unit = direction / (float(np.linalg.norm(direction)) or 1.0)
+    axis = int(np.argmax(np.abs(unit)))
+    along = f"along ({', '.join(f'{each + 0.0:.2g}' for each in unit)})" if unit.any() else "across"
+    return "xyz"[axis] if unit[axis] > _STRAIGHT else along
+
+
+def _cell_edges(grid: Grid, area: Floats) -> tuple[Floats, Floats]:
+    """Edges of cells about halfway between the pairs, as wide as the areas of their lines say."""
+    x, y = grid.along, grid.across
+    total, lone = float(area.sum()), min(_LONE, _SLIM * float(max(x[-1], y[-1])))
+    x_share, y_share = (np.r_[0.0, np.cumsum(area[grid.pair].sum(axis=axis))] / total for axis in (0, 1))
+    x_length, y_length = _length(x, x_share), _length(y, y_share)
+    if len(x) == len(y) == 2:
+        x_length, y_length = np.sqrt(total / (x[1] * y[1])) * np.array([x[1], y[1]])
+    elif 2 in (len(x), len(y)):
+        x_length, y_length = np.fmin([x_length, y_length], [total / y_length, total / x_length])
+    return _edges(x, x_share, x_length, lone), _edges(y, y_share, y_length, lone)
+
+
+def _length(at: Floats, share: Floats) -> float:
+    """Length, m, of lines at rising positions (n,) whose cells have shares (n + 1,) of the area up to them; or NaN."""
+    return float(np.polyfit(share[1:-1], 0.5 * (at[1:] + at[:-1]), 1)[0]) if len(at) > 2 else np.nan
+
+
+def _edges(at: Floats, share: Floats, length: float, lone: float) -> Floats:
+    """Edges (n + 1,) of cells. lone: width of a single one, m."""
+    if len(at) == 1:
+        return lone * np.array([-0.5, 0.5])
+    if len(at) == 2:
+        # at most as if a third line stood on each side
+        length = float(np.clip(np.nan_to_num(length, nan=np.inf), at[1], 2.0 * at[1]))
+    start = float(np.mean(0.5 * (at[1:] + at[:-1]) - length * share[1:-1]))
+    return np.asarray(start + length * share)
 
 
 # --- the whole contact of a cylinder or a sphere on a flat ---
 
 
 def find_scar(result: Result) -> Scar | None:
-    """The contact of the shown scene where it is one of a cylinder or a sphere on a flat; None for other scenes."""
+    """The line through the middle of the whole contact of a cylinder or a sphere on a flat; None for other scenes."""
     x, y, _ = contact_pairs(result, result.shown).position.T
     if result.study.get("scene", {}).get("model") not in _MIRRORED or not np.isfinite([x, y]).all():
         return None
     row = np.flatnonzero(y <= y.min() + 0.5 * x.min())
     row = row[np.argsort(x[row], kind="stable")]
-    return Scar(np.r_[-x[row[::-1]], x[row]], np.r_[row[::-1], row])
+    return np.r_[-x[row[::-1]], x[row]], np.r_[row[::-1], row]
 
 
 def read_profile(path: Path) -> Profile:
     """The profile in a CSV file: a header such as `x_mm,depth_um`, then a row for each position. Raises UserError."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines()
+        lines = [line for line in lines if line.strip(" ,")]
+        table: NDArray[Any] = np.genfromtxt(lines, delimiter=",", names=True, ndmin=1) if lines else np.zeros(0)
+    except (OSError, ValueError) as error:
         raise UserError(str(path), "the file", None, f"give a CSV file that can be read: {error}") from None
-    header, *rows = [line.replace('"', "").split(",") for line in lines if line.strip(" ,")] or [[""]]
-    matches = ((place, _HEADER.fullmatch(cell)) for place, cell in enumerate(header))
-    found = {match[1].lower(): (place, _UNITS[match[2].lower()]) for place, match in matches if match}
-    if set(found) != {"x", "depth"}:
+    columns = table.dtype.names or ()
+    units = {
+        match[1].lower(): (match[0], _UNITS[match[2].lower()]) for match in map(_COLUMN.fullmatch, columns) if match
+    }
+    if set(units) != {"x", "depth"}:
         remedy = "give a first line that names both columns with their units, m, mm or um, as x_mm,depth_um"
-        raise UserError(str(path), "line 1", Verbatim(f'"{",".join(header)[:60]}"'), remedy)
-    values = []
-    for number, row in enumerate(rows, start=2):
-        try:
-            values.append([float(row[place]) * factor for place, factor in (found["x"], found["depth"])])
-        except (ValueError, IndexError):
-            raise UserError(str(path), f"row {number}", ",".join(row)[:60], "give a number in both columns") from None
-    array = np.array(values, dtype=float).reshape(-1, 2)
-    if not len(array) or not np.isfinite(array).all():
-        raise UserError(str(path), "the file", None, "give at least one row, and finite numbers")
-    array = array[np.argsort(array[:, 0], kind="stable")]
-    return Profile(path.name, array[:, 0], array[:, 1])
+        raise UserError(str(path), "line 1", Verbatim(f'"{",".join(columns)[:60]}"'), remedy)
+    x, depth = (table[name] * factor for name, factor in (units["x"], units["depth"]))
+    if not x.size or not np.isfinite([x, depth]).all():
+        raise UserError(str(path), "the file", None, "give at least one row, and finite numbers in both columns")
+    order = np.argsort(x, kind="stable")
+    return Profile(path.name, x[order], depth[order])

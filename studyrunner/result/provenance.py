@@ -38,7 +38,7 @@ _COMMENT = (
 def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
     """Attributes that equal runs share, not of time, place or number of ranks; the id is a hash of all inputs."""
     text, solver = format_study(study), solver_digest()
-    own = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
+    program = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
         "title": study.study.title or study.study.name,
@@ -46,8 +46,8 @@ def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
         "keywords": "fretting wear, contact, dry friction, vibration, harmonic balance",
         "id": hashlib.sha256("\n".join((text, facts.digest, solver)).encode()).hexdigest()[:32],
         "naming_authority": PACKAGES[0],
-        "source": f"{own}: multiscale harmonic balance with wear on a slow time scale",
-        "history": f"computed by run-study of {own} from the study in the attribute study",
+        "source": f"{program}: multiscale harmonic balance with wear on a slow time scale",
+        "history": f"computed by run-study of {program} from the study in the attribute study",
         "references": _REFERENCE,
         "comment": _COMMENT,
         "processing_level": "model result, not processed further",

@@ -58,21 +58,17 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
         target = Path(os.path.realpath(path))
         # the libraries that write it are given a text, not bytes
         str(target).encode(sys.getfilesystemencoding())
+        progress, is_file = Target(target).progress, target.is_file()
         # what leads to a stream, or to a file without a name, exists although its target does not
-        is_there, is_file = os.path.lexists(target) or path.exists(), target.is_file()
-        progress = Target(target).progress
-        is_input = is_file and any(source.exists() and target.samefile(source) for source in inputs)
-        faults = (
-            (not target.parent.is_dir(), f"give a file in a folder that exists: there is no folder {path.parent}"),
-            (is_there and not is_file, "give the name of an ordinary file"),
-            (is_file and not os.access(target, os.W_OK), "give a file that may be written: this is write-protected"),
-            (is_input, f"give another file with {option}: this one is read by the run"),
-            (
-                os.path.lexists(progress) and (progress.is_symlink() or not progress.is_file()),
-                f"give another name: {progress.name}, which the run needs, is no plain file",
-            ),
-        )
-        remedy = next((text for is_wrong, text in faults if is_wrong), "")
+        is_free = is_file or not (os.path.lexists(target) or path.exists())
+        is_free &= not os.path.lexists(progress) or (progress.is_file() and not progress.is_symlink())
+        remedy = ""
+        if not target.parent.is_dir():
+            remedy = f"give a file in a folder that exists: there is no folder {path.parent}"
+        elif not is_free or (is_file and not os.access(target, os.W_OK)):
+            remedy = f"give the name of an ordinary file that may be written, as {progress.name} beside it must be"
+        elif is_file and any(source.exists() and target.samefile(source) for source in inputs):
+            remedy = f"give another file with {option}: this one is read by the run"
         if not remedy:
             trial = new_partial(target)
             with trial.open("xb") as file:
@@ -97,10 +93,10 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
     UserError where what exists, or its progress, is no result of run-study or belongs to another study.
     """
     target = Target(check_output(option, path, study.files))
-    own, (standing, finished) = identity_of(study.study.name, study.scene.model), _read_result(option, target.path)
-    for what, found in ((target.path, standing), (target.progress, read_study(target.progress))):
-        if found is not None and found != own and not overwrite:
-            remedy = f"give another name or {how}: {what.name} is of {found}, this is {own}"
+    name, (existing, finished) = identity_of(study.study.name, study.scene.model), _read_result(option, target.path)
+    for file, other in ((target.path, existing), (target.progress, read_study(target.progress))):
+        if other is not None and other != name and not overwrite:
+            remedy = f"give another name or {how}: {file.name} is of {other}, this is {name}"
             raise UserError("command line", option, str(target.path), remedy)
     return Target(target.path, finished)
 
@@ -123,8 +119,8 @@ def _read_result(option: str, path: Path) -> tuple[str | None, bool]:
             text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
             stored: Any = b"" if text is None else text.item()
             table: Any = read_toml(stored if isinstance(stored, bytes) else stored.encode(), "")
-            found = identity_of(str(table["study"]["name"]), str(table["scene"]["model"]))
             # version 0.4.0 does not say how many points are left
-            return found, left is None or left.item() == 0
+            finished = left is None or left.item() == 0
+            return identity_of(str(table["study"]["name"]), str(table["scene"]["model"])), finished
     remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"
     raise UserError("command line", option, str(path), remedy)

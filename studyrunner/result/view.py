@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,25 +14,23 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.result.opening import as_history, find_value, open_known, study_tables
+from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
+from studyrunner.result.opening import as_history, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_percent, show_value
-from studyrunner.user_error import show_text
+from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from studyrunner.result.pairs import Profile
 
-CONVERGED = 0
-"""The `outcome` of a point that was computed to the end without restriction."""
-
-COMPLETE_WORDS = ("converged", "inaccurate", "sensitive")
-"""Outcomes of points that were computed to the end."""
-
-WELL_ENOUGH = 0.5
-"""Largest relative error of a number that is a result: that of the outcome `sensitive`."""
-
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
+
+NO_MOTION = 1e-12
+"""Motion, m, below which it is round-off: less than the size of an atom."""
+
+OWN_STEPS = ("adaptive", "final")
+"""Schemes that choose their steps, without `step`."""
 
 _AT_ONCE = 2**21  # numbers that are read at once
 
@@ -41,22 +40,13 @@ Point = Mapping[str, int]
 
 
 @dataclass(frozen=True)
-class Ending:
-    """One outcome: word of the file, sentence for the reader."""
-
-    word: str
-    sentence: str
-
-
-@dataclass(frozen=True)
 class Result:
     """A result file, each point one combination of the axes. Arrays of points have the shape of the axes.
 
     dataset: read lazily; a variable that was read as a whole stays in memory. fixed: axes of which this holds one value
-    of several. blocks: of missions what belongs to single blocks; in `dataset` missions then
-    have the name of cycles. chosen: values of axes of the point that figures of a single point show. measured: a worn
-    profile to compare with. recomputed: of the worn joint of the shown point, by `studyrunner.worn_joint`.
-    no_worn_response: why its response curve is not among them.
+    of several. blocks: of missions what belongs to single blocks; in `dataset` missions then have the name of cycles.
+    chosen: values of axes of the shown point. measured: a worn profile to compare with. recomputed: of the worn joint
+    of the shown point, by `studyrunner.worn_joint`. no_worn_response: why its response curve is not among them.
     """
 
     path: Path
@@ -67,11 +57,6 @@ class Result:
     measured: Profile | None = None
     recomputed: Mapping[str, xr.Dataset] = field(default_factory=dict)
     no_worn_response: str = ""
-
-    @property
-    def title(self) -> str:
-        """Title of the study, or the name of the file."""
-        return str(self.dataset.attrs.get("title") or show_text(self.path.stem))
 
     @cached_property
     def study(self) -> dict[str, dict[str, object]]:
@@ -130,9 +115,8 @@ class Result:
 
     def lacks(self, *names: str) -> str:
         """Sentence that says which of these variables to ask for; empty where the file has all."""
-        missing = [
-            name for name in names if not self.has(name) and name not in (() if self.blocks is None else self.blocks)
-        ]
+        there = {*self.dataset.variables, *(self.blocks or ())}
+        missing = [name for name in names if name not in there]
         return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
 
     def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
@@ -152,32 +136,20 @@ class Result:
             parts.append(np.array(reduce(part.reshape(*part.shape[: len(self.axes)], -1))))
         return np.concatenate(parts, axis=self.axes.index(axis))
 
-    @cached_property
-    def endings(self) -> dict[int, Ending]:
-        """All ways for a point to end that the file names, by number; a number without a name stands for itself."""
-        outcome = self.dataset["outcome"]
-        numbers = np.atleast_1d(outcome.attrs.get("flag_values", ())).tolist()
-        words = str(outcome.attrs.get("flag_meanings", "")).split()
-        # versions before 0.5 said so of every point that was computed to the end
-        claimed = str(outcome.attrs.get("sentences", "")).replace("computed to tolerance", "computed to the end")
-        sentences = claimed.splitlines() + [""] * len(words)
-        found = {number: Ending(f"outcome_{number}", f"outcome {number}") for number in np.unique(outcome).tolist()}
-        for number, word, sentence in zip(numbers, words, sentences, strict=False):
-            found[int(number)] = Ending(word, sentence or word.replace("_", " "))
-        return found
-
-    def ended(self, *words: str) -> Mask:
+    def ended(self, *outcomes: Outcome) -> Mask:
         """Points with one of these outcomes."""
-        numbers = [number for number, ending in self.endings.items() if ending.word in words]
-        return np.asarray(np.isin(self.dataset["outcome"].values, numbers))
+        return np.asarray(np.isin(self.dataset["outcome"].values, outcomes))
 
     @cached_property
     def computed(self) -> Mask:
         """Points that were computed to the end."""
-        if not self.has("last_cycle") and not self.has_modes:
-            # an older file holds nothing of any other point
-            return np.asarray(self.dataset["outcome"].values == CONVERGED)
-        return self.ended(*COMPLETE_WORDS)
+        # version 0.4 has kept nothing of other points than these
+        return self.ended(*COMPLETE) if self.has("last_cycle") or self.has_modes else self.ended(Outcome.CONVERGED)
+
+    def of_points(self, name: str, cycle: int | None = None) -> NDArray[Any]:
+        """A variable of all points (axes..., what follows), also along axes that it lacks. cycle: index of a count."""
+        values = self.dataset[name] if cycle is None else self.dataset[name].isel(cycle=cycle)
+        return values.broadcast_like(self.dataset["outcome"]).transpose(*self.axes, ...).values
 
     @cached_property
     def last_cycle(self) -> NDArray[np.float64]:
@@ -204,11 +176,10 @@ class Result:
     @cached_property
     def rtol(self) -> NDArray[np.float64]:
         """Relative error that each point was to keep below; NaN where the file does not say."""
-        outcome = self.dataset["outcome"]
-        if "rtol" in outcome.dims:
-            return np.asarray(self.dataset["rtol"].broadcast_like(outcome).transpose(*self.axes).values, dtype=float)
+        if "rtol" in self.axes:
+            return self.of_points("rtol").astype(float)
         value = self.study.get("solver", {}).get("rtol")
-        return np.full(outcome.shape, float(value) if isinstance(value, int | float) else math.nan)
+        return np.full(self.computed.shape, float(value) if isinstance(value, int | float) else math.nan)
 
     @property
     def above(self) -> Mask:
@@ -218,8 +189,8 @@ class Result:
     @cached_property
     def usable(self) -> Mask:
         """Points whose worn volume is a result: computed to the end, and not known to a factor of two only."""
-        found = self.computed & ~self.ended("sensitive")
-        return found & (self.errors <= WELL_ENOUGH) if self.has("error_estimate") else found
+        known = self.errors <= SENSITIVE_ERROR if self.has("error_estimate") else True
+        return self.computed & ~self.ended(Outcome.SENSITIVE) & known
 
     @cached_property
     def best_known(self) -> Mask:
@@ -256,9 +227,9 @@ class Result:
         numbers = np.asarray(self.dataset["cycle"].values, dtype=float)
         if not self.has("cycle_count"):
             return numbers
-        own = np.asarray(self.at("cycle_count", point).values, dtype=float)
-        ascend = own.size > 1 and not np.isinf(own).any() and (np.diff(own[~np.isnan(own)]) > 0.0).all()
-        return own if ascend else numbers
+        counts = np.asarray(self.at("cycle_count", point).values, dtype=float)
+        ascend = counts.size > 1 and not np.isinf(counts).any() and (np.diff(counts[~np.isnan(counts)]) > 0.0).all()
+        return counts if ascend else numbers
 
     def last_reached(self, point: Point) -> int:
         """Index of the last cycle count at which a point holds values: one at its target has none after it."""
@@ -278,23 +249,20 @@ class Result:
         Where nothing is worn the one with the largest response at first. Other points count only where there is none.
         """
         everywhere = has_slow_time = np.ones(self.computed.shape, np.bool_)
-        measures, outcome = [everywhere.astype(float)], self.dataset["outcome"]
-        if self.has_modes:
-            measures.insert(0, self.dataset["modal_amplitude"].broadcast_like(outcome).transpose(*self.axes).values)
-        elif self.has("response_amplitude"):
-            amplitude = self.dataset["response_amplitude"].isel(cycle=0).max("response", skipna=False)
-            measures.insert(0, amplitude.transpose(*self.axes).values)
+        measures = [self.of_points("modal_amplitude")] if self.has_modes else []
         if not self.has_modes and self.has("worn_volume"):
-            measures.insert(0, self.worn)
+            measures.append(self.worn)
+        if not self.has_modes and self.has("response_amplitude"):
+            measures.append(self.of_points("response_amplitude", 0).max(axis=-1))
         if self.has("cycle_count"):
-            has_slow_time = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
-        wanted = xr.ones_like(outcome, dtype=bool)
+            has_slow_time = np.isfinite(self.of_points("cycle_count", -1))
+        wanted = everywhere
         for name in set(self.chosen) & set(self.varying):
-            wanted = wanted & (self.dataset[name] == self.chosen[name])
-        allowed, best = np.asarray(wanted.transpose(*self.axes).values), self.best_known
+            wanted = wanted & (self.of_points(name) == self.chosen[name])
+        best = self.best_known
         sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, everywhere)
-        points = next(each & allowed for each in sets if (each & allowed).any())
-        for measure in measures:
+        points = next(each & wanted for each in sets if (each & wanted).any())
+        for measure in (*measures, everywhere):
             known = np.where(points & np.isfinite(measure), measure, 0.0)
             if known.max() > 0.0:
                 break
@@ -320,11 +288,9 @@ class Result:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
         named = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
         followed = f"the {self.followed}" if self.followed else ""
-        return ", ".join(
-            (name == "frequency" and followed) or show_value(self.dataset[name], point[name])
-            for name in self.axes
-            if name in named and name in point
-        )
+        names = [name for name in self.axes if name in named and name in point]
+        values = {name: show_value(self.dataset[name], point[name]) for name in names}
+        return ", ".join((name == "frequency" and followed) or value for name, value in values.items())
 
 
 def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -> Result:
@@ -333,5 +299,20 @@ def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -
     Raises UserError where it is no result of `run-study`, or has no such point.
     """
     dataset, blocks = as_history(open_known(path))
-    values = {name: find_value(dataset, name, text) for name, text in (chosen or {}).items()}
+    values = {name: _find_value(dataset, name, text) for name, text in (chosen or {}).items()}
     return Result(Path(path), dataset, blocks=blocks, chosen=values)
+
+
+def _find_value(dataset: xr.Dataset, name: str, text: str) -> float | str:
+    """The value of an axis as it is in a file, from its text on the command line."""
+    axes = [str(axis) for axis in dataset["outcome"].dims]
+    remedy = f"give one of the axes {', '.join(axes)}"
+    if name in axes:
+        values = dataset[name].values.tolist()
+        for value in values:
+            with suppress(TypeError, ValueError):
+                if value == text or math.isclose(value, float(text), rel_tol=1e-9):
+                    return value  # type: ignore[no-any-return]
+        remedy = f"give one of the values of {name}: {', '.join(map(str, values[:12]))}"
+        remedy += ", ..." if len(values) > 12 else ""
+    raise UserError("command line", "--point", f"{name}={text}", remedy)

@@ -146,20 +146,19 @@ def _create_all(
     variables = {**study.recorded, **study.kind.always}
     for name, size in sizes.items():
         file.createDimension(name, size)
-    of_pairs = sorted(each.name for each in arrays if each.name.startswith("contact_"))
-    drawn = [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
-    drawn += [each for each in arrays if each.name == "frequency" and "frequency_ratio" in each.dimensions]
+    of_pairs = sorted((each for each in arrays if each.name.startswith("contact_")), key=lambda each: each.name)
+    auxiliary = of_pairs + [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
+    auxiliary += [each for each in arrays if each.name == "frequency" and "frequency_ratio" in each.dimensions]
     for name, entry in variables.items():
         dimensions = (*study.dimensions, *entry.dimensions)
         # a chunk of loops holds a single pair: then pairs without loops take no room
-        own = (1 if name in LOOPS and each == "contact" else sizes[each] for each in entry.dimensions)
-        variable = _create(file, name, entry, dimensions, (*slab, *own))
-        named = [each.name for each in drawn if set(each.dimensions) <= set(dimensions)]
-        named = of_pairs * ("contact" in entry.dimensions) + named
+        lengths = (1 if name in LOOPS and each == "contact" else sizes[each] for each in entry.dimensions)
+        variable = _create(file, name, entry, dimensions, (*slab, *lengths))
+        named = [each.name for each in auxiliary if set(each.dimensions) <= set(dimensions)]
         if named and not entry.is_text:
             variable.setncattr("coordinates", " ".join(named))
     if not any("contact" in entry.dimensions for entry in variables.values()):
-        file.setncattr("coordinates", " ".join(of_pairs))
+        file.setncattr("coordinates", " ".join(each.name for each in of_pairs))
     return variables
 
 
@@ -185,9 +184,9 @@ def _write_array(file: netCDF4.Dataset, shape: Sequence[int], slab: Sequence[int
         if dimension not in file.dimensions:
             file.createDimension(dimension, size)
     if array.over_axes:
-        own = values.shape[len(shape) :]
-        variable = _create(file, array.name, array.entry, array.dimensions, (*slab, *own))
-        variable[...] = np.broadcast_to(values, (*shape, *own))
+        lengths = values.shape[len(shape) :]
+        variable = _create(file, array.name, array.entry, array.dimensions, (*slab, *lengths))
+        variable[...] = np.broadcast_to(values, (*shape, *lengths))
         return
     is_text = values.dtype.kind == "U"
     variable = file.createVariable(array.name, str if is_text else values.dtype, array.dimensions)

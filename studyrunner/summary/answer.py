@@ -12,12 +12,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from studyrunner.result.opening import as_history
+from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
+from studyrunner.result.opening import as_history, describe_outcome
 from studyrunner.result.pairs import contact_pairs
-from studyrunner.result.view import COMPLETE_WORDS, Result
-from studyrunner.summary.certainty import ADVICE, certainty_of, first_ended
+from studyrunner.result.view import OWN_STEPS, Result
 from studyrunner.summary.findings import (
+    LEAST_ERROR,
     Finding,
     compare_meshes,
     mode_ranges,
@@ -26,6 +28,7 @@ from studyrunner.summary.findings import (
     where_is,
 )
 from studyrunner.system.progress import count
+from studyrunner.units import show_cycles, show_percent, show_rtol
 
 MOST_LINES = 9
 
@@ -35,6 +38,26 @@ SMALL = 0.1
 _MOST_FAILURES, _MOST_MODES = 2, 4
 _WIDTH, _LONGEST = 12, 240
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
+
+
+_FAR = 10.0
+"""Errors of more than so many times `rtol` do not fall in proportion to it."""
+
+_AUTOMATIC = 'harmonics and samples of "auto", where numbers are given'
+ADVICE = {
+    Outcome.TIME_LIMIT: "--retry-failed continues with a larger solver.time_limit",
+    Outcome.RESONANCE_LOST: "Try another range in loading.between, or another axes.sweep",
+    Outcome.START_FAILED: f"Try another axes.sweep, or {_AUTOMATIC}",
+    Outcome.BRANCH_LOST: f"Try another axes.sweep, or {_AUTOMATIC}",
+    Outcome.UNSTABLE: "Try another axes.sweep",
+    Outcome.MARCH_FAILED: f"Try a smaller solver.rtol or step, or {_AUTOMATIC}",
+    Outcome.STEP_TOO_LONG: 'Try scheme = "adaptive", or a smaller step',
+    Outcome.SENSITIVE: "Try a smaller solver.rtol or step; if that fails, the joint is that sensitive: use [scatter]",
+    Outcome.INACCURATE: f"Try {_AUTOMATIC}",
+    Outcome.CERTIFICATE_FAILED: f"Try a smaller solver.tolerance, or {_AUTOMATIC}",
+    Outcome.NO_FINAL_STATE: "Try an end in slow_time.cycles or slow_time.until",
+}
+"""What may help, by outcome."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +98,17 @@ def summary(dataset: xr.Dataset) -> Summary:
 
 def summarise(result: Result) -> Summary:
     """The summary of a result that is opened for the report."""
-    of_scenes = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
-    stuck, findings, doubts = float(of_scenes) if of_scenes.ndim == 0 else math.nan, list[Finding](), list[str]()
+    stuck = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
+    resonance = float(stuck) if stuck.ndim == 0 else math.nan
+    findings, doubts = list[Finding](), list[str]()
     if result.has_modes:
         findings += itertools.islice(mode_ranges(result), _MOST_MODES)
     else:
-        findings += [*wear_and_response(result, stuck), *filter(None, (shortest_life(result), compare_meshes(result)))]
-        doubts += filter(None, (_not_small(result), _in_radians(result, stuck), _too_few_counts(result)))
+        findings += [
+            *wear_and_response(result, resonance),
+            *filter(None, (shortest_life(result), compare_meshes(result))),
+        ]
+        doubts += filter(None, (_not_small(result), _in_radians(result, resonance), _too_few_counts(result)))
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
     findings += [*_failures(result), *(Finding("doubt", "beware", doubt) for doubt in doubts[:1])]
     if certainty := certainty_of(result, wore=wore):
@@ -95,34 +122,48 @@ def _failures(result: Result) -> Iterator[Finding]:
     Those that failed come before those that are uncertain only; of many ways the last are counted.
     """
     numbers, counts = np.unique(result.dataset["outcome"].values, return_counts=True)
-    found = []
+    findings = []
     for number, n_points in zip(numbers.tolist(), counts.tolist(), strict=True):
-        ending = result.endings[number]
-        if ending.word == "converged":
+        if number == Outcome.CONVERGED:
             continue
-        point, reason = first_ended(result, number)
-        # what the message of a sensitive one holds is no result
-        reason = "" if ending.word == "sensitive" else reason
+        word, sentence = describe_outcome(number)
+        point, reason = _first_ended(result, number)
         reason = f"{reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if len(reason) > _LONGEST else reason
-        advice, first = ADVICE.get(ending.word, ""), reason[:1].upper() + reason[1:]
+        advice, first = ADVICE.get(number, ""), reason[:1].upper() + reason[1:]
         if result.varying:
             first = f"First: {': '.join(filter(None, (where_is(result, point), reason)))}"
-        said = (re.split(r"[.:](?:\s|$)", ending.sentence)[0] or ending.word, advice, first)
+        sentences = (re.split(r"[.:](?:\s|$)", sentence)[0] or word, advice, first)
         of = f"{n_points} of {count(result.computed.size, 'point')}: " if result.computed.size > 1 else ""
-        values = {
-            "n_points": n_points,
-            "is_complete": ending.word in COMPLETE_WORDS,
-            "reason": reason,
-            "advice": advice,
-        }
-        label = "uncertain" if ending.word in COMPLETE_WORDS else "failed"
-        found.append(Finding(ending.word, label, of + ". ".join(filter(None, said)), values))
-    found.sort(key=lambda each: (each.values["is_complete"], -each.values["n_points"]))
-    yield from found[:_MOST_FAILURES]
-    if left := found[_MOST_FAILURES:]:
+        is_complete = number in COMPLETE
+        values = {"n_points": n_points, "is_complete": is_complete, "reason": reason, "advice": advice}
+        label = "uncertain" if is_complete else "failed"
+        findings.append(Finding(word, label, of + ". ".join(filter(None, sentences)), values))
+    findings.sort(key=lambda each: (each.values["is_complete"], -each.values["n_points"]))
+    yield from findings[:_MOST_FAILURES]
+    if left := findings[_MOST_FAILURES:]:
         n_left = sum(each.values["n_points"] for each in left)
         text = f"{count(n_left, 'more point')}: {', '.join(each.name.replace('_', ' ') for each in left)}"
         yield Finding("others", left[0].label, text, {"n_points": n_left})
+
+
+def _first_ended(result: Result, number: int) -> tuple[dict[str, int], str]:
+    """The first point that ended in this way, and what is to be added to its outcome, which may be nothing."""
+    place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
+    point = result.point_at(place)
+    if number == Outcome.SENSITIVE:
+        # what its message holds is no result
+        return point, ""
+    message = str(result.dataset["message"].values[place]) if result.has("message") else ""
+    if result.has_values[place] and result.counted[:-1] not in message:
+        last = show_cycles(float(result.last_cycle[place]), result.counted)
+        end = "" if result.computed[place] else f"computed up to {last}"
+        is_known = 0.0 < result.errors[place] <= SENSITIVE_ERROR
+        known = f"worn volume known within {result.show_error(point)}" if is_known else ""
+        message = ", ".join(filter(None, (end, known, message)))
+    return point, message
+
+
+# --- values that are hardly what was meant ---
 
 
 def _not_small(result: Result) -> str:
@@ -160,8 +201,90 @@ def _too_few_counts(result: Result) -> str:
     """Points that reach their target before the first count at which the file could hold wear."""
     if not result.has("cycles_to_target", "worn_volume") or result.dataset.sizes["cycle"] < 2:
         return ""
-    at_second = result.dataset["worn_volume"].isel(cycle=1).transpose(*result.axes).values
-    early = result.computed & np.isfinite(result.dataset["cycles_to_target"].values) & np.isnan(at_second)
+    no_volume = np.isnan(result.of_points("worn_volume", 1))
+    early = result.computed & np.isfinite(result.dataset["cycles_to_target"].values) & no_volume
+    if not early.any():
+        return ""
     points = count(int(np.count_nonzero(early)), "point")
-    said = f"no worn volume is stored for {points}: the target comes before the second of slow_time.outputs: give more"
-    return said if early.any() else ""
+    return f"no worn volume is stored for {points}: the target comes before the second of slow_time.outputs: give more"
+
+
+# --- how well the numbers are known ---
+
+
+def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
+    """How well worn volumes, or where nothing wore responses, or modes are known; None where the file has no errors.
+
+    Values: n_known to rtol, n_less and n_unknown, never estimated, of the points computed to the end; worst: the
+    largest relative error, NaN without one; rtol: NaN where it is an axis.
+    """
+    responses = result.has("response_error") and result.blocks is None
+    has_errors = result.has("error_estimate") and np.isfinite(result.rtol).any() and result.computed.any()
+    if result.has_modes:
+        of, errors = "point", _errors_of_modes(result)
+    elif result.wears and has_errors and (wore or not responses):
+        of, errors = "worn volume", result.errors
+    elif responses:
+        of, errors = "response", result.of_points("response_error", -1)
+    else:
+        return None
+    known, above = result.computed & np.isfinite(errors), result.computed & (errors > result.rtol)
+    masks = {"n_known": known & ~above, "n_less": above, "n_unknown": result.computed & np.isnan(errors)}
+    values: dict[str, Any] = {name: int(np.count_nonzero(mask)) for name, mask in masks.items()}
+    aims = np.unique(result.rtol[np.isfinite(result.rtol)])
+    values |= {"of": of, "rtol": float(aims[0]) if aims.size == 1 else math.nan}
+    values |= {"worst": math.nan, "where": "", "advice": ""}
+    if above.any() or known.any():
+        # each is compared with its own rtol: one that is above it is worse than any that is not
+        point = result.largest(np.where(above if above.any() else known, errors, -1.0))
+        worst = float(errors[result.place(point)])
+        values |= {"worst": worst, "where": result.describe(point) if result.varying else ""}
+        if above.any():
+            in_volume = of == "worn volume"
+            values["advice"] = _advise_error(result, result.place(point), worst) if in_volume else "a smaller rtol"
+    return Finding("certainty", "certainty", _describe_certainty(result.computed.size, values), values)
+
+
+def _describe_certainty(n_points: int, values: Mapping[str, Any]) -> str:
+    of, rtol, worst = values["of"], values["rtol"], values["worst"]
+    aim = "their rtol" if math.isnan(rtol) else f"rtol = {show_rtol(rtol)}"
+    shown = worst if rtol < LEAST_ERROR else max(worst, LEAST_ERROR)
+    within = f"within {show_percent(shown, rtol)}" if shown <= SENSITIVE_ERROR else "not known"
+    n_known, n_less, n_unknown = (values[name] for name in ("n_known", "n_less", "n_unknown"))
+    n_short = n_points - n_known - n_less - n_unknown
+    advice = f": set {values['advice']}" if values["advice"] else ""
+    if n_points == 1:
+        if n_short:
+            return f"the {of} is not known: the point was not computed to the end"
+        return f"the {of} is {within.replace('within', 'known within')} ({aim}){advice}"
+    text = f"{n_known} of {count(n_points, of)} are known within {aim}"
+    text += f", {n_less} less well" if n_short and n_less else ""
+    text += f", {n_short} not computed to the end" if n_short else ""
+    text += f", {n_unknown} without an estimate" if n_unknown else ""
+    where = ", ".join(filter(None, (values["where"], within)))
+    return f"{text}; least certain: {where}{advice}" if worst > 0.0 else text
+
+
+def _errors_of_modes(result: Result) -> NDArray[np.float64]:
+    """Largest relative error of natural frequency and damping ratio; in the shape of the axes."""
+    errors = np.zeros(result.computed.shape)
+    for name in ("natural_frequency", "damping_ratio"):
+        if result.has(name, f"{name}_error"):
+            value, error = np.abs(result.dataset[name].values), result.dataset[f"{name}_error"].values
+            errors = np.fmax(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
+    return errors
+
+
+def _advise_error(result: Result, place: tuple[int, ...], error: float) -> str:
+    """What to set so that the error of a worn volume is smaller. error: relative, above `rtol`."""
+    scheme, rtol = "adaptive", float(result.rtol[place])
+    if "scheme" in result.axes:
+        scheme = str(result.dataset["scheme"].values[place[result.axes.index("scheme")]])
+    if scheme not in OWN_STEPS:
+        by_depth = scheme == "explicit" and "largest_depth" in result.study.get("slow_time", {})
+        return f'scheme = "adaptive" or a smaller {"slow_time.largest_depth" if by_depth else "step"}'
+    if error >= _FAR * rtol:
+        return "a smaller solver.rtol"
+    # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
+    digits, exponent = f"{rtol**2 / error:.12e}".split("e")
+    return f"solver.rtol = {float(f'{digits[:3]}e{exponent}'):g}"

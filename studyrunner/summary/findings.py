@@ -13,15 +13,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from solver.outcome import SENSITIVE_ERROR, Outcome
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
-from studyrunner.result.view import NO_VOLUME, WELL_ENOUGH, Point, Result
+from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_cycles, show_number, show_percent
 
-_NO_MOTION = 1e-12  # m, round-off: less than the size of an atom
-_LEAST = 1e-4  # relative error that is shown, of any smaller one
+LEAST_ERROR = 1e-4
+"""Relative error that is shown, of any smaller one."""
+
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
 
@@ -55,7 +57,7 @@ def _known(value: float, error: float, units: str) -> str:
     text = _show(value, units)
     if math.isnan(error):
         return f"{text} (error not known)"
-    return f"{text} ± {show_percent(max(error / value, _LEAST))}" if value > 0.0 else text
+    return f"{text} ± {show_percent(max(error / value, LEAST_ERROR))}" if value > 0.0 else text
 
 
 # --- wear and vibration ---
@@ -103,8 +105,8 @@ def _of_wear(result: Result, point: dict[str, int]) -> Iterator[Finding]:
         yield Finding("input", "input", ranking)
     yield _deepest(result, point, at, f" in the sample that wears most ({where})" if volumes else "")
     if result.blocks is not None and "block_worn_volume" in result.blocks:
-        own = result.blocks["block_worn_volume"].isel(point).isel(cycle=at)
-        shares = dict(zip(own["block"].values.tolist(), (own.values / volume).tolist(), strict=True))
+        worn = result.blocks["block_worn_volume"].isel(point).isel(cycle=at)
+        shares = dict(zip(worn["block"].values.tolist(), (worn.values / volume).tolist(), strict=True))
         text = ", ".join(f"{name} {show_percent(share)}" for name, share in shares.items())
         yield Finding("blocks", "blocks", f"share of the wear: {text}", shares)
 
@@ -142,9 +144,10 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
         text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in place)}) mm"
     text, share = text + where, math.nan
     if result.has("contact_surface", "contact_area", "contact_edge"):
-        own, edge = pairs.surface == surface, result.at("contact_edge", point).values != 0
-        if edge[own].any() and depths[own].any():
-            share, of_area = (each[own & edge].sum() / each[own].sum() for each in (depths * pairs.area, pairs.area))
+        on_it = pairs.surface == surface
+        edge = on_it & (result.at("contact_edge", point).values != 0)
+        if edge.any() and depths[on_it].any():
+            share, of_area = (each[edge].sum() / each[on_it].sum() for each in (depths * pairs.area, pairs.area))
             if share > max(_SHARE, of_area):
                 text += f"; {show_percent(share)} of the wear of {surface} is in edge pairs:"
                 text += " valid if the real contact ends there, else extend the model"
@@ -158,7 +161,7 @@ def _nothing(result: Result, resonance: str) -> Finding:
     if result.has("slip_range"):
         largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=-1))
         slip = float(largest[result.best_known].max())
-        slip = slip if slip >= _NO_MOTION else 0.0
+        slip = slip if slip >= NO_MOTION else 0.0
         why = f": pairs slip by up to {_show(slip, 'm')} without wear" if slip else ": all pairs stick"
     n_points, n_known = result.usable.size, int(np.count_nonzero(result.usable))
     where = f"at all {n_points} points" if n_points > 1 else f"at {where_is(result, result.shown)}"
@@ -173,9 +176,9 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     ends = [0, result.last_reached(point)]
     amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
     of = int(np.argmax(amplitude[0]))
-    both = np.where(amplitude[:, of] > _NO_MOTION, amplitude[:, of], 0.0)
+    both = np.where(amplitude[:, of] > NO_MOTION, amplitude[:, of], 0.0)
     wrong = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
-    both = np.where((wrong > WELL_ENOUGH) & (both > 0.0), np.nan, both)
+    both = np.where((wrong > SENSITIVE_ERROR) & (both > 0.0), np.nan, both)
     errors, name = wrong * both, result.responses[of]
     new, worn = (_known(value, error, "m") for value, error in zip(both.tolist(), errors.tolist(), strict=True))
     values: dict[str, Any] = {"response": name, "amplitude": both.tolist(), "error": errors.tolist()}
@@ -193,7 +196,7 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     case = " in this case" if wears else f", most at {where_is(result, point)}"
     text = f"{name}{case if result.computed.size > 1 else ''}: amplitude {new}"
     if wears:
-        elsewhere = " (its resonance may lie elsewhere)" if both[1] < both[0] else ""
+        elsewhere = " (its resonance may lie elsewhere)" if both[1] < both[0] and not result.followed else ""
         text += f" when new, {worn} when worn{elsewhere}"
     frequency, peak = _peak(result, point, of)
     if math.isfinite(frequency):
@@ -229,15 +232,15 @@ def mode_ranges(result: Result) -> Iterator[Finding]:
     for index, number in enumerate(result.dataset["mode"].values.tolist()):
         computed = result.computed.take(index, axis=axis)
         values: dict[str, Any] = {"n_found": int(computed.sum())}
-        said = []
+        ranges = []
         for name, (factor, digits, unit) in shown.items():
             if result.has(name) and computed.any():
-                own = result.dataset[name].values.take(index, axis=axis)[computed]
-                values[name] = [float(own.min()), float(own.max())]
+                of_mode = result.dataset[name].values.take(index, axis=axis)[computed]
+                values[name] = [float(of_mode.min()), float(of_mode.max())]
                 texts = dict.fromkeys(f"{factor * each:.{digits}g}" for each in values[name])
-                said.append(f"{name.replace('_', ' ')} {' to '.join(texts)}{unit}")
-        text = ", ".join(said) + (f" over {over}" if said and over else "")
-        if not said or not computed.all():
+                ranges.append(f"{name.replace('_', ' ')} {' to '.join(texts)}{unit}")
+        text = ", ".join(ranges) + (f" over {over}" if ranges and over else "")
+        if not ranges or not computed.all():
             text += f"{', ' if text else ''}found at {values['n_found']} of {count(computed.size, 'point')}"
         yield Finding(f"mode {number}", f"mode {number}", text, values)
 
@@ -248,14 +251,13 @@ def shortest_life(result: Result) -> Finding | None:
     if not isinstance(until, dict) or not result.has("cycles_to_target"):
         return None
     (quantity, target), *_ = until.items()
-    found = result.computed & ~result.ended("sensitive")
+    ended = result.computed & ~result.ended(Outcome.SENSITIVE)
     lives, errors = (result.dataset[name].values for name in ("cycles_to_target", "cycles_to_target_error"))
-    unknown = found & (errors > WELL_ENOUGH * lives)
-    n_beyond, n_unsure = int(np.count_nonzero(found & np.isnan(lives))), int(np.count_nonzero(unknown))
-    lives = np.where(found & ~unknown, lives, np.nan)
-    reaches = (
-        f"{quantity.replace('_', ' ')} {_show(target, {'wear_depth': 'm', 'worn_volume': 'm3'}.get(quantity, '1'))}"
-    )
+    unknown = ended & (errors > SENSITIVE_ERROR * lives)
+    n_beyond, n_unsure = int(np.count_nonzero(ended & np.isnan(lives))), int(np.count_nonzero(unknown))
+    lives = np.where(ended & ~unknown, lives, np.nan)
+    units = {"wear_depth": "m", "worn_volume": "m3"}.get(quantity, "1")
+    reaches = f"{quantity.replace('_', ' ')} {_show(target, units)}"
     unsure = f"the life of {count(n_unsure, 'point')} is not known" if n_unsure else ""
     values = {"target": target, "count": math.nan, "n_beyond": n_beyond, "n_unsure": n_unsure}
     if np.isnan(lives).all():

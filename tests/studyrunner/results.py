@@ -1,7 +1,8 @@
 """The one factory of results: datasets in memory, of any axes and pairs, made from the tables of variables.
 
-`build_file` has numbers that all differ, `make_result` smooth ones, `sample_file` samples, `mesh_file` scenes that
-differ in their pairs. `made_result` is of a study; `build_dataset`, `write_dataset` are the plain twin of the writer.
+`build_file` has numbers that all differ, `smooth_result` smooth ones, `sample_file` samples, `mesh_file` scenes that
+differ in their pairs, `result_of_study` the axes of a study; `build_dataset`, `write_dataset` are the plain twin of the
+writer.
 """
 
 import math
@@ -136,7 +137,7 @@ def _about(name: str) -> dict[str, object]:
 # --- smooth ones, for figures ---
 
 
-def make_result(
+def smooth_result(
     *,
     frequency: Sequence[float] = (200.0, 201.0, 202.0, 204.0),
     wear_coefficient: Sequence[float] = (1.1e-11,),
@@ -160,7 +161,9 @@ def make_result(
     axes |= {"step": (1000.0,), "scheme": scheme, "sweep": sweep}
     names = ("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "response_phase")
     names += ("response_error", "wear_rate_error", "energy_error", "worn_volume_error")
-    of_pairs = {"positions": _positions(pairs), "surfaces": ["left"] * 6 + ["right"] * 6, "loops": loops}
+    scattered = 2e-3 * np.random.default_rng(1).uniform(-1.0, 1.0, (12, 3))
+    positions = flank_positions(3, 2) + {"grid": 0.0, "scattered": scattered, "nowhere": math.nan}[pairs]
+    of_pairs = {"positions": positions, "surfaces": ["left"] * 6 + ["right"] * 6, "loops": loops}
     dataset = build_file(axes, cycles, responses=responses, variables=names, **of_pairs)
     grid = np.meshgrid(*(np.arange(len(values)) for values in axes.values()), indexing="ij")
     peak = 1.0 / (1.0 + 0.5 * (grid[0] - 2) ** 2)
@@ -203,15 +206,6 @@ def make_result(
     study = '[study]\nname = "s"\n[scene]\nnodal_diameter = 0\n[solver]\nrtol = 0.01\n[slow_time]\ncycles = 1\n'
     kept = dataset[there].drop_vars(without).assign_attrs(title="Made up", study=study)
     return Result(Path("made.nc"), kept)
-
-
-def _positions(pairs: str) -> NDArray[np.float64]:
-    """Two flanks of 3 (along z) x 2 pairs; the second mirrored."""
-    if pairs == "nowhere":
-        return np.full((12, 3), math.nan)
-    flank = np.array([[0.24 + 0.003 * i, 0.01 - 0.003 * i, 0.01 * along] for along in range(3) for i in (0, 1)])
-    both = np.concatenate([flank, flank * [1.0, -1.0, 1.0]])
-    return both + 2e-3 * np.random.default_rng(1).uniform(-1.0, 1.0, both.shape) * (pairs == "scattered")
 
 
 # --- samples, and scenes that differ ---
@@ -279,7 +273,7 @@ def mesh_file() -> xr.Dataset:
 # --- of a study ---
 
 
-def made_result(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Index], object]) -> xr.Dataset:
+def result_of_study(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Index], object]) -> xr.Dataset:
     """A result of a study whose points are all computed to the end, without wear, slip and errors.
 
     given: for variables by name, from the index of a point along the axes to its values.

@@ -96,7 +96,6 @@ WRONG = {
     "a frequency that is none": changed(poke("frequency", 0, np.nan)),
     "number of a dimension as text": attribute("_Netcdf4Dimid", "first", "frequency"),
     "scale as text": attribute("scale_factor", "x", "worn_volume"),
-    "flags as text": attribute("flag_values", "0 1", "outcome"),
     "cycles that do not rise": changed(poke("cycle", 1, 1e9)),
     "a worn volume of 1e308": changed(poke("worn_volume", ..., 1e308)),
 }

@@ -9,7 +9,7 @@ from studies import build_scene
 from studyrunner.api import run_study
 from studyrunner.cli import main
 from studyrunner.report.contents import draw_report
-from studyrunner.report.page.page import write_page
+from studyrunner.report.page import write_page
 from studyrunner.result.view import open_for_report
 from studyrunner.summary.answer import summary
 from tests.mpi.launching import options, results

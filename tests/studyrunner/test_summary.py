@@ -14,7 +14,7 @@ from studyrunner.summary.answer import MOST_LINES, SMALL, summary
 from studyrunner.summary.findings import Finding, compare_meshes
 from studyrunner.units import show_percent, show_rtol
 from tests.studyrunner.fakes import FACTS
-from tests.studyrunner.results import made_result
+from tests.studyrunner.results import result_of_study
 
 GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit', 'adaptive']")
 SENSITIVE, FAILED, INACCURATE = int(Outcome.SENSITIVE), int(Outcome.MARCH_FAILED), int(Outcome.INACCURATE)
@@ -29,7 +29,7 @@ def wearing(*overrides, volume=lambda _: 1e-9, name="sdof_slider", facts=FACTS, 
     """A result whose points wear these volumes, m3, in equal parts up to the last count."""
     study = read_study(name, overrides)
     share = np.linspace(0.0, 1.0, len(study.output_counts))
-    return made_result(study, facts, worn_volume=lambda point: volume(point) * share, **given)
+    return result_of_study(study, facts, worn_volume=lambda point: volume(point) * share, **given)
 
 
 def result_of(dataset):
@@ -91,7 +91,9 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
     share = np.linspace(0.0, 1.0, 21)
     for depths, pair, edge in ((DEPTHS, 4, 0.0), (DEPTHS[[4, 1, 2, 3, 0, 5]], 0, 7.0 / 9.0)):
         depth = np.outer(share, depths) if name == "wear_depth" else depths
-        made = made_result(study, BY_SIX, worn_volume=lambda _: 1e-9 * share, **{name: lambda _, depth=depth: depth})
+        made = result_of_study(
+            study, BY_SIX, worn_volume=lambda _: 1e-9 * share, **{name: lambda _, depth=depth: depth}
+        )
         deepest = summary(made).values["deepest"]
         assert deepest["wear_depth"] == 5e-6
         assert (deepest["contact"], deepest["surface"]) == (pair, "right" if pair else "left")
@@ -117,7 +119,7 @@ def test_nothing_wore_says_why():
     unknown = wearing(*two, volume=lambda p: 1e-9 * p[0], error_estimate=lambda p: 0.01 + p[0])
     assert "at 1 of 2 points" in summary(unknown).lines[0]
     stuck = summary(
-        made_result(read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))).assign(
+        result_of_study(read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))).assign(
             stuck_frequency=212.6
         )
     )
@@ -254,7 +256,9 @@ def meshed(volumes, *overrides):
     mesh, wear = (list(study.dimensions).index(name) for name in ("mesh", "wear_coefficient"))
     share = np.linspace(0.0, 1.0, len(study.output_counts))
     worn = list(volumes.values())
-    return compare_meshes(result_of(made_result(study, worn_volume=lambda p: 1e-9 * worn[p[mesh]][p[wear]] * share)))
+    return compare_meshes(
+        result_of(result_of_study(study, worn_volume=lambda p: 1e-9 * worn[p[mesh]][p[wear]] * share))
+    )
 
 
 def test_meshes_are_compared_at_the_resonance_alone():

@@ -13,11 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
-from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn, Table, as_sentences
-from studyrunner.report.panels import COLOURS, FloatArray
+from solver.outcome import Outcome
+from studyrunner.report import drawing as plot
+from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sentences
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
-from studyrunner.result.view import CONVERGED, NO_VOLUME, Result
+from studyrunner.result.opening import describe_outcome
+from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, measure_of
 from studyrunner.system.progress import count
@@ -65,17 +66,16 @@ def draw_trends(result: Result) -> Drawn:
 
 def _find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArray]]:
     """Label, unit, values and errors (axes...) in the end of what every point has."""
-    found = []
+    quantities = []
     if result.has("worn_volume") and len(result.cycles) > 1:
         worn = np.where(result.computed, result.worn, np.nan)
-        found.append(("worn volume\nin the end", "m3", worn, result.errors * worn))
+        quantities.append(("worn volume\nin the end", "m3", worn, result.errors * worn))
     if result.has("response_amplitude"):
-        last = result.dataset.isel(response=0, cycle=-1).transpose(*result.axes, ...)
-        amplitude = np.where(result.computed, last["response_amplitude"].values, np.nan)
-        wrong = last["response_error"].values if result.has("response_error") else np.nan
-        units = str(last["response_amplitude"].attrs.get("units", "m"))
-        found.append((f"response\nof {result.responses[0]}", units, amplitude, wrong * amplitude))
-    return found
+        amplitude = np.where(result.computed, result.of_points("response_amplitude", -1)[..., 0], np.nan)
+        error = result.of_points("response_error", -1) if result.has("response_error") else np.nan
+        units = str(result.dataset["response_amplitude"].attrs.get("units", "m"))
+        quantities.append((f"response\nof {result.responses[0]}", units, amplitude, error * amplitude))
+    return quantities
 
 
 def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, errors: FloatArray) -> None:
@@ -198,8 +198,8 @@ def draw_exceedance(result: Result) -> Drawn:
             value, interval = (_ends(point, f"{name}{each}", dimension) for each in ("", "_interval"))
             panel.fill_between(at, *interval.T, color=style["color"], alpha=0.18, lw=0.0)
             for bound in (_LOWEST, _HIGHEST) if (np.ptp(value, axis=1) > 0.0).any() else (_LOWEST,):
-                own = {"color": style["color"], "linestyle": style["linestyle"]}
-                panel.plot(at, value[:, bound], **own, label="_" if bound else label or "samples")
+                look = {name: style[name] for name in ("color", "linestyle")}
+                panel.plot(at, value[:, bound], **look, label="_" if bound else label or "samples")
         panel.set(xlabel=scale.label(words), ylabel="probability of more", ylim=(0.0, 1.02))
         panel.set_xlim(0.0, scale(last[dimension].values[-1]).item())
     plot.label_outer(panels)
@@ -233,8 +233,8 @@ def draw_deciding_inputs(result: Result) -> Drawn:
         panel.set_ylabel("share of the variance" if shares else "rank correlation")
         panel.grid(visible=False, axis="x")
     plot.label_outer(panels)
-    said = [(label, describe_ranking(point)) for label, point in zip(labels, shown, strict=True)]
-    decides = (f"{label}: {says}" if label else says[0].upper() + says[1:] for label, says in said if says)
+    rankings = [(label, describe_ranking(point)) for label, point in zip(labels, shown, strict=True)]
+    decides = (f"{label}: {text}" if label else text[0].upper() + text[1:] for label, text in rankings if text)
     return figure, as_sentences(*decides), _n_samples(last), left_out
 
 
@@ -244,13 +244,13 @@ def draw_deciding_inputs(result: Result) -> Drawn:
 def draw_outcomes(result: Result) -> Drawn:
     """One cell a point: the course across, a row for each other combination; nothing where all points are alike."""
     course = find_course(result)
-    if course is None or (result.dataset["outcome"].values == CONVERGED).all():
+    if course is None or (result.dataset["outcome"].values == Outcome.CONVERGED).all():
         return None
-    choice = choose(result, [course.axis], _MOST_ROWS)
-    field = np.array([course.read(result, "outcome", point) for point in choice.points])
+    choice = course.choose(_MOST_ROWS)
+    field = course.read("outcome", *choice.points)
     present = np.unique(field).astype(int).tolist()
     others = itertools.cycle(_OTHERS)
-    cells = {number: _CONVERGED_COLOUR if number == CONVERGED else next(others) for number in present}
+    cells = {number: _CONVERGED_COLOUR if number == Outcome.CONVERGED else next(others) for number in present}
     labels = [textwrap.fill(label, _LABEL_WIDTH) if plot.is_narrow() else label for label in choice.labels]
     figure, panel = plot.new_panel(1.4 + 0.32 * len(field) + 0.15 * sum(label.count("\n") for label in labels))
     norm = BoundaryNorm([*(np.array(present) - 0.5), present[-1] + 0.5], len(present))
@@ -264,9 +264,9 @@ def draw_outcomes(result: Result) -> Drawn:
     panel.set_yticks(np.arange(len(labels)), labels)
     panel.tick_params(length=0)
     panel.spines[:].set_visible(False)
-    words = {number: result.endings[number].word.replace("_", " ") for number in present}
+    words = {number: describe_outcome(number)[0].replace("_", " ") for number in present}
     plot.add_legend(figure, [Patch(facecolor=cells[number], label=words[number]) for number in present])
-    meaning = (f"{words[number].capitalize()}: {result.endings[number].sentence}" for number in present if number)
+    meaning = (f"{words[number].capitalize()}: {describe_outcome(number)[1]}" for number in present if number)
     return figure, as_sentences(*meaning), choice.sentence
 
 
@@ -275,7 +275,7 @@ def list_certificates(result: Result) -> Drawn:
     rows = []
     for name, words in CERTIFICATE.items():
         if result.has(name) and "cycle" in result.dataset[name].dims:
-            values = result.dataset[name].transpose(*result.axes, "cycle").values
+            values = result.of_points(name)
             values = np.where(result.computed[..., None] & np.isfinite(values), values, 0.0)
             *place, cycle = map(int, np.unravel_index(int(np.argmax(values)), values.shape))
             point = result.point_at(place)

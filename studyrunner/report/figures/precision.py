@@ -13,9 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import Drawn
-from studyrunner.report.panels import FloatArray, add_legend, line_style, new_panels, set_log
-from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.report.drawing import Drawn, FloatArray, add_legend, line_style, new_panels, set_log
+from studyrunner.result.view import NO_VOLUME, OWN_STEPS, Result
 from studyrunner.units import show_number, show_percent
 
 KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
@@ -27,8 +26,8 @@ QUANTITIES = {"volume": "final worn volume", "response": "response at the end"}
 RESOLVED = 3.0
 """An error counts from so many times the uncertainty of the reference on."""
 
-_ROUND_OFF = 1e-12
-_AUTO, _OWN_STEPS, _EXPLICIT = "auto", ("adaptive", "final"), "explicit"
+_SMALLEST = 1e-12  # relative error that double precision shows
+_AUTO, _EXPLICIT = "auto", "explicit"
 _COMPARED = (
     *("computed", "run_time", "worn_volume", "response_amplitude", "exact_worn_volume", "exact_response_amplitude"),
     *("error_estimate", "response_error", "harmonics_used"),
@@ -75,16 +74,16 @@ class ComparedPoint:
 
     def is_clear(self, quantity: str) -> NDArray[np.bool_]:
         """Which errors (n_setting,) are clearly more than round-off and the uncertainty of the reference."""
-        least = max(RESOLVED * self.uncertainty[quantity], _ROUND_OFF)
+        least = max(RESOLVED * self.uncertainty[quantity], _SMALLEST)
         return np.asarray((self.errors[quantity] >= least) & np.isfinite(self.errors[quantity]))
 
     def front(self, quantity: str, scheme: str | None = None) -> list[int]:
         """Rows of settings than which no quicker one is as exact, the quickest first."""
         errors = np.maximum(self.errors[quantity], RESOLVED * self.uncertainty[quantity])
-        own = [row for row, each in enumerate(self.settings) if scheme in (None, each.scheme)]
-        own = sorted((row for row in own if np.isfinite(errors[row])), key=lambda row: (self.time[row], errors[row]))
-        least = np.minimum.accumulate([math.inf, *(errors[row] for row in own)])
-        return [row for row, before in zip(own, least, strict=False) if errors[row] < before]
+        of_scheme = np.array([scheme in (None, each.scheme) for each in self.settings]) & np.isfinite(errors)
+        rows = sorted(np.flatnonzero(of_scheme).tolist(), key=lambda row: (self.time[row], errors[row]))
+        least = np.minimum.accumulate([math.inf, *errors[rows]])
+        return [row for row, before in zip(rows, least, strict=False) if errors[row] < before]
 
 
 def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
@@ -97,8 +96,8 @@ def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
     if alone or result.blocks is not None or not result.has("worn_volume", "response_amplitude"):
         return ()
     keys, others = ([name for name in result.axes if (name in KEYS) == each] for each in (True, False))
-    found = _list_settings(result, keys)
-    settings, rows = tuple(found), list(found.values())
+    settings = _list_settings(result, keys)
+    rows = list(settings.values())
     dataset = result.dataset.assign(computed=(result.axes, result.computed)).isel(cycle=-1, missing_dims="ignore")
 
     def read(name: str, at: Mapping[str, int]) -> FloatArray:
@@ -112,31 +111,31 @@ def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
     for place in itertools.product(*(range(dataset.sizes[name]) for name in others)):
         at = dict(zip(others, place, strict=True))
         label = result.describe(at, set(result.varying) - set(KEYS))
-        points.append(_compare(label, settings, {name: read(name, at) for name in _COMPARED}))
+        points.append(_compare(label, tuple(settings), {name: read(name, at) for name in _COMPARED}))
     most = max(int(np.isfinite(each).sum()) for point in points for each in point.errors.values())
     return tuple(points) if most > 1 else ()
 
 
-def _compare(label: str, settings: tuple[Setting, ...], own: Mapping[str, FloatArray]) -> ComparedPoint:
-    """The settings at one point. own (n_setting, ...): variables of `_COMPARED`."""
+def _compare(label: str, settings: tuple[Setting, ...], values: Mapping[str, FloatArray]) -> ComparedPoint:
+    """The settings at one point. values (n_setting, ...): variables of `_COMPARED`."""
 
     def rank(row: int) -> tuple[float, ...]:
         """The highest of the finest setting: smallest estimated error, no explicit steps; then the most harmonics."""
-        error, setting = float(own["error_estimate"][row]), settings[row]
+        error, setting = float(values["error_estimate"][row]), settings[row]
         error = error if math.isfinite(error) and setting.scheme != _EXPLICIT else math.inf
         automatic = isinstance(setting.harmonics, str)
-        harmonics = float(own["harmonics_used"][row]) if automatic else float(setting.harmonics or 0.0)
+        harmonics = float(values["harmonics_used"][row]) if automatic else float(setting.harmonics or 0.0)
         return -error, harmonics, -(setting.step or 0.0)
 
-    computed, worn, response = own["computed"] == 1.0, own["worn_volume"], own["response_amplitude"]
-    volume_there, response_there = (own[f"exact_{name}"][0] for name in ("worn_volume", "response_amplitude"))
+    computed, worn, response = values["computed"] == 1.0, values["worn_volume"], values["response_amplitude"]
+    volume_there, response_there = (values[f"exact_{name}"][0] for name in ("worn_volume", "response_amplitude"))
     reference, uncertainty = None, dict.fromkeys(QUANTITIES, 0.0)
     if not (np.isfinite(volume_there) and np.isfinite(response_there).all()):
         uncertainty = dict.fromkeys(QUANTITIES, math.inf)
         reference = max(np.flatnonzero(computed).tolist(), key=rank, default=None)
         if reference is not None:
             volume_there, response_there = worn[reference], response[reference]
-            estimates = (own[name][reference] for name in ("error_estimate", "response_error"))
+            estimates = (values[name][reference] for name in ("error_estimate", "response_error"))
             known = (float(np.nan_to_num(each, nan=math.inf)) for each in estimates)
             uncertainty = dict(zip(QUANTITIES, known, strict=True))
     volume = np.where(worn > NO_VOLUME, np.inf, np.nan)
@@ -146,7 +145,7 @@ def _compare(label: str, settings: tuple[Setting, ...], own: Mapping[str, FloatA
     compared = computed & (np.arange(len(settings)) != reference)
     errors = {name: np.where(compared, each, np.nan) for name, each in zip(QUANTITIES, (volume, away), strict=True)}
     worn = np.where(computed, worn, np.nan)
-    return ComparedPoint(label, settings, own["run_time"], worn, errors, reference, uncertainty)
+    return ComparedPoint(label, settings, values["run_time"], worn, errors, reference, uncertainty)
 
 
 def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:
@@ -158,20 +157,20 @@ def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:
         return text if key == "scheme" or text == _AUTO else float(text)
 
     by_depth = result.study.get("slow_time", {}).get("largest_depth") is not None
-    solver, found = result.study.get("solver", {}), dict[Setting, int]()
+    solver, settings = result.study.get("solver", {}), dict[Setting, int]()
     axes = ([read(key, value) for value in result.dataset[key].values] for key in keys)
     for place, given in enumerate(itertools.product(*axes)):
         setting = Setting(**dict(zip(keys, given, strict=True)))  # type: ignore[arg-type]
-        if setting.scheme in _OWN_STEPS or (setting.scheme == _EXPLICIT and by_depth):
+        if setting.scheme in OWN_STEPS or (setting.scheme == _EXPLICIT and by_depth):
             setting = setting._replace(step=None)
         if result.cycles[-1] == 0.0:
             # only unworn states: no scheme takes a step
             setting = setting._replace(scheme=None, step=None)
         automatic = [getattr(setting, key) or solver.get(key, _AUTO) for key in ("harmonics", "samples")]
-        if setting.scheme not in _OWN_STEPS and _AUTO not in automatic:
+        if setting.scheme not in OWN_STEPS and _AUTO not in automatic:
             setting = setting._replace(rtol=None)
-        found.setdefault(setting, place)
-    return found
+        settings.setdefault(setting, place)
+    return settings
 
 
 def draw_precision(result: Result) -> Drawn:
@@ -185,8 +184,8 @@ def draw_precision(result: Result) -> Drawn:
         return "Here no error is clearly larger than the uncertainty of the reference: give finer values of a key."
     figure, (panels,) = new_panels(1, len(quantities), 3.0)
     schemes = dict.fromkeys(each.scheme for each in point.settings)
-    lines = {scheme: line_style(number) for number, scheme in enumerate(schemes)}
-    lines = {scheme: {key: look[key] for key in ("color", "linestyle")} for scheme, look in lines.items()}
+    looks = map(line_style, range(len(schemes)))
+    lines = {s: {key: look[key] for key in ("color", "linestyle")} for s, look in zip(schemes, looks, strict=True)}
     # the first other key that varies has the shapes
     key = next((key for key in _SHAPED if key in result.varying), "scheme")
     values = {getattr(each, key) for each in point.settings if key != "scheme"} - {None}
@@ -202,19 +201,19 @@ def draw_precision(result: Result) -> Drawn:
     }
     meaning["cheapest for its error"] = _RING
     add_legend(figure, [Line2D([], [], label=label, **look) for label, look in meaning.items()])
-    said = "errors are those against the exact answer"
+    against = "errors are those against the exact answer"
     if point.reference is not None:
         each = (f"{show_percent(point.uncertainty[name])} ({words})" for name, words in QUANTITIES.items())
         finest = point.settings[point.reference].describe()
-        said = f"errors are those against the finest setting ({finest}), known to {' and '.join(each)}"
-    return figure, f"{point.label or 'Reference'}: {said}"
+        against = f"errors are those against the finest setting ({finest}), known to {' and '.join(each)}"
+    return figure, f"{point.label or 'Reference'}: {against}"
 
 
 def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, lines: Mapping[Any, Any], markers: list[str]) -> None:
     """lines: look of each scheme. markers: of each setting."""
     errors, time, clear = point.errors[quantity], point.time, point.is_clear(quantity)
     least = RESOLVED * point.uncertainty[quantity]
-    bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > _ROUND_OFF) & np.isfinite(errors)])
+    bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > _SMALLEST) & np.isfinite(errors)])
     drawn, known = np.maximum(errors, bottom), np.isfinite(errors)
     for scheme, look in lines.items():
         rows = point.front(quantity, scheme)

@@ -12,13 +12,12 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
-from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn
-from studyrunner.report.figures.flanks import JOINT_WORDS
-from studyrunner.report.panels import COLOURS, FloatArray
+from studyrunner.report import drawing as plot
+from studyrunner.report.drawing import COLOURS, Drawn, FloatArray
 from studyrunner.report.selection import Course, choose, find_course, labelled
-from studyrunner.result.pairs import has_depths, last_depth
-from studyrunner.result.view import NO_VOLUME, Point, Result
+from studyrunner.result.opening import pairs_with_loops
+from studyrunner.result.pairs import JOINT_WORDS, last_depth
+from studyrunner.result.view import NO_MOTION, Point, Result
 from studyrunner.units import scale_for
 
 _MOST_LINES, _MOST_RESPONSES, _MOST_MODES, _MOST_PAIRS = 3, 3, 6, 3
@@ -27,7 +26,6 @@ _BEFORE = "worn_cycle"
 _WORN: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (5, 1.5)), "marker": "s", "markersize": 4.5}
 _EXACT: dict[str, Any] = {"color": "0.5", "linewidth": 5, "alpha": 0.45, "zorder": 1}
 _LABEL_WIDTH = 25
-_NO_MOTION = 1e-15  # m; a range below this is round-off
 _TANGENTS = ("tangent_1", "tangent_2")
 _UNITS = {"phase": "°", "displacement": "m", "force": "N"}
 # of each figure what its rows show over what: signal and component
@@ -56,8 +54,8 @@ def draw_responses(result: Result) -> Drawn:
     """Amplitude of the first harmonic over frequency, a panel a response: of the new and of the shown worn joint."""
     course, curves = find_course(result, "frequency"), result.recomputed.get("response")
     if course is None and curves is None:
-        said = "The study has one frequency: give several under [axes] frequency"
-        return f"{result.no_worn_response or said}."
+        remedy = "The study has one frequency: give several under [axes] frequency"
+        return f"{result.no_worn_response or remedy}."
     if course is not None and result.cycles[0] != 0.0:
         return "The file holds no new joint: add 0 to slow_time.outputs."
     lines, failed, left_out = _new_joint(result, course) if course else ([], np.zeros((0, 0), np.bool_), "")
@@ -101,17 +99,17 @@ def _new_joint(result: Result, course: Course) -> tuple[list[_Line], NDArray[np.
     lines, failed = [], []
     for place, (point, label) in enumerate(choice):
         others = {name: index for name, index in point.items() if name != "frequency"}
-        own = unworn.isel(others, missing_dims="ignore").transpose("frequency", "response").values[course.index]
-        failed.append(np.isnan(own[:, 0]))
+        values = unworn.isel(others, missing_dims="ignore").transpose("frequency", "response").values[course.index]
+        failed.append(np.isnan(values[:, 0]))
         at = course.values
         if result.has("branch"):
-            jumps = np.flatnonzero(np.diff(course.read(result, "branch", point)) != 0) + 1
-            at, own = np.insert(at, jumps, np.nan), np.insert(own, jumps, np.nan, axis=0)
+            jumps = np.flatnonzero(np.diff(course.read("branch", point)[0]) != 0) + 1
+            at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan, axis=0)
         text = label if _BEFORE in result.varying else ", ".join(filter(None, (label, "new joint")))
         # the second colour is that of the worn joint
-        lines.append(_Line(text, at, own, course.line_style(place + (place > 0))))
+        lines.append(_Line(text, at, values, course.line_style(place + (place > 0))))
     if result.has("exact_response_amplitude"):
-        exact = course.read(result, "exact_response_amplitude", result.shown)[:, 0]
+        exact = course.read("exact_response_amplitude", result.shown)[0, :, 0]
         lines += [_Line("exact", course.values, exact, _EXACT)] if np.isfinite(exact).any() else []
     return lines, np.array(failed), choice.sentence
 
@@ -120,32 +118,11 @@ def _recomputed(curves: xr.Dataset) -> list[_Line]:
     """Lines computed again, of the worn joint and where it is there of the new one."""
     lines = []
     for cycle in range(curves.sizes["cycle"]):
-        is_new, own = curves.sizes["cycle"] > 1 and cycle == 0, curves.isel(cycle=cycle)
+        is_new, curve = curves.sizes["cycle"] > 1 and cycle == 0, curves.isel(cycle=cycle)
         label, look = ("new joint", plot.line_style(0)) if is_new else (str(curves.attrs["title"]), _WORN)
-        values, error = (own[f"response_{each}"].values for each in ("amplitude", "error"))
+        values, error = (curve[f"response_{each}"].values for each in ("amplitude", "error"))
         lines.append(_Line(label, curves["frequency"].values, values, look, error))
     return lines
-
-
-def draw_after_wear(result: Result) -> Drawn:
-    """Amplitude of each point after its own wear, beside that of the new joint; nothing where no point wears."""
-    course = find_course(result, "frequency")
-    wears = not result.has("worn_volume") or float(np.nanmax(result.worn, initial=0.0)) > NO_VOLUME
-    if course is None or len(result.cycles) == 1 or not wears:
-        return None
-    choice = choose(result, ["frequency"], _MOST_LINES)
-    fields = np.array([course.read(result, "response_amplitude", point)[..., 0] for point in choice.points])
-    scale, (figure, panel) = scale_for("m", fields), plot.new_panel(3.4)
-    own = [f"each after its own {result.cycle_label(cycle)}" for cycle in (0, -1)]
-    new = "new joint" if result.cycles[0] == 0.0 else own[0]
-    panel.plot(course.values, scale(fields[0, :, 0]), color="0.5", linewidth=1.0, label=new)
-    for number, (label, field) in enumerate(zip(choice.labels, fields, strict=True)):
-        look = course.line_style(number) | {"linestyle": "none", "label": ", ".join(filter(None, (label, own[1])))}
-        panel.plot(course.values, scale(field[:, -1]), **look)
-    plot.set_from_zero(panel)
-    panel.set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
-    course.set_axis(panel)
-    return figure, choice.sentence
 
 
 def draw_mode(result: Result, name: str) -> Drawn:
@@ -153,15 +130,14 @@ def draw_mode(result: Result, name: str) -> Drawn:
     course = find_course(result, "modal_amplitude")
     if course is None:
         return "The study has one amplitude: give several under [axes] modal_amplitude."
-    choice = choose(result, ["modal_amplitude"], _MOST_MODES, first=("cycle", "mode", "sweep"))
+    choice = course.choose(_MOST_MODES, first=("cycle", "mode", "sweep"))
     figure, panel = plot.new_panel(3.6)
-    values = np.array([course.read(result, name, point) for point in choice.points])
-    for number, (point, label) in enumerate(choice):
-        error = course.read(result, f"{name}_error", point) if result.has(f"{name}_error") else None
-        if np.isfinite(values[number]).any():
-            plot.add_line(
-                panel, course.values, values[number], error, **course.line_style(number), label=label or "mode"
-            )
+    values, has_errors = course.read(name, *choice.points), result.has(f"{name}_error")
+    errors = course.read(f"{name}_error", *choice.points) if has_errors else np.nan * values
+    for number, (label, line, error) in enumerate(zip(choice.labels, values, errors, strict=True)):
+        if np.isfinite(line).any():
+            look = course.line_style(number) | {"label": label or "mode"}
+            plot.add_line(panel, course.values, line, error, **look)
     panel.set(xlabel=course.label, ylabel="natural frequency (Hz)" if name == "natural_frequency" else "damping ratio")
     plot.set_log(panel.xaxis, float(course.values[0]), float(course.values[-1]))
     low, high = float(np.nanmin(values, initial=np.inf)), float(np.nanmax(values, initial=-np.inf))
@@ -178,11 +154,9 @@ def find_loops(result: Result, point: Point) -> list[int]:
     """Contact pairs whose loops the file holds at a point: those that the study asked for, without those of NaN."""
     if not result.has("loop_displacement", "loop_force"):
         return []
-    listed = result.study.get("outputs", {}).get("loops")
-    pairs = [int(pair) for pair in result.dataset["contact"].values]
-    wanted = [pair for pair in pairs if pair in listed] if isinstance(listed, list) and listed else pairs
-    force = result.at("loop_force", point, 0).sel(contact=wanted)
-    return [pair for pair in wanted if force.sel(contact=pair).notnull().any()]
+    pairs = pairs_with_loops(result.dataset) or result.dataset["contact"].values.tolist()
+    force = result.at("loop_force", point, 0).sel(contact=pairs)
+    return [pair for pair in pairs if force.sel(contact=pair).notnull().any()]
 
 
 def draw_loops(result: Result, name: str) -> Drawn:
@@ -190,7 +164,7 @@ def draw_loops(result: Result, name: str) -> Drawn:
 
     Where the file has no loops, a sentence in place of the fretting loops; None where nothing moves.
     """
-    depth = last_depth(result, result.shown) if has_depths(result) else np.zeros(result.dataset.sizes["contact"])
+    depth = last_depth(result, result.shown)
     worn = dict(zip(result.dataset["contact"].values.tolist(), np.nan_to_num(depth).tolist(), strict=True))
     there, source = find_loops(result, result.shown), result.recomputed.get("loops")
     how = "" if source is None else str(source.attrs["how"])
@@ -201,8 +175,8 @@ def draw_loops(result: Result, name: str) -> Drawn:
         source = result.dataset[["loop_displacement", "loop_force"]].isel(result.shown)
     else:
         deepest = max(worn, key=lambda pair: worn[pair])
-        said = f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
-        return said if name == "fretting_loops" else None
+        remedy = f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
+        return remedy if name == "fretting_loops" else None
     pairs = sorted(sorted(there, key=lambda pair: -worn.get(pair, 0.0))[:_MOST_PAIRS])
     others = ", ".join(str(pair) for pair in there if pair not in pairs)
     how = how or (f"The file also holds loops of the pairs {textwrap.shorten(others, 40)}" if others else "")
@@ -245,7 +219,7 @@ def _signal(loop: xr.Dataset, each: tuple[str, str]) -> FloatArray:
     if component == "normal":
         return np.asarray(np.nan_to_num(values))
     away = values - values[:, :-1].mean(axis=1, keepdims=True)
-    return np.where(np.ptp(values, axis=1, keepdims=True) >= _NO_MOTION, away, 0.0)
+    return np.where(np.ptp(values, axis=1, keepdims=True) >= NO_MOTION, away, 0.0)
 
 
 def _word(result: Result, each: tuple[str, str], rows: list[Any]) -> str:

@@ -1,4 +1,4 @@
-"""Pictures of the root: where it wears, slips and opens; the sector with its frequencies, and the disk (Fig. 2)."""
+"""Pictures of the root: where it wears, slips and opens; the sector with its frequencies (Fig. 2)."""
 
 from __future__ import annotations
 
@@ -10,16 +10,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn
-from studyrunner.report.figures.flanks import largest_pair
-from studyrunner.report.panels import COLOURS, FloatArray
+from studyrunner.report import drawing as plot
+from studyrunner.report.drawing import COLOURS, Drawn, FloatArray
+from studyrunner.report.figures.pairs import largest_pair
 from studyrunner.report.root import (
     MESH,
     RootSurface,
-    View,
     draw_scale_bar,
-    face_normals,
     find_views,
     from_aslant,
     paint_faces,
@@ -34,9 +31,7 @@ from studyrunner.units import Scale, scale_for, show_number
 OF_SECTOR = (*MESH, "mesh_part", "natural_frequency")
 """Variables that the figure of the sector shows."""
 
-_MOST_CLOSE_UPS, _FEWEST_SECTORS = 2, 3
-_MOST_PAIRS, _MOST_FACES, _MOST_OF_DISK = 20_000, 60_000, 300_000
-_TO_EYE, _FADED = np.array([0.35, 0.25, 1.0]), 0.45  # the disk: direction to the eye, paleness of the other sectors
+_MOST_CLOSE_UPS, _MOST_PAIRS, _MOST_FACES = 2, 20_000, 60_000
 
 
 def _read_surface(result: Result) -> RootSurface | None:
@@ -50,8 +45,7 @@ def draw_root(result: Result) -> Drawn:
     shown, surface = result.shown, _read_surface(result)
     if surface is None or not (has_depths(result) or result.has("mean_pressure")):
         return None
-    last = result.last_reached(shown)
-    depth = last_depth(result, shown) if has_depths(result) else np.zeros(result.dataset.sizes["contact"])
+    last, depth = result.last_reached(shown), last_depth(result, shown)
     name, values, units = "wear depth", depth, "m"
     if result.has("mean_pressure") and not float(depth.max()) > NO_DEPTH:
         name, values, units = "mean pressure", result.at("mean_pressure", shown, last).values, "Pa"
@@ -86,9 +80,10 @@ def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale:
     figure, (panels,) = plot.new_panels(1, len(ratios), 3.4, width_ratios=ratios)
     norm = Normalize(0.0, scale(float(of_pairs.max())).item() or 1.0)
     at_nodes = np.full(len(nodes), np.nan)
-    at_nodes[surface.own] = scale(of_pairs[surface.pairs])
-    colours, own = rgb(surface.bodies, surface.body), surface.flank >= 0
-    colours[own] = mpl.colormaps[mpl.rcParams["image.cmap"]](norm(at_nodes[surface.faces[own]].mean(axis=1)))[:, :3]
+    at_nodes[surface.contact_nodes] = scale(of_pairs[surface.pairs])
+    colours, touch = rgb(surface.bodies, surface.body), surface.flank >= 0
+    of_faces = at_nodes[surface.faces[touch]].mean(axis=1)
+    colours[touch] = mpl.colormaps[mpl.rcParams["image.cmap"]](norm(of_faces))[:, :3]
     for panel, view in zip(panels, [views[-1], *close_ups], strict=True):
         faces = surface.faces[view.faces]
         paint_faces(panel, nodes, faces, colours[view.faces], view)
@@ -96,27 +91,6 @@ def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale:
         panel.set_title(view.title)
     plot.add_colour_bar(figure, panels, norm, scale.label(label), fraction=0.05, panchor=False)
     return figure
-
-
-def draw_disk(result: Result) -> Drawn:
-    """The disk of all sectors, that of the mesh in full colour; None without sectors, or with too many faces."""
-    scene, surface = result.study.get("scene", {}), _read_surface(result)
-    number = scene.get("n_sectors")
-    if scene.get("model") != "dovetail_sector" or not isinstance(number, int) or surface is None:
-        return None
-    if number < _FEWEST_SECTORS or number * len(surface.faces) > _MOST_OF_DISK:
-        return None
-    to_eye, angles = _TO_EYE / np.linalg.norm(_TO_EYE), 2.0 * np.pi * np.arange(number) / number
-    turns = np.array([[[np.cos(a), np.sin(a), 0.0], [-np.sin(a), np.cos(a), 0.0], [0.0, 0.0, 1.0]] for a in angles])
-    nodes = (surface.nodes @ turns).reshape(-1, 3)
-    faces = (surface.faces + len(surface.nodes) * np.arange(number)[:, None, None]).reshape(-1, 4)
-    colours = np.tile(rgb(surface.bodies, surface.body), (number, 1))
-    colours[len(surface.faces) :] += (1.0 - colours[len(surface.faces) :]) * _FADED
-    looking = face_normals(nodes, faces) @ to_eye > 0.0
-    figure, panel = plot.new_panel(4.6)
-    view = View("", looking, to_eye, np.array([1.0, 0.0, 0.0]))
-    paint_faces(panel, nodes, faces[looking], colours[looking], view, lines=0.0)
-    return figure, f"The {number} sectors of the disk, seen along its axis; parts: {', '.join(surface.bodies)}"
 
 
 def draw_sector(result: Result) -> Drawn:
@@ -130,21 +104,21 @@ def draw_sector(result: Result) -> Drawn:
         view = from_aslant(nodes, len(faces))
         paint_faces(panels[0], nodes, faces, rgb(tuple(names.tolist()), body), view)
         draw_scale_bar(panels[0], nodes, view)
-    panel, own = panels[-1], result.dataset["natural_frequency"].transpose("nodal_diameter", "mode")
-    for number, mode in enumerate(own.values.T):
+    panel, modes = panels[-1], result.dataset["natural_frequency"].transpose("nodal_diameter", "mode")
+    for number, mode in enumerate(modes.values.T):
         style = {"linewidth": 0.8, "markersize": 3.5, "marker": plot.line_style(number)["marker"], "color": "0.35"}
         style |= {"markerfacecolor": COLOURS[0], "label": f"_mode {number + 1}"}
-        panel.plot(own["nodal_diameter"].values, mode, **style)
-    plot.set_from_zero(panel, float(np.nanmax(own.values)))
+        panel.plot(modes["nodal_diameter"].values, mode, **style)
+    plot.set_from_zero(panel, float(np.nanmax(modes.values)))
     panel.set(xlabel="nodal diameter", ylabel="natural frequency (Hz)")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    said = f"With the joint stuck, {own.sizes['mode']} modes, the lowest at {np.nanmin(own.values):.4g} Hz"
+    text = f"With the joint stuck, {modes.sizes['mode']} modes, the lowest at {np.nanmin(modes.values):.4g} Hz"
     of = f"Of the sector at {result.describe(result.shown, result.fixed)}" if result.fixed else ""
     diameter = result.study.get("scene", {}).get("nodal_diameter")
     if not isinstance(diameter, int) or "frequency" not in result.dataset.coords:
-        return figure, said, of
+        return figure, text, of
     ends = [float(end(result.dataset["frequency"].values)) for end in (np.min, np.max)]
     star: dict[str, Any] = {"marker": "*", "markersize": 11, "label": "this study", "clip_on": False, "zorder": 5}
     panel.plot([diameter, diameter], ends, color=COLOURS[1], **star)
     span = " to ".join(dict.fromkeys(f"{each:.6g}" for each in ends))
-    return figure, f"{said}. Star: this study, {span} Hz at nodal diameter {diameter}", of
+    return figure, f"{text}. Star: this study, {span} Hz at nodal diameter {diameter}", of

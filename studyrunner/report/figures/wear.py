@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from studyrunner.report import panels as plot
-from studyrunner.report.drawing import Drawn, Table
-from studyrunner.report.panels import FloatArray
+from solver.outcome import Outcome
+from studyrunner.report import drawing as plot
+from studyrunner.report.drawing import Drawn, FloatArray, Table
 from studyrunner.report.selection import (
     Choice,
     Course,
@@ -62,14 +62,16 @@ def draw_history(result: Result) -> Drawn:
     panel.set_xlim(0.0, panel.dataLim.xmax or None)  # 0: a target before the second count
     panel.set_ylabel(scale.label("worn volume"))
     plot.set_from_zero(panel, highest if wears else 0.0)
-    said = f"Worn {_at_the_end(result)}: {', '.join(ends)}" if wears else "Nothing is worn at the stored counts"
-    return figure, said, choice.sentence
+    text = f"Worn {_at_the_end(result)}: {', '.join(ends)}" if wears else "Nothing is worn at the stored counts"
+    return figure, text, choice.sentence
 
 
 def draw_excitation(result: Result) -> Drawn:
     """Frequency of an excitation that follows the resonance; nothing where the study gives the frequency."""
     if not result.followed or len(result.cycles) == 1:
         return None
+    if not result.has("excitation_frequency"):
+        return result.lacks("excitation_frequency")
     choice, (figure, panel) = choose(result, [], _MOST_LINES), plot.new_panel(3.4)
     _draw_over_cycles(result, panel, "excitation_frequency", choice, Scale(1.0, "Hz"))
     panel.set_ylabel("frequency (Hz)")
@@ -117,7 +119,7 @@ def _with_error(result: Result, point: Point) -> str:
     place = result.place(point)
     if not result.computed[place] or not 0.0 < result.errors[place] < np.inf:
         return ""
-    remark = ", sensitive" if result.ended("sensitive")[place] else ", above rtol" if result.above[place] else ""
+    remark = ", sensitive" if result.ended(Outcome.SENSITIVE)[place] else ", above rtol" if result.above[place] else ""
     return f" ± {result.show_error(point)}{remark}"
 
 
@@ -135,40 +137,40 @@ def draw_final(result: Result) -> Drawn:
     course = _worn_over(result)
     if course is None:
         return None
-    choice = choose(result, [course.axis], _MOST_LINES)
-    fields = np.array([course.read(result, "worn_volume", point) for point in choice.points])
-    name = "error_estimate"
-    known = [course.read(result, name, point) if result.has(name) else fields[0, :, 0] * 0.0 for point in choice.points]
-    failed = np.isnan(fields[..., 0])
+    choice = course.choose(_MOST_LINES)
+    volumes, errors = course.read("worn_volume", *choice.points), course.read(result.errors, *choice.points)
+    failed = np.isnan(volumes[..., 0])
     # of a point that ended early, what was worn by then
-    reached = np.where(np.isnan(fields).all(axis=-1), np.nan, np.nan_to_num(fields).max(axis=-1))
+    reached = np.where(np.isnan(volumes).all(axis=-1), np.nan, np.nan_to_num(volumes).max(axis=-1))
     number, place = map(int, np.unravel_index(int(np.nanargmax(reached)), reached.shape))
     scale, (figure, panel) = scale_for("m3", reached), plot.new_panel(3.4)
     highest = top = float(scale(reached[number, place]))
-    for line, (label, values, error) in enumerate(zip(choice.labels, fields[..., -1], known, strict=True)):
+    for line, (label, values, error) in enumerate(zip(choice.labels, volumes[..., -1], errors, strict=True)):
         if not failed[line].all():
             look = course.line_style(line) | {"label": label or "computed"}
             reach = plot.add_line(panel, course.values, scale(values), scale(error * values), **look)
             highest = max(highest, min(reach, 2.0 * top))
-    _mark_care(result, panel, course, choice, scale(reached))
+    _mark_care(panel, course, choice, scale(reached))
     plot.set_from_zero(panel, highest)
     crosses = plot.mark_failed(panel, course.values, failed)
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume {_at_the_end(result)}"))
-    wrong = f" ± {show_percent(known[number][place])}" if known[number][place] > 0.0 else ""
-    text = f"Largest: {scale.show(float(reached[number, place]), 4)}{wrong} at {course.at(result, place)}"
+    error = errors[number, place]
+    wrong = f" ± {show_percent(error)}" if error > 0.0 else ""
+    text = f"Largest: {scale.show(float(reached[number, place]), 4)}{wrong} at {course.at(place)}"
     return figure, labelled(text, choice.labels[number]), crosses, choice.sentence
 
 
-def _mark_care(result: Result, panel: Axes, course: Course, choice: Choice, fields: FloatArray) -> None:
-    """Marks at points to be taken with care. fields (n_lines, n): their worn volumes, as shown."""
-    sensitive, early = result.ended("sensitive"), result.has_values & ~result.computed
+def _mark_care(panel: Axes, course: Course, choice: Choice, volumes: FloatArray) -> None:
+    """Marks at points to be taken with care. volumes (n_lines, n): their worn volumes, as shown."""
+    result = course.result
+    sensitive, early = result.ended(Outcome.SENSITIVE), result.has_values & ~result.computed
     kinds = {"above rtol": ("s", result.above & ~sensitive), "sensitive": ("D", sensitive), "ended early": ("^", early)}
     for label, (marker, where) in kinds.items():
-        marked = np.array([course.along(result, where, point) for point in choice.points]) & np.isfinite(fields)
+        marked = (course.read(where, *choice.points) > 0.0) & np.isfinite(volumes)
         if marked.any():
             x = np.broadcast_to(course.values, marked.shape)[marked]
-            panel.plot(x, fields[marked], marker=marker, label=label, **_LARGE)
+            panel.plot(x, volumes[marked], marker=marker, label=label, **_LARGE)
 
 
 def draw_map(result: Result, name: str) -> Drawn:
@@ -176,12 +178,13 @@ def draw_map(result: Result, name: str) -> Drawn:
     course = _worn_over(result)
     if course is None or result.has("cycle_count"):
         return None
-    cycles, choice = scale_for(result.counted, result.cycles), choose(result, [course.axis], _MOST_MAPS)
-    fields = np.array([course.read(result, name, point) for point in choice.points])
-    place = tuple(map(int, np.unravel_index(int(np.nanargmax(fields)), fields.shape)))
+    cycles, choice = scale_for(result.counted, result.cycles), course.choose(_MOST_MAPS)
+    fields = course.read(name, *choice.points)
+    number, place, count = map(int, np.unravel_index(int(np.nanargmax(fields)), fields.shape))
+    largest = fields[number, place, count]
     scale = scale_for("m3" if name == "worn_volume" else f"m3 per {result.counted[:-1]}", fields)
     figure, panels = plot.panel_grid(choice.labels, 2.7, sharex=True)
-    norm = Normalize(0.0, scale(fields[place]).item() or 1.0)
+    norm = Normalize(0.0, scale(largest).item() or 1.0)
     # half a cell at both ends: nothing is known beyond
     rows = np.clip(cell_edges(cycles(result.cycles)), cycles(result.cycles[0]), cycles(result.cycles[-1]))
     for panel, field in zip(panels.flat, fields, strict=True):
@@ -191,8 +194,8 @@ def draw_map(result: Result, name: str) -> Drawn:
     for panel in panels[-1]:
         course.set_axis(panel)
     plot.add_colour_bar(figure, panels, norm, scale.label(name.replace("_", " ")))
-    text = f"{scale.show(float(fields[place]), 4)} at {course.at(result, place[1])}, {result.cycle_label(place[2])}"
-    return figure, labelled(f"Largest: {text}", choice.labels[place[0]]), choice.sentence
+    text = f"{scale.show(float(largest), 4)} at {course.at(place)}, {result.cycle_label(count)}"
+    return figure, labelled(f"Largest: {text}", choice.labels[number]), choice.sentence
 
 
 # --- of missions, by block ---
@@ -202,17 +205,13 @@ def list_blocks(result: Result) -> Drawn:
     """Frequency, cycles, worn volume with its error, and share of each block at the last number of missions."""
     assert result.blocks is not None
     blocks = result.blocks.isel(result.shown, missing_dims="ignore")
+    reached = np.flatnonzero(np.isfinite(blocks["block_worn_volume"].values).all(axis=1))
+    last, rows = int(reached[-1]) if reached.size else 0, []
+    blocks = blocks.isel(cycle=last)
     worn = blocks["block_worn_volume"].values
-    reached = np.flatnonzero(np.isfinite(worn).all(axis=1))
-    last = int(reached[-1]) if reached.size else 0
-    scale, total, rows = scale_for("m3", worn[last]), float(worn[last].sum()), []
-    numbers = [
-        worn[last],
-        blocks["block_worn_volume_error"].values[last],
-        *(blocks[name].values for name in LISTED[:4]),
-    ]
-    for name, *values in zip(blocks["block"].values, *numbers, strict=True):
-        volume, error, begin, end, cycles, rate = map(float, values)
+    scale, total = scale_for("m3", worn), float(worn.sum())
+    for name, *values in zip(blocks["block"].values, *(blocks[name].values for name in LISTED), strict=True):
+        begin, end, cycles, rate, volume, error = map(float, values)
         amount = scale.show(volume, 4) if reached.size else "-"
         amount += f" ± {show_percent(error)}" if error > 0.0 else ""
         share = show_percent(volume / total) if total > NO_VOLUME else "-"
@@ -236,11 +235,10 @@ def draw_blocks(result: Result, names: Mapping[str, str]) -> Drawn:
         unit = str(blocks[name].attrs.get("units", "1"))
         scale = Scale(100.0, "%") if unit == "1" else scale_for(unit, values)
         for place, block in enumerate(blocks["block"].values):
-            own = scale(values[:, place])
-            error = blocks[wrong].values[:, place] * own if wrong in blocks else None
-            plot.add_line(
-                panel, result.cycles, own, error, band=True, label=str(block), **plot.line_style(place, own.size)
-            )
+            line = scale(values[:, place])
+            error = blocks[wrong].values[:, place] * line if wrong in blocks else None
+            look = plot.line_style(place, line.size) | {"label": str(block)}
+            plot.add_line(panel, result.cycles, line, error, band=True, **look)
         plot.set_from_zero(panel, float(np.nanmax(scale(values), initial=0.0)))
         panel.set_ylabel(scale.label(words))
     panels[-1, 0].set(xlabel="missions", xlim=(0.0, result.cycles[-1]))

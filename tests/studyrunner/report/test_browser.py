@@ -12,7 +12,7 @@ from selenium.webdriver.support.select import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
 from solver.outcome import Outcome
-from studyrunner.report.page.page import write_page
+from studyrunner.report.page import write_page
 from tests.studyrunner.report.cases import dovetail, dovetail_file, draw_figure
 from tests.studyrunner.results import as_result, build_file, sample_file
 

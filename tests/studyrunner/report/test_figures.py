@@ -15,11 +15,12 @@ from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 from studies.scene import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing
-from studyrunner.report.figures.flanks import find_flanks
+from studyrunner.result.pairs import find_flanks
 from studyrunner.result.view import Result
+from studyrunner.study.study_file import read_study
 from tests.studyrunner.report.cases import check_print, dovetail_file, draw_figure, numbers_of, values_of, with_mesh
 from tests.studyrunner.report.test_precision import finest_file
-from tests.studyrunner.results import fail, make_result, sample_file
+from tests.studyrunner.results import fail, result_of_study, sample_file, smooth_result
 
 ALL_DRAWINGS = (
     "final_worn_volume worn_volume worn_volume_map wear_rate_map frequency_response wear_depth worn_profile"
@@ -51,17 +52,17 @@ MANY = {"wear_coefficient": [1e-12, 1.1e-11], "sweep": ["up", "down"], "failed":
 WEARS = {"frequency": [200.0], "wear_coefficient": [1e-12, 1e-11, 1e-10]}
 # of each result what is drawn, and what is not, as there is nothing to see
 CASES = {
-    "complete": (lambda: with_sector(make_result(loops=(0, 11))), ALL_DRAWINGS, ""),
-    "one point": (lambda: make_result(frequency=[200.0], scheme=["implicit"]), "worn_volume", ALONG),
-    "no cycles": (lambda: make_result(cycles=[0.0]), "", f"worn_volume {FLAT}"),
-    "all failed": (lambda: make_result(failed=range(8)), "", ALL_DRAWINGS),
-    "nothing wears": (lambda: make_result(wears=False), "worn_volume", FLAT),
-    "scattered pairs": (lambda: make_result(pairs="scattered"), "worn_profile", ""),
-    "pairs nowhere": (lambda: make_result(pairs="nowhere"), "wear_depth", "worn_profile pair_numbers"),
-    "wear coefficients": (lambda: make_result(**WEARS), "trends", "frequency_response"),
-    "many": (lambda: with_sector(make_result(**MANY)), "outcome_map trends", ""),
-    "two responses": (lambda: make_result(responses=("tip", "root")), "frequency_response", ""),
-    "nothing asked for": (lambda: make_result(without=NOTHING), "", "worn_volume frequency_response"),
+    "complete": (lambda: with_sector(smooth_result(loops=(0, 11))), ALL_DRAWINGS, ""),
+    "one point": (lambda: smooth_result(frequency=[200.0], scheme=["implicit"]), "worn_volume", ALONG),
+    "no cycles": (lambda: smooth_result(cycles=[0.0]), "", f"worn_volume {FLAT}"),
+    "all failed": (lambda: smooth_result(failed=range(8)), "", ALL_DRAWINGS),
+    "nothing wears": (lambda: smooth_result(wears=False), "worn_volume", FLAT),
+    "scattered pairs": (lambda: smooth_result(pairs="scattered"), "worn_profile", ""),
+    "pairs nowhere": (lambda: smooth_result(pairs="nowhere"), "wear_depth", "worn_profile pair_numbers"),
+    "wear coefficients": (lambda: smooth_result(**WEARS), "trends", "frequency_response"),
+    "many": (lambda: with_sector(smooth_result(**MANY)), "outcome_map trends", ""),
+    "two responses": (lambda: smooth_result(responses=("tip", "root")), "frequency_response", ""),
+    "nothing asked for": (lambda: smooth_result(without=NOTHING), "", "worn_volume frequency_response"),
     "samples": (samples, "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs", ""),
     "settings": (lambda: finest_file(1e-4), "precision", ""),
 }
@@ -96,7 +97,6 @@ def test_each_kind_of_result_has_its_figures_and_they_can_be_read(case):
 LINES = {
     "worn_volume": ("worn_volume", 1e9, {"frequency": 2}),
     "final_worn_volume": ("worn_volume", 1e9, {"cycle": -1}),
-    "response_after_own_wear": ("response_amplitude", 1e3, {"cycle": -1}),
     "wear_depth": ("wear_depth", 1e6, {"frequency": 2, "cycle": -1}),
 }
 LOOPS = {
@@ -109,7 +109,7 @@ LOOPS = {
 @pytest.mark.parametrize("name", LINES)
 def test_each_scheme_has_a_line_with_the_numbers_of_the_file(name):
     variable, factor, place = LINES[name]
-    result = make_result()
+    result = smooth_result()
     drawn = [rows for series, rows in numbers_of(draw_figure(result, name)).items() if "scheme" in series]
     expected = result.dataset[variable].isel(place).squeeze(drop=True).transpose("scheme", ...)
     x = expected[expected.dims[-1]].values
@@ -121,7 +121,7 @@ def test_each_scheme_has_a_line_with_the_numbers_of_the_file(name):
 
 @pytest.mark.parametrize(("name", "factor"), [("worn_volume", 1e9), ("wear_rate", 1e12)])
 def test_maps_over_frequency_and_cycles(name, factor):
-    result = make_result(frequency=[204.0, 200.0, 202.0, 201.0], failed=[2])
+    result = smooth_result(frequency=[204.0, 200.0, 202.0, 201.0], failed=[2])
     drawing = draw_figure(result, f"{name}_map")
     for number, rows in enumerate(numbers_of(drawing).values()):
         expected = factor * values_of(result, name, scheme=number)[[1, 3, 2, 0]].T
@@ -140,7 +140,7 @@ FLANKS = (range(6), range(6, 12))
 
 
 def test_pressure_and_depth_of_the_pairs_are_maps_and_profiles():
-    result = make_result()
+    result = smooth_result()
     pressure = draw_figure(result, "mean_pressure")
     places = [(pairs, cycle) for cycle in (0, -1) for pairs in FLANKS]
     for rows, place in zip(numbers_of(pressure).values(), places, strict=True):
@@ -156,13 +156,13 @@ def test_pressure_and_depth_of_the_pairs_are_maps_and_profiles():
         expected = grid_of(result, "wear_depth", 1e6, pairs, -1)
         np.testing.assert_allclose(rows[:, 2], expected.ravel(), rtol=1e-8)
         for line, row in zip(panel.get_lines(), expected, strict=True):
-            np.testing.assert_allclose(line.get_data(), [[0.0, 10.0, 20.0], row], atol=1e-9)
+            np.testing.assert_allclose(line.get_data(), [[0.0, 20.0, 40.0], row], atol=1e-9)
         assert panel.yaxis_inverted()
 
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_are_closed_and_those_of_the_file(name):
-    result = make_result(loops=(0, 11))
+    result = smooth_result(loops=(0, 11))
     found = numbers_of(draw_figure(result, name))
     for pair in (0, 11):
         of_pair = [
@@ -174,7 +174,7 @@ def test_loops_are_closed_and_those_of_the_file(name):
 
 
 def test_worn_volume_has_a_band_of_its_error_and_a_mark_where_it_ended_early():
-    result = make_result()
+    result = smooth_result()
     fail(result.dataset, 5, 3, 6000.0)
     drawing = draw_figure(result, "worn_volume")
     worn = 1e9 * values_of(result, "worn_volume", frequency=2)
@@ -186,7 +186,7 @@ def test_worn_volume_has_a_band_of_its_error_and_a_mark_where_it_ended_early():
 
 def test_final_volumes_have_bars_and_marks():
     # numbers of points: frequency 200, 201, 202, 204 times implicit, explicit; errors 2 % at 202 Hz, 1.3 % beside it
-    result = make_result(failed=[7])
+    result = smooth_result(failed=[7])
     for point, outcome, last in ((2, 3, 6000.0), (4, 6, 20_000.0), (5, 15, 20_000.0)):
         fail(result.dataset, point, outcome, last)
     drawing = draw_figure(result, "final_worn_volume")
@@ -203,7 +203,7 @@ def test_final_volumes_have_bars_and_marks():
 
 
 def test_frequency_response_of_both_sweeps_is_open_at_the_fold():
-    result = make_result(sweep=["up", "down"], scheme=["implicit"])
+    result = smooth_result(sweep=["up", "down"], scheme=["implicit"])
     result.dataset["branch"][2:, ..., 0] = 1
     lines = numbers_of(draw_figure(result, "frequency_response"))
     for number, sweep in enumerate(("up", "down")):
@@ -214,21 +214,17 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold():
         assert np.flatnonzero(~known).tolist() == ([2] if number == 0 else [])
 
 
-def test_worn_joints_have_response_curves_and_joints_that_wore_differently_are_marks():
-    made = make_result(scheme=["implicit"], wear_coefficient=[0.0, 1e5])
+def test_worn_joints_have_response_curves():
+    made = smooth_result(scheme=["implicit"], wear_coefficient=[0.0, 1e5])
     worn = Result(made.path, made.dataset.rename(wear_coefficient="worn_cycle"))
     lines = numbers_of(draw_figure(worn, "frequency_response"))
     for number, label in enumerate(("|worn cycle 0 1/Pa", "|worn cycle 100 000 1/Pa")):
         expected = 1e3 * values_of(worn, "response_amplitude", worn_cycle=number, cycle=0)
         np.testing.assert_allclose(lines[label][:, 1], expected, rtol=1e-8)
 
-    drawn = draw_figure(make_result(), "response_after_own_wear").figure.axes[0].get_lines()
-    (own,) = [line for line in drawn if str(line.get_label()).startswith("implicit")]
-    assert own.get_linestyle() == "None"
-
 
 def test_an_exact_answer_is_drawn_beside_the_computed_one():
-    result = make_result()
+    result = smooth_result()
     exact = {f"exact_{name}": 1.02 * result.dataset[name] for name in ("worn_volume", "response_amplitude")}
     changed = replace(result, dataset=result.dataset.assign(exact))
     for name in ("worn_volume", "frequency_response"):
@@ -236,7 +232,7 @@ def test_an_exact_answer_is_drawn_beside_the_computed_one():
 
 
 def test_natural_frequencies_and_mesh():
-    result = with_sector(make_result())
+    result = with_sector(smooth_result())
     left, right = draw_figure(result, "natural_frequencies").figure.axes
     faces = next(item for item in left.collections if isinstance(item, PolyCollection))
     assert len(faces.get_paths()) == 6
@@ -247,11 +243,11 @@ def test_natural_frequencies_and_mesh():
 
 
 def test_outcomes_are_words_and_the_worst_certificate_is_named_with_its_place():
-    drawing = draw_figure(make_result(failed=[2, 5]), "outcome_map")
+    drawing = draw_figure(smooth_result(failed=[2, 5]), "outcome_map")
     assert numbers_of(drawing)["|map"][:, 2].reshape(2, 4).tolist() == [[0, 3, 0, 0], [0, 0, 3, 0]]
     assert [label.get_text() for label in drawing.figure.axes[0].get_xticklabels()] == ["200", "201", "202", "204"]
     assert [text.get_text() for text in drawing.figure.legends[0].get_texts()] == ["converged", "branch lost"]
-    result = make_result()
+    result = smooth_result()
     table = next(item for item in draw_report(result) if item.name == "certificates")
     (row,) = [row for row in table.rows if row[0] == "estimated error of the response"]
     assert float(row[1]) == pytest.approx(float(result.dataset["response_error"].max()), rel=0.05)
@@ -262,15 +258,14 @@ def test_outcomes_are_words_and_the_worst_certificate_is_named_with_its_place():
 def test_a_flank_is_as_large_as_it_is(density):
     """40 mm long and 7 mm high: pairs at its edges own a half or a quarter of a cell."""
     for flank in find_flanks(Result(Path("dovetail.nc"), dovetail_file(density))):
-        assert flank.cells is not None
-        np.testing.assert_allclose(flank.cells.x_edges[[0, -1]], [0.0, 0.04], atol=1e-6)
-        np.testing.assert_allclose(flank.cells.y_edges[[0, -1]], [0.0, 0.007], atol=1e-6)
-        cells = np.outer(np.diff(flank.cells.y_edges), np.diff(flank.cells.x_edges))
-        np.testing.assert_allclose(cells, flank.area[flank.cells.pair], rtol=1e-3)
+        for edges, length in zip(flank.edges, (0.04, 0.007), strict=True):
+            np.testing.assert_allclose(edges[[0, -1]], [0.0, length], atol=1e-6)
+        cells = np.outer(*(np.diff(edges) for edges in flank.edges[::-1]))
+        np.testing.assert_allclose(cells, flank.area[flank.grid.pair], rtol=1e-3)
 
 
 def test_the_most_worn_of_many_loops_are_shown_about_their_means_and_one_tangent_has_no_path():
-    result = make_result(loops=range(12))
+    result = smooth_result(loops=range(12))
     # at the last count, along the first tangent
     result.dataset["loop_displacement"].values[..., -1, :, :, 1] += 3e-3
     drawing = draw_figure(result, "fretting_loops")
@@ -283,7 +278,7 @@ def test_the_most_worn_of_many_loops_are_shown_about_their_means_and_one_tangent
 
 
 def test_trends_are_those_of_the_file():
-    result = make_result(wear_coefficient=(1e-12, 5e-12, 5e-11), sweep=("up", "down"))
+    result = smooth_result(wear_coefficient=(1e-12, 5e-12, 5e-11), sweep=("up", "down"))
     last, at = result.dataset.isel(cycle=-1), tuple(result.shown[name] for name in result.axes)
     panels = draw_figure(result, "trends").figure.axes
     for number, values in enumerate((last["worn_volume"].values, last["response_amplitude"].isel(response=0).values)):
@@ -304,6 +299,13 @@ def test_samples_are_those_of_the_file():
     assert names[int(np.argmax([patch.get_height() for patch in bars.patches]))] == "wear coefficient"
 
 
+def test_a_followed_frequency_that_the_file_does_not_hold_is_asked_for():
+    given = ("axes.frequency='resonance'", "loading.between=[180, 230]", "outputs.variables=['worn_volume']")
+    items = list(draw_report(Result(Path("followed.nc"), result_of_study(read_study("sdof_slider", given)))))
+    (missing,) = [item for item in items if item.name == "excitation_frequency"]
+    assert "excitation_frequency" in missing.sentence
+
+
 # --- files ---
 
 
@@ -311,19 +313,19 @@ def test_samples_are_those_of_the_file():
 def test_figures_are_saved_as_svg_and_png_for_a_page_and_for_a_column(tmp_path):
     before = dict(mpl.rcParams)
     for name in ("final_worn_volume", "worn_volume_map"):
-        paths = draw_figure(make_result(), name).save(tmp_path)
+        paths = draw_figure(smooth_result(), name).save(tmp_path)
         contents_of = [path.read_bytes() for path in paths]
         assert max(map(len, contents_of)) < 200_000
         # 190 mm and 90 mm at 300 dpi
         pngs = [path.with_suffix(".png").read_bytes() for path in paths]
         assert [int.from_bytes(png[16:20]) for png in pngs] == [2250, 1065]
-        assert [path.read_bytes() for path in draw_figure(make_result(), name).save(tmp_path)] == contents_of
+        assert [path.read_bytes() for path in draw_figure(smooth_result(), name).save(tmp_path)] == contents_of
     assert dict(mpl.rcParams) == before
 
 
 def test_a_history_with_values_at_its_first_count_only_is_drawn_without_a_warning():
     """As of a point that is at its target before the second count."""
-    result = make_result(frequency=[200.0], scheme=["implicit"])
+    result = smooth_result(frequency=[200.0], scheme=["implicit"])
     volume = result.dataset["worn_volume"]
     early = volume.where(result.dataset["cycle"] == result.dataset["cycle"][0])
     with warnings.catch_warnings(action="error"):

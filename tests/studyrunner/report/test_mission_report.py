@@ -12,7 +12,7 @@ from studyrunner.api import run_study
 from studyrunner.report.cli import main
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Drawing, plotted_values
-from studyrunner.report.page.page import build_page_data
+from studyrunner.report.page import build_page_data
 from studyrunner.result.view import open_for_report
 from tests.studyrunner.faked_runs import FakedBlocks
 from tests.studyrunner.small_studies import MISSIONS

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from studyrunner.report.drawing import Drawing, Missing, Table
-from studyrunner.report.page import page
-from studyrunner.report.page.page import build_page_data, write_page
-from studyrunner.report.panels import new_panel
+from studyrunner.report import page
+from studyrunner.report.drawing import Drawing, Missing, Table, new_panel
+from studyrunner.report.page import build_page_data, write_page
 from studyrunner.result.view import Result
 from tests.studyrunner.results import AXES, as_result, build_file
 

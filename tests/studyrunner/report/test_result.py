@@ -12,17 +12,17 @@ from studyrunner.report import contents
 from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Missing, Table
-from studyrunner.report.page.page import write_page
+from studyrunner.report.page import write_page
 from studyrunner.result.view import open_for_report
-from studyrunner.summary.certainty import certainty_of
+from studyrunner.summary.answer import certainty_of
 from studyrunner.units import scale_for
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure
-from tests.studyrunner.results import build_file, fail, make_result
+from tests.studyrunner.results import build_file, fail, smooth_result
 
 
 def test_the_shown_point_wears_most_of_those_to_be_trusted_or_is_chosen(tmp_path):
-    result = make_result()
+    result = smooth_result()
     # the explicit scheme wears more everywhere, but is not shown
     assert int(result.dataset["worn_volume"].isel(cycle=-1).argmax(...)["scheme"]) == 1
     assert result.shown == dict.fromkeys(result.axes, 0) | {"frequency": 2, "scheme": 0}
@@ -56,7 +56,7 @@ def test_prefixes_fit_the_values(units, largest, shown):
 
 def test_the_certainty_stands_on_the_page(tmp_path):
     """One point ended early, one is above rtol, one sensitive and one has no state; others are known to rtol or not."""
-    result = make_result(failed=[7])
+    result = smooth_result(failed=[7])
     fail(result.dataset, 2, 3, 6000.0, "it broke off")
     fail(result.dataset, 4, 6, 20_000.0, "the wear rate is known to 2.6 % only")
     fail(result.dataset, 5, 15, 20_000.0)
@@ -70,7 +70,7 @@ def test_the_certainty_stands_on_the_page(tmp_path):
 
 def test_an_inaccurate_state_is_no_volume_above_rtol():
     """Known to rtol is what its error says, whatever the outcome."""
-    result = make_result()
+    result = smooth_result()
     fail(result.dataset, 0, 6, 20_000.0, "the response is known to 3 % only")
     assert float(result.errors.flat[0]) < 0.01
     assert not result.above.flat[0]
@@ -80,7 +80,7 @@ def test_an_inaccurate_state_is_no_volume_above_rtol():
 
 def test_a_point_at_its_target_is_drawn_where_it_ended():
     """It is computed to the end, with no values at later counts."""
-    result = make_result()
+    result = smooth_result()
     for point in range(8):
         fail(result.dataset, point, 0, 6000.0)
     assert result.last_reached(result.shown) == 2

@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
-from studyrunner.report import vtu
+from studyrunner.report import root
 from studyrunner.report.cli import BAD_INPUT, main
 from studyrunner.report.root import face_normals, read_root
 from tests.studyrunner.report.cases import dovetail, dovetail_file, draw_figure
@@ -47,10 +47,10 @@ def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(
         for flank, own in ((0, slice(None, half)), (1, slice(half, None))):
             chosen = (surface.body == body) & (surface.flank == flank)
             assert areas[chosen].sum() == pytest.approx(pairs.area[own].sum(), rel=1e-9)
-            at = np.isin(surface.own, surface.faces[chosen])
+            at = np.isin(surface.contact_nodes, surface.faces[chosen])
             found = surface.pairs[at]
             assert sorted(found) == list(range(len(pairs.area)))[own]
-            places = surface.nodes[surface.own[at]]
+            places = surface.nodes[surface.contact_nodes[at]]
             np.testing.assert_allclose(places, pairs.position[found], atol=1e-12)
             # normals of pairs point out of the moving body, the blade
             normals = outwards * surface.normals[at]
@@ -89,13 +89,12 @@ def test_the_faces_near_the_contact_are_kept(tmp_path):
     fewer = surface.near_contact(1000)
     assert len(fewer.faces) == 1000
     assert (fewer.flank >= 0).sum() == (surface.flank >= 0).sum()
-    np.testing.assert_array_equal(fewer.nodes[fewer.own], surface.nodes[surface.own])
+    np.testing.assert_array_equal(fewer.nodes[fewer.contact_nodes], surface.nodes[surface.contact_nodes])
     assert surface.near_contact(len(surface.faces)) is surface
 
 
 def test_the_figures_of_the_dovetail(result, surface):
     worn, numbers = draw_figure(result, "worn_root"), draw_figure(result, "pair_numbers")
-    assert draw_figure(result, "whole_disk").figure.axes
     depth = result.at("wear_depth", result.shown, -1).values
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
     assert f"{surface.exaggeration(float(depth.max())):g} times" in worn.caption.replace("\u00a0", "")
@@ -111,7 +110,7 @@ def folder(result, tmp_path_factory):
     folder = tmp_path_factory.mktemp("vtu")
     (folder / "vtu").mkdir()
     (folder / "vtu" / "root_9999.vtu").touch()  # of an older, longer series
-    assert vtu.find_writer(result)(folder) == 5
+    assert root.find_writer(result)(folder) == 5
     return folder
 
 
@@ -133,7 +132,7 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder, result, cycle):
     way = np.linalg.norm(mesh.points[there][:, None] - pairs.position, axis=2)
     assert way.min(axis=1).max() < 1e-12
     pair = way.argmin(axis=1)
-    for name in vtu.FIELDS:
+    for name in root.FIELDS:
         units = dataset[name].attrs["units"]
         field = mesh.point_data[name if units == "1" else f"{name} ({units})"]
         np.testing.assert_array_equal(field[there], result.at(name, result.shown, cycle).values[pair])
@@ -153,7 +152,7 @@ def test_what_stands_in_the_way_is_said_before_anything_is_written(tmp_path, mon
     monkeypatch.chdir(tmp_path)
     build_file(positions=np.full((2, 3), np.nan)).to_netcdf("some.nc")
     if not library:
-        monkeypatch.setattr(vtu, "find_spec", lambda _: None)
+        monkeypatch.setattr(root, "find_spec", lambda _: None)
     assert main(["some.nc", "--vtu"]) == BAD_INPUT
     (line,) = capsys.readouterr().err.splitlines()
     assert "--vtu" in line

@@ -12,7 +12,7 @@ import json
 import math
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -26,10 +26,12 @@ from studyrunner.report.drawing import Drawing, Item, Missing
 from studyrunner.report.figures.response import find_loops
 from studyrunner.report.root import body_colours, find_views, read_root
 from studyrunner.report.selection import course_axis
+from studyrunner.result.opening import describe_outcome
 from studyrunner.result.pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.summary.answer import summarise
+from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_number, units_of
 from studyrunner.user_error import show_text
@@ -45,10 +47,12 @@ _MOST_VALUES = 12
 def write_page(result: Result, items: Iterable[Item], path: Path) -> str:
     """Write the page, and beside it the files of each drawing, into a folder that exists; what is there, in words.
 
-    An older page is replaced when the new one is complete. Raises OSError where something cannot be written.
+    An older page is replaced when the new one is complete. Raises OSError where something cannot be written, and
+    KeyboardInterrupt where the process is ended from outside.
     """
     counts, parts = Counter[str](), list[Any]()
     for item in items:
+        raise_ending()
         counts[type(item).__name__] += 1
         parts.append(_save(item, path.parent) if isinstance(item, Drawing) else item)
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
@@ -80,16 +84,17 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
     from plotly.offline import get_plotlyjs
 
     blocks: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
-    loader = PackageLoader("studyrunner.report.page", ".")
+    loader = PackageLoader("studyrunner.report", "browser")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
-    notes, own = list[str](), resources.files("studyrunner.report.page") / "browser"
-    data = build_page_data(result, DATA_LIMIT, notes)
+    notes, browser = list[str](), resources.files("studyrunner.report") / "browser"
+    data, scripts = build_page_data(result, DATA_LIMIT, notes), list[str]()
     if data is not None:
         data["root"] = build_root_numbers(result, notes)
+        scripts = [get_plotlyjs(), "\n".join(browser.joinpath(name).read_text("utf-8") for name in _SCRIPTS)]
     return environment.get_template("page.html").render(
-        title=result.title,
+        title=result.dataset.attrs.get("title") or show_text(result.path.stem),
         file=show_text(result.path.name),
-        css=own.joinpath("page.css").read_text("utf-8"),
+        css=browser.joinpath("page.css").read_text("utf-8"),
         answer=summarise(result).rows,
         facts=_facts(result),
         study=result.dataset.attrs.get("study"),
@@ -98,19 +103,13 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
         notes=notes,
         # nothing in it ends the script element that it stands in
         data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c") if data else "",
-        scripts=[get_plotlyjs(), "\n".join(own.joinpath(name).read_text("utf-8") for name in _SCRIPTS)] if data else [],
+        scripts=scripts,
     )
 
 
 def _facts(result: Result) -> list[tuple[str, str]]:
     """Names and values: points, axes, contact pairs, versions."""
-    ends = {
-        "computed to the end": result.computed,
-        "ended early with values up to there": result.has_values & ~result.computed,
-        "without a result": ~result.has_values,
-    }
-    ended = ", ".join(f"{np.count_nonzero(where)} {words}" for words, where in ends.items() if where.any())
-    facts = [("points", f"{result.computed.size}: {ended}")]
+    facts = [("points", f"{result.computed.size}, {np.count_nonzero(result.computed)} computed to the end")]
     for name in result.axes:
         axis = result.dataset[name]
         numbers, units = axis.dtype.kind in "fiu", units_of(axis)
@@ -146,6 +145,8 @@ _FIRST = ("worn_volume", "natural_frequency", "response_amplitude")
 _COLOURED = ("worn_cycle", "scheme", "sweep", "cycle", "mode")
 _LINES = 10
 
+_Arrays = dict[str, xr.DataArray]
+
 
 def encode_floats(values: ArrayLike) -> str:
     """Numbers as base64 of little-endian 32 bit floats, the last index fastest; NaN stays NaN."""
@@ -161,20 +162,19 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
     """
     if not result.has_values.any():
         return None
-    if result.has_values.size > _MOST_POINTS:
-        notes.append(
-            f"The study has {result.has_values.size} points, more than the {_MOST_POINTS} that can be picked here."
-        )
+    if (n_points := result.has_values.size) > _MOST_POINTS:
+        notes.append(f"The study has {n_points} points, more than the {_MOST_POINTS} that can be picked here.")
         return None
     if result.has("cycle_count"):
         notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
     shown = dict(result.shown)
     last = 0 if result.has_modes else result.last_reached(shown)
     floats = math.inf if result.has_modes else limit / _CHARACTERS_A_FLOAT
-    arrays, kept = _fit(dict(_arrays(result)), floats, notes)
+    arrays, counts = _fit(_arrays(result), floats, notes)
     used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])
     if not result.has_modes:
-        shown["cycle"] = int(np.abs(kept - last).argmin())
+        shown["cycle"] = int(np.abs(counts - last).argmin())
+    outcomes = np.unique(result.dataset["outcome"].values).tolist()
     messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
     return {
         "dims": [_dimension(result, name, arrays) for name in used],
@@ -183,29 +183,26 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
         "variables": [_encode(array, arrays) for array in arrays.values()],
         "at": {name: shown.get(name, 0) for name in used},
         "start": _start(result, arrays),
-        "sentences": {str(number): ending.sentence for number, ending in result.endings.items()},
+        "sentences": {str(number): describe_outcome(number)[1] for number in outcomes},
         "messages": {str(place): text for place, text in enumerate(messages) if text and place < _MOST_MESSAGES},
     }
 
 
-def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
+def _arrays(result: Result) -> _Arrays:
     """Numbers of the file that belong to points of the study, unread; loops of those pairs alone that have some."""
-    found = {**result.dataset.data_vars, **(result.blocks.data_vars if result.blocks is not None else {})}
-    for name, array in found.items():
-        if array.dtype.kind not in "iuf" or not set(result.axes) & set(array.dims) or not array.size:
-            continue
+    arrays, blocks = _Arrays(), {} if result.blocks is None else result.blocks.data_vars
+    for name, array in {**result.dataset.data_vars, **blocks}.items():
         if "phase" in array.dims:
             phases = slice(None, None, -(-array.sizes["phase"] // _MOST_PHASES))
-            array = array.sel(contact=find_loops(result, result.shown)).isel(phase=phases)
-            array = array.rename(contact=_LOOPS)
-        if array.size:
-            yield str(name), array
+            pairs = find_loops(result, result.shown)
+            array = array.sel(contact=pairs).isel(phase=phases).rename(contact=_LOOPS)
+        if array.dtype.kind in "iuf" and set(result.axes) & set(array.dims) and array.size:
+            arrays[str(name)] = array
+    return arrays
 
 
-def _fit(
-    arrays: dict[str, xr.DataArray], floats: float, notes: list[str]
-) -> tuple[dict[str, xr.DataArray], NDArray[np.intp]]:
-    """Variables that fit, at the counts that are kept, and places of these: the first, the last, and some between."""
+def _fit(arrays: _Arrays, floats: float, notes: list[str]) -> tuple[_Arrays, NDArray[np.intp]]:
+    """Variables that fit, at as many counts as fit, and places of these: the first, the last, and some between."""
     cycles = {name: array.sizes.get("cycle", 1) for name, array in arrays.items()}
     small = {name: array.size // cycles[name] * min(2, cycles[name]) for name, array in arrays.items()}
     n_cycles = max(cycles.values(), default=1)
@@ -216,15 +213,15 @@ def _fit(
     # a variable along the cycles takes as much at each of them
     each = sum(array.size / n_cycles for array in arrays.values() if "cycle" in array.dims)
     others = sum(array.size for array in arrays.values() if "cycle" not in array.dims)
-    keep = n_cycles if each * n_cycles + others <= floats else max(min(2, n_cycles), int((floats - others) / each))
-    kept = np.unique(np.linspace(0, n_cycles - 1, keep).round().astype(np.intp))
-    if keep < n_cycles:
-        notes.append(f"On this page are {len(kept)} of {n_cycles} counts.")
-        arrays = {name: array.isel(cycle=kept, missing_dims="ignore") for name, array in arrays.items()}
-    return arrays, kept
+    most = n_cycles if each * n_cycles + others <= floats else max(min(2, n_cycles), int((floats - others) / each))
+    counts = np.unique(np.linspace(0, n_cycles - 1, most).round().astype(np.intp))
+    if most < n_cycles:
+        notes.append(f"On this page are {len(counts)} of {n_cycles} counts.")
+        arrays = {name: array.isel(cycle=counts, missing_dims="ignore") for name, array in arrays.items()}
+    return arrays, counts
 
 
-def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
+def _encode(array: xr.DataArray, arrays: _Arrays) -> dict[str, Any]:
     """A variable: `data` in SI times `factor` in `unit`, `error` the variable of its error, `words` of its values."""
     name, attributes = str(array.name), array.attrs
     values = array.values.astype(float)
@@ -232,7 +229,7 @@ def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str
     if name in _PERCENT and name.endswith(("_error", "_estimate")):
         scale = Scale(100.0, "%")
     error = _ERRORS.get(name, f"{name}_error")
-    flags = attributes.get("flag_values", ()), str(attributes.get("flag_meanings", "")).split()
+    outcomes = np.unique(array.values).tolist() if name == "outcome" else []
     return {
         "name": name,
         "label": str(attributes.get("long_name", name)),
@@ -242,11 +239,11 @@ def _encode(array: xr.DataArray, arrays: Mapping[str, xr.DataArray]) -> dict[str
         "data": encode_floats(values),
         "error": error if error in arrays else None,
         "relative": error in arrays and str(arrays[error].attrs.get("units")) != str(attributes.get("units")),
-        "words": {str(int(value)): word.replace("_", " ") for value, word in zip(*flags, strict=False)},
+        "words": {str(number): describe_outcome(number)[0].replace("_", " ") for number in outcomes},
     }
 
 
-def _dimension(result: Result, name: str, arrays: Mapping[str, xr.DataArray]) -> dict[str, Any]:
+def _dimension(result: Result, name: str, arrays: _Arrays) -> dict[str, Any]:
     """A dimension with its values: numbers, or words."""
     axis = next(array for array in arrays.values() if name in array.dims)[name]
     label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
@@ -272,7 +269,7 @@ def _coordinates(result: Result, dims: set[str]) -> Iterator[dict[str, Any]]:
             yield {"name": str(name), "dim": along[0], "label": label, "unit": scale.unit, "data": data}
 
 
-def _start(result: Result, arrays: Mapping[str, xr.DataArray]) -> dict[str, str]:
+def _start(result: Result, arrays: _Arrays) -> dict[str, str]:
     """What is shown first: a variable over the axis that figures are drawn over, or over slow time."""
     wears = result.has("worn_volume") and bool(np.nanmax(result.worn) > NO_VOLUME)
     usual = [name for name in _FIRST if name in arrays and (wears or name != "worn_volume")]
@@ -299,16 +296,14 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
     if whole is None:
         return None
     surface = whole.near_contact(_MOST_FACES)
-    if len(surface.faces) < len(whole.faces):
-        notes.append(
-            f"In three dimensions are {len(surface.faces)} of {len(whole.faces)} faces, those near the contact."
-        )
+    n_shown, n_faces = len(surface.faces), len(whole.faces)
+    if n_shown < n_faces:
+        notes.append(f"In three dimensions are {n_shown} of {n_faces} faces, those near the contact.")
     views, shown = find_views(surface), result.shown
     seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
     of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": surface.flank}
     pairs = pairs_of_scene(result, shown)[surface.pairs]
-    of_contact = {"nodes": surface.own, "pairs": pairs, "normals": surface.normals}
-    directions = [{"eye": view.to_eye, "up": view.up} for view in views]
+    of_contact = {"nodes": surface.contact_nodes, "pairs": pairs, "normals": surface.normals}
     return {
         **{name: encode_floats(values) for name, values in (of_faces | {"seen": np.asarray(seen)}).items()},
         "bodies": list(surface.bodies),
@@ -317,7 +312,12 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
         "well_seen": surface.well_seen,
         "scene": {name: shown[name] for name in axes_of_scenes(result)},
         "views": [
-            {"title": view.title, "body": view.body, **{name: np.round(each, 6).tolist() for name, each in way.items()}}
-            for view, way in zip(views, directions, strict=True)
+            {
+                "title": each.title,
+                "body": each.body,
+                "eye": each.to_eye.round(6).tolist(),
+                "up": each.up.round(6).tolist(),
+            }
+            for each in views
         ],
     }

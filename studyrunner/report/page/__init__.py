@@ -1,1 +1,0 @@
-"""The HTML page: one file with everything inside."""
