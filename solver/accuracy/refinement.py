@@ -219,7 +219,7 @@ class _Search:
 
     def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
-        unknowns, most = here.unknowns(resolution), here.limit(NODE_UNKNOWNS if self.node else MOST_UNKNOWNS)
+        unknowns, most = here.unknowns(resolution), here.most_unknowns(NODE_UNKNOWNS if self.node else MOST_UNKNOWNS)
         if 2 * resolution.highest >= resolution.samples:  # which are given
             return False
         # the contact law costs unknowns times samples
@@ -260,7 +260,7 @@ def _richer(here: ResolvedState) -> list[Resolution]:
     """
     resolution, at, model = here.case.resolution, here.point.evaluation, here.case.model
     levels = enumerate(shifted(resolution, level) for level in range(1, len(HARMONIC_LEVELS)))
-    most = here.limit(COMPARED_UNKNOWNS), FAR_UNKNOWNS
+    most = here.most_unknowns(COMPARED_UNKNOWNS), FAR_UNKNOWNS
     found = [
         each for place, each in levels if model.has_harmonics(each.highest) and here.unknowns(each) <= most[place > 1]
     ]

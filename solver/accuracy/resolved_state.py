@@ -18,7 +18,7 @@ from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import State, largest_responses, transfer
+from solver.harmonic_balance.state import State, largest_responses
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.packing import packable
@@ -34,7 +34,6 @@ Hz 5 and 7 agree by chance (errors of the worn volume with 5, 7, 9: 1.9, 1.2, 0.
 
 STIFFNESS_MISMATCH = 0.25
 """Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
-
 
 FAINT_SHARE = 0.1
 """Fraction of rtol: part of the slip work that may be creep, and normal force over the largest one below which a
@@ -92,8 +91,7 @@ class ResolvedState:
         """The state with other harmonics and samples; None where it is not found. with_tail: as in `transfer`."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        balance, start = transfer(self.case, joint, self.point.evaluation, with_tail=with_tail)
-        point = run.fresh().state(balance, start, self.point.parameter)
+        point = run.move(self.case, joint, self.point, with_tail=with_tail)
         # the mean position of a mass depends a little on the harmonics
         return None if point is None else ResolvedState(case, joint, point).at_rest(run)
 
@@ -119,7 +117,7 @@ class ResolvedState:
         """Number of unknowns of the balance with other harmonics."""
         return self.joint.component_index.size * (2 * len(resolution.orders) + 1)
 
-    def limit(self, unknowns: float) -> float:
+    def most_unknowns(self, unknowns: float) -> float:
         """A limit of the unknowns with 48 pairs for this joint: of a larger joint it limits the harmonics only."""
         return unknowns * max(1.0, self.joint.component_index.size / 144)
 
@@ -139,7 +137,8 @@ class ResolvedState:
     def difference(self, better: ResolvedState) -> Estimate:
         """Relative differences of response and wear rate to a better state."""
         mine, its = self.response(), better.response()
-        least, work = better._least_response(), max(self._least_work(), better._least_work())
+        # slip work whose error has less weight: a fraction of the work of the excitation
+        least, work = better._least_response(), SMALL_WORK * max(self._input_work(), better._input_work())
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
         size = np.maximum(better.peaks, max(SMALL_PEAK * float(better.peaks.max(initial=0.0)), least))
         response = max(first, float((np.abs(self.peaks - better.peaks) / size).max(initial=0.0)))
@@ -159,10 +158,8 @@ class ResolvedState:
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
         return max(NEGLIGIBLE * float(np.linalg.norm(response)), 1e-300)
 
-    def _least_work(self) -> float:
-        """Slip work, N m, below which its error has less weight: a fraction of the work of the excitation."""
-        motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        return SMALL_WORK * abs(self.joint.structure.input_work(motion))
+    def _input_work(self) -> float:
+        return abs(self.joint.structure.input_work(self.joint.to_relative(self.point.evaluation.displacement_h)))
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:
@@ -219,7 +216,7 @@ def nothing_happens(evaluation: Evaluation) -> bool:
 
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
-    """Whether a state has odd harmonics only although its contact forces have even ones: its symmetry is lost."""
+    """Whether a state has odd harmonics only although its contact forces have even ones."""
     return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, NEGLIGIBLE)
 
 

@@ -14,7 +14,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import BalanceAt, Failure, State, final_history
+from solver.harmonic_balance.state import BalanceAt, Failure, State
 from solver.model import FloatArray
 from solver.newton.run import MOST_ITERATIONS, SHORTEST_STEP, Run
 from solver.structure.joint import Joint
@@ -112,10 +112,8 @@ def follow_naturally(
         reach = target if ahead == 1.0 else start.parameter + ahead * whole
         balance = balance_at(reach, state.history)
         most = MOST_ITERATIONS if fraction <= 2.0 * shortest else NEAR_ITERATIONS
-        result = run.solve(balance, state.evaluation.predicted_h, most)
-        if result.converged:
-            state = State(result.evaluation, final_history(balance, result.evaluation), reach)
-            done, fraction = ahead, min(2.0 * fraction, longest)
+        if (found := run.state(balance, state.evaluation.predicted_h, reach, most)) is not None:
+            state, done, fraction = found, ahead, min(2.0 * fraction, longest)
             continue
         fraction, failures = 0.5 * (ahead - done), failures + 1
         if fraction < shortest or failures > ATTEMPTS or run.budget.exhausted:

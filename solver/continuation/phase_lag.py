@@ -19,7 +19,7 @@ from solver.continuation.natural import ATTEMPTS
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
 from solver.newton.linear_solver import FORCING
-from solver.newton.run import Bordered, Run
+from solver.newton.run import MOST_ITERATIONS, Bordered, Run
 from solver.settings import DIFFERENCE, NEGLIGIBLE, ROUND_OFF
 from solver.structure.condensation import FrequencySlope, frequency_slope
 from solver.structure.fourier import to_complex
@@ -77,7 +77,7 @@ class _AtLag:
         # of the equation times |F^H x|, whose derivative is linear in the motion
         return self._errors(_changes(here.balance.joint, tangent.motion(step))[0], here.extra)
 
-    def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
+    def fraction(self, here: Bordered, change: FloatArray) -> float:
         return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
 
     def _errors(self, part: complex, product: complex) -> FloatArray:
@@ -86,7 +86,7 @@ class _AtLag:
 
 
 def solve_at_lag(
-    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
+    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int = MOST_ITERATIONS
 ) -> Bordered | None:
     """The state of a balance, with fixed or with growing wear depths, at a phase lag, rad; None where it is not found.
 
@@ -97,7 +97,7 @@ def solve_at_lag(
 
 
 def solve_at_peak(
-    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
+    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int = MOST_ITERATIONS
 ) -> tuple[Bordered, float] | None:
     """The state of the largest amplitude near a phase lag, rad, and its lag; None where it is not found.
 
@@ -140,7 +140,7 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     joint, at = state.balance.joint, state.at
     fixed = Balance(joint, at.history, at.wear_depth)
     by_frequency = frequency_derivative(fixed, at)
-    step = run.step(fixed, at, -by_frequency.force, min(FORCING, 0.1 * accuracy))
+    (step,) = run.steps(fixed, at, [-by_frequency.force], min(FORCING, 0.1 * accuracy))
     product, response = _changes(joint, fixed.linearise(at).motion(step))
     amplitude = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
     rise = (by_frequency.response[0] + response[0]) / amplitude

@@ -129,9 +129,7 @@ class Linearisation:
     """`dR/dp = Z_r motion_tangent + force_tangent` at a point, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
 
     growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, which is a part of the static normal motion.
-
-    The motion of a pair that sticks during the whole period does not depend on p: the columns of its unknowns are those
-    of the identity. They are left out of the coupled system of the `active` pairs.
+    Columns of pairs that stick during the whole period are those of the identity: only `active` pairs are coupled.
     """
 
     joint: Joint

@@ -1,4 +1,4 @@
-"""A converged state: the history that it leaves, the state with other harmonics, its largest response; or a failure."""
+"""A converged state: the history that it leaves, other harmonics, its largest response; or a failure."""
 
 from __future__ import annotations
 
@@ -49,10 +49,9 @@ def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
 
 
 def history_at_rest(joint: Joint, state: State) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick.
-
-    A pair whose range of slip shrinks to zero comes to stick in the middle of the range. Behind the resonance of the
-    dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 % with `final_history`.
+    """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick: a range of slip
+    that shrinks to zero ends in its middle. Behind the resonance of the dovetail the motion after a sweep is 0.5 %
+    wrong with the middle, and 2.3 % with `final_history`.
     """
     return joint.law.middle_history(state.evaluation, state.history)
 
@@ -106,8 +105,7 @@ def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArr
 def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
     """Largest magnitudes over a period of the responses (n_response,), m, the static ones included.
 
-    With the tail of friction on rigid ground: without it the error of the peak falls only with the square of the
-    highest harmonic.
+    With the tail of friction on rigid ground: else the error of the peak falls as the square of the highest harmonic.
     """
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     response_t = response_h @ build_basis(joint.basis.orders, FINE_SAMPLES).synthesis

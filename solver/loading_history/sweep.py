@@ -56,10 +56,6 @@ class Nodes:
     resolution: Resolution
     states: tuple[Any, ...] = ()
 
-    def then(self, state: Any) -> Nodes:
-        """With one node more."""
-        return replace(self, states=(*self.states, state)[-LAST_NODES:])
-
 
 _SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
 """Attributes of a `Sweep` with which it goes on from a node, and the Newton iterations so far."""
@@ -200,7 +196,8 @@ class Sweep(Generic[S]):
         """Make the next node the current one."""
         self.ahead = None
         self.passed.append(step.state.parameter)
-        self.nodes = replace(self.nodes, states=(step.state,)) if step.folds else self.nodes.then(step.state)
+        before_it = () if step.folds else self.nodes.states
+        self.nodes = replace(self.nodes, states=(*before_it, step.state)[-LAST_NODES:])
         self.branch, self.fold = self.branch + len(step.folds), (self.fold, *step.folds)[-1]
         if self.with_reference:
             self._lead_reference(before, step)

@@ -14,9 +14,8 @@ from solver.contact.wear_law import WearLaw
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, State, vibration_change
-from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.start_states import states_of_sweeps
+from solver.loading_history.start_states import FrequencySweep
 from solver.loading_history.sweep import LAST_NODES, STEPS_OF_REFERENCE
 from solver.missions.mission import Block, MissionRequest
 from solver.model import ComplexArray, FloatArray, ReducedModel
@@ -234,7 +233,7 @@ def find_start(given: BlockInput) -> tuple[StartState, Begun | None]:
         return again, given.begun
     way = given.block.way
     sweeps = given.sweeps(given.mission.first if way == "continue" else way)
-    _, start = next(states_of_sweeps(sweeps, np.array([given.block.ends[0]])))
+    _, start = next(sweeps.states(np.array([given.block.ends[0]])))
     present = sweeps.present
     if start.state is None or present is None or way == "continue":
         return start, None
@@ -328,7 +327,7 @@ def _continued(given: BlockInput, carried: StartState) -> StartState:
         parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
         if not sweeps.go_on_from(setup.case, replace(last.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)
-        _, after = next(states_of_sweeps(sweeps, np.array([target])))
+        _, after = next(sweeps.states(np.array([target])))
         start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)
         iterations += after.newton_iterations
     return replace(start, newton_iterations=iterations)

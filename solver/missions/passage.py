@@ -33,7 +33,6 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure, largest_responses
-from solver.loading_history.start_states import states_of_sweeps
 from solver.missions.block_run import Begun, BlockInput, BlockResult
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
@@ -227,7 +226,7 @@ def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | 
     if given.guide is not None:
         # errors of a reference solution are not used
         sweeps.known = given.guide.resolutions
-    for index, start in states_of_sweeps(sweeps, frequencies):
+    for index, start in sweeps.states(frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() > given.deadline:

@@ -26,7 +26,7 @@ from solver.harmonic_balance.state import Failure, State, final_history, history
 from solver.loading_history.path import FREE_STEP, Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
-from solver.newton.run import Bordered, Run
+from solver.newton.run import MOST_ITERATIONS, Bordered, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.settings import DIFFERENCE, SolverSettings
@@ -102,12 +102,12 @@ class NonlinearMode(Path[ModeState]):
         start: tuple[FloatArray, FloatArray],
         history: FloatArray,
         run: Run,
-        most: int | None = None,
+        most: int = MOST_ITERATIONS,
     ) -> ModeState | None:
         """The mode at an amplitude a, m sqrt(kg); None where Newton's method fails.
 
         start: first predicted force (n_rel, 2H+1), N, and values (3,). history (n_contact, 2): tangential history, m.
-        run, most: as in `Run.solve`.
+        most: iterations.
         """
         found = run.solve_bordered(_AtAmplitude(self, amplitude, history), *start, most)
         # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states; below
@@ -201,7 +201,7 @@ class _AtAmplitude:
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         return self._products(here.extra, _shape(here.balance.joint, tangent.motion(step), 0.0))
 
-    def fraction(self, _: Bordered, __: FloatArray, ___: FloatArray) -> float:
+    def fraction(self, _: Bordered, __: FloatArray) -> float:
         return 1.0
 
 

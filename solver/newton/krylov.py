@@ -30,14 +30,14 @@ Product = Callable[[FloatArray], FloatArray]
 
 
 def solve_gmres(
-    product: Product, right: FloatArray, rtol: float, most: int
+    product: Product, right: FloatArray, residual: float, most: int
 ) -> tuple[FloatArray, bool, FloatArray, FloatArray]:
-    """Solve `A x = right` (n,) by GMRES from zero, with at most `most` products, to the relative residual `rtol`.
+    """Solve `A x = right` (n,) by GMRES from zero, with at most `most` products, to a relative residual.
 
     Returns x, whether it has converged, and basis and Hessenberg matrix (`_arnoldi`).
     """
     norms, null = [float(np.linalg.norm(right))], np.ones(min(most, right.size) + 1)
-    wanted = rtol * norms[0]
+    wanted = residual * norms[0]
     if not 0.0 < norms[0] < math.inf:
         return np.zeros_like(right), norms[0] == 0.0, right[None], np.zeros((1, 0))
 

@@ -4,7 +4,7 @@ The monodromy integrates a disturbance (dy, dlambda) of displacements and contac
 
     M dy'' + C dy' + K dy + dlambda = 0,                                                                     (1)
 
-with the derivative of the contact law at each sample (`contact.sampled_law`), by BDF2: the contact holds displacements
+with the derivative of the contact law at each sample (`contact.law`), by BDF2: the contact holds displacements
 suddenly, which needs damping at high rates. In N samples it damps a vibration at r times the frequency of the state by
 the fraction `(2 pi r)^4 / (4 N^3)`. Pairs that stick or are open during the whole period need no law.
 """
@@ -19,7 +19,7 @@ from numba import njit
 from scipy.linalg import eigvals
 
 from solver.contact.coulomb import SEPARATED, STICK
-from solver.contact.sampled_law import SampledLaw, sampled_law
+from solver.contact.law import SampledLaw, sampled_law
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel
 from solver.structure.condensation import relative_indices

@@ -118,10 +118,8 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
         predicted = np.zeros((1, 5))
         for _ in range(steps):
             balance = Balance(transient.step(motion, inverse), history, idle)
-            result = Run(1e-10).solve(balance, predicted)
-            assert result.converged
-            predicted = result.evaluation.predicted_h
-            motion = transient.after(result.evaluation, motion, inverse)
+            at = Run(1e-10).state(balance, predicted).evaluation
+            predicted, motion = at.predicted_h, transient.after(at, motion, inverse)
         phases = np.exp(1j * omega * end * np.arange(3))
         errors.append(abs(np.real(motion.displacement[:, 1] @ phases) - exact))
     assert errors[1] < 0.02 * abs(exact)
@@ -158,8 +156,7 @@ def slider_state(gain=0.0, damping=20.0, friction=0.5):
     joint = case.joint(LAG_OMEGA, 10.0)
     balance = Balance(joint, np.zeros((1, 2)), np.zeros(1), np.full(1, gain))
     start = balance.predict(np.zeros((1, 3, 7)), np.zeros((1, 3, 7)))
-    found = Run(1e-11).solve(balance, start, 100)
-    assert found.converged
+    found = Run(1e-11).state(balance, start, most=100)
     return case, Bordered(balance, found.evaluation, np.array([LAG_OMEGA]), np.zeros(1))
 
 
@@ -181,7 +178,7 @@ def test_the_change_of_the_lag_with_the_frequency_is_that_of_finite_differences(
     lags, length = [], 1e-5 * LAG_OMEGA
     for omega in (LAG_OMEGA - length, LAG_OMEGA + length):
         balance = replace(state.balance, joint=case.joint(omega, 10.0))
-        end = Run(1e-12).solve(balance, state.at.predicted_h)
+        end = Run(1e-12).state(balance, state.at.predicted_h)
         lags.append(phase_lag(balance.joint, end.evaluation))
     expected = (lags[1] - lags[0]) / (2.0 * length)
     lag = phase_lag(state.balance.joint, state.at)
@@ -203,6 +200,6 @@ def test_a_linear_oscillator_has_its_natural_frequency_and_its_peak_below():
     assert rise * natural == pytest.approx(-1.0, rel=1e-5)
     assert turn * natural == pytest.approx(1.0 / ratio, rel=1e-5)
     peak = replace(found.balance, joint=case.joint(natural * math.sqrt(1.0 - 2.0 * ratio**2), 10.0))
-    end = Run(1e-12).solve(peak, found.at.predicted_h)
+    end = Run(1e-12).state(peak, found.at.predicted_h)
     at_peak, turn = rise_of_response(Bordered(peak, end.evaluation, np.zeros(1), np.zeros(1)), Run(1e-12), 1e-2)
     assert abs(at_peak) < 1e-5 * turn

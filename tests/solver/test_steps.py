@@ -198,7 +198,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
         rates = []
         for sign in (1.0, -1.0):
             depth = at.wear_depth + sign * step * np.eye(slips.size)[pair]
-            solved = Run(1e-13).solve(Balance(joint, at.history, depth), at.predicted_h)
+            solved = Run(1e-13).state(Balance(joint, at.history, depth), at.predicted_h)
             rates.append(gain * solved.evaluation.slip_work)
         wanted = (rates[0] - rates[1]) / (2.0 * step)
         # as exact as a Newton direction
