@@ -201,9 +201,9 @@ def balance_at_start(
     ((_, start),) = follow_branch(model, friction, load, np.array([frequency]), sweep, settings)
     fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)
     case = build_case(model, friction, start.penalty_omega, fixed, start.resolution)
-    joint, n_contact = case.joint(2.0 * np.pi * frequency, load), model.contact.n_contact
+    joint = case.joint(2.0 * np.pi * frequency, load)
     if start.state is None:
-        return start, case, Balance(joint, np.zeros((n_contact, 2)), np.zeros(n_contact)), None
+        return start, case, Balance(joint, np.zeros((model.contact.n_contact, 2))), None
     return start, case, *evaluated(joint, start.state)
 
 

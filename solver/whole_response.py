@@ -187,7 +187,7 @@ def _reported(path: LoadingPath, branch: _Branch, errors: bool) -> ResponseCurve
             estimate = refine(case, joint, point, run).estimate.response
             error[index] = estimate if np.isfinite(estimate) else np.inf
         found.append(find_multipliers(case, joint, at, run))
-        stability.append(found[-1].stability(odd=not run.fresh().is_stable(balance, at)))
+        stability.append(found[-1].stability(odd=not run.fresh().is_stable(joint, at)))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
     return ResponseCurve(
         parameter="frequency" if path.omega is None else "excitation_amplitude",

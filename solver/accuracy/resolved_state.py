@@ -23,7 +23,6 @@ from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, SolverSettings, all_orders, samples_for
-from solver.structure.condensation import relative_indices
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 from solver.structure.penalty import build_penalty, compliance_at
@@ -191,8 +190,8 @@ def reach(model: ReducedModel, omega: float, highest: int) -> int:
     G is evaluated at real rates (growth instead of vibration), where the structure has no resonances. omega: rad/s.
     The last level where there is none.
     """
-    _, component_index = relative_indices(model.contact)
-    pair, tangent = component_index // 3, np.minimum(component_index % 3, 1)
+    pair, component = np.divmod(model.contact.component_index, 3)
+    tangent = np.minimum(component, 1)
     for level in (highest, *(level for level in HARMONIC_LEVELS if level > highest)):
         penalty = build_penalty(model, omega, level)
         half_octaves = np.arange(0.0, 2.0 * np.log2(HARMONIC_LEVELS[-1] / (level + 1)) + 1.0)

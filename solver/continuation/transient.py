@@ -27,7 +27,7 @@ from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
-from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
+from solver.structure.condensation import condense, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Joint
@@ -53,22 +53,12 @@ class Motion:
     velocity: ComplexArray
 
 
-@dataclass(frozen=True, eq=False)
-class _LoadedStructure(CondensedStructure):
-    """A structure with a load in each harmonic, load_h (n_rel, 2H+1), N."""
-
-    load_h: FloatArray
-
-    def force_h(self) -> FloatArray:
-        return self.load_h
-
-
 class Transient:
     """Matrices and loads of a joint for steps in time."""
 
     def __init__(self, joint: Joint) -> None:
         self.joint, orders = joint, np.array((0, *joint.basis.orders))
-        self.relative, _ = relative_indices(joint.contact)
+        self.relative = joint.contact.relative
         self.rates: ComplexArray = 1j * joint.omega * orders
         self.linear = [joint.model.harmonic_structure(order) for order in orders.tolist()]
         self.loads: ComplexArray = np.zeros((orders.size, len(self.linear[0].mass)), complex)
@@ -88,9 +78,12 @@ class Transient:
             for of, rate, load in zip(self.linear, rates, loads, strict=True)
         ]
         stiffness, force = (np.array([getattr(each, name) for each in found]) for name in ("stiffness", "force"))
-        changed = {"static_stiffness": np.real(stiffness[0]), "moving": DenseStiffness(stiffness[1:])}
-        load_h = from_complex(np.real(force[0]), force[1:].T)
-        structure = _LoadedStructure(**{**vars(self.joint.structure), **changed}, load_h=load_h)
+        structure = replace(
+            self.joint.structure,
+            static_stiffness=np.real(stiffness[0]),
+            moving=DenseStiffness(stiffness[1:]),
+            force_h=from_complex(np.real(force[0]), force[1:].T),
+        )
         return replace(self.joint, structure=structure)
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
@@ -142,7 +135,7 @@ def relax_to_periodic(
         change = _change(motion, ahead)
         too_far = change > 2.0 * SMOOTH_CHANGE and length > 1.0
         # a step over more than the time in which a motion grows would damp this motion
-        damped = grows and end is not None and not run.is_stable(balance, end.evaluation)
+        damped = grows and end is not None and not run.is_stable(balance.joint, end.evaluation)
         if damped and budget.iterations == before:
             return Failure(Outcome.UNSTABLE)
         if end is None or too_far or damped:
@@ -158,11 +151,10 @@ def relax_to_periodic(
         if change < RELAXED_CHANGE and renewed:
             tried = change
             before = budget.iterations
-            balance = Balance(joint, history, wear_depth)
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
-            found = run.state(balance, predicted)
+            found = run.state(Balance(joint, history, wear_depth), predicted)
             left -= budget.iterations - before
-            if found is not None and not run.is_stable(balance, found.evaluation):
+            if found is not None and not run.is_stable(joint, found.evaluation):
                 grows = True
             elif found and _change(transient.periodic(found.evaluation), motion) < SMOOTH_CHANGE:
                 return found

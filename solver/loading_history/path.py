@@ -179,7 +179,7 @@ class LoadingPath(Path[State]):
 
     def balance_at(self, parameter: float, history: FloatArray) -> Balance:
         """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
-        return Balance(self.joint_at(parameter), history, np.zeros(self.case.model.contact.n_contact))
+        return Balance(self.joint_at(parameter), history)
 
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""
@@ -201,7 +201,7 @@ class LoadingPath(Path[State]):
         """As in Path."""
         balance = self.balance_at(state.parameter, history)
         found = run.state(balance, predicted_h, state.parameter, NEAR_ITERATIONS)
-        return found if found is not None and run.is_stable_finely(balance, found.evaluation) else None
+        return found if found is not None and run.is_stable_finely(balance.joint, found.evaluation) else None
 
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Failure:
         """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the
@@ -211,14 +211,12 @@ class LoadingPath(Path[State]):
         fine, folds = FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
-            balance = self.balance_at(end.parameter, end.evaluation.history)
-            if arrived and run.is_stable(balance, end.evaluation):
+            if arrived and run.is_stable(self.joint_of(end), end.evaluation):
                 return Step(end, tuple(folds))
             # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
-            joints = self.joint_at(beyond), self.joint_of(end)
-            settled = relax_to_periodic(joints[0], balance.wear_depth, end, joints[1], run)
+            settled = relax_to_periodic(self.joint_at(beyond), end.evaluation.wear_depth, end, self.joint_of(end), run)
             if isinstance(settled, Failure):
                 return settled
             # a fold with a smaller change is a corner of the branch

@@ -215,10 +215,10 @@ class FrequencySweep:
         """
         others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
         omega, load = (place, 1.0) if self.omega is None else (self.omega, place)
-        unworn, why = np.zeros(self.model.contact.n_contact), list[Failure]()
+        why = list[Failure]()
         for resolution in (path.case.resolution, *others):
             at = path.at(resolution)
-            found = solve_first_state(at.case, omega, load * self.excitation_amplitude, unworn, run.fresh())
+            found = solve_first_state(at.case, omega, load * self.excitation_amplitude, run.fresh())
             if isinstance(found, State):
                 return at, replace(found, parameter=place)
             why.append(found)
@@ -317,7 +317,7 @@ def _resonance_between(
         found = None
     for fold in step.folds:
         before_fold = (fold - omega) * present.sign > FREE_STEP * fold
-        if found is None or not before_fold or not run.is_stable(found.balance, found.at):
+        if found is None or not before_fold or not run.is_stable(found.balance.joint, found.at):
             way = f'give sweep = "{"down" if sweeps.direction == "up" else "up"}"'
             over = f"the sweep {sweeps.direction} jumps over the resonance at {fold / (2.0 * math.pi):.6g} Hz"
             return Failure(Outcome.RESONANCE_LOST, f"{over}: {way}")

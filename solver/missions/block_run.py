@@ -276,8 +276,8 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
     if not begun.nodes or begun.resolution is None:
         return None
     coarse, (first, *nodes) = path.at(begun.resolution), begun.nodes[::stride]
-    joint, unworn = coarse.joint_at(first), np.zeros(path.case.model.contact.n_contact)
-    found = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
+    joint = coarse.joint_at(first)
+    found = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, run)
     if not isinstance(found, State):
         return None
     states: tuple[State, ...] = (replace(found, parameter=first),)

@@ -30,7 +30,7 @@ from solver.newton.run import MOST_ITERATIONS, Bordered, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.settings import DIFFERENCE, SolverSettings
-from solver.structure.condensation import relative_indices, whole_motion
+from solver.structure.condensation import whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
 
@@ -176,7 +176,7 @@ class _AtAmplitude:
     history: FloatArray
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        balance = Balance(self.mode.joint_with(values), self.history, np.zeros(len(self.history)))
+        balance = Balance(self.mode.joint_with(values), self.history)
         at = balance.evaluate(predicted_h)
         shape = _shape(balance.joint, at.displacement_h, float(values[2]))
         real, imaginary, square = self._products(shape, shape)
@@ -207,7 +207,7 @@ class _AtAmplitude:
 
 def _shape(joint: Joint, displacement_h: FloatArray, drive: float) -> ComplexArray:
     """x_1 (n,), m, of relative displacements and a drive, m sqrt(kg)."""
-    linear, (relative, _) = joint.model.harmonic_structure(1), relative_indices(joint.model.contact)
+    linear, relative = joint.model.harmonic_structure(1), joint.contact.relative
     moved = to_complex(joint.to_relative(displacement_h))[:, 0]
     return whole_motion(linear, 1j * joint.omega, relative, drive * linear.load_harmonic, moved)
 
@@ -231,7 +231,7 @@ class Rest:
         """Amplitude, m sqrt(kg), of the first node: the vibration is far too small for slip or separation."""
         case, normal_force = self.mode.case, self.state.evaluation.force_h[:, 0, 0]
         limit = np.linalg.norm(friction_limit(case.friction_coefficient, normal_force))
-        force = np.linalg.norm(case.joint(self.mode.linear.omega, 1.0).structure.force_h()[:, 1:])
+        force = np.linalg.norm(case.joint(self.mode.linear.omega, 1.0).structure.force_h[:, 1:])
         return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
 
     def raised(self, amplitude: float, run: Run) -> ModeState | None:
@@ -241,7 +241,7 @@ class Rest:
         linear = self.mode.linear
         joint = self.mode.case.joint(linear.omega, amplitude)
         start = self.state.evaluation.predicted_h.copy()
-        start[:, 1:] = joint.structure.force_h()[:, 1:]
+        start[:, 1:] = joint.structure.force_h[:, 1:]
         values = np.array([linear.omega, linear.damping_ratio, amplitude])
         histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, *RELIEF))
         found = (self.mode.find(amplitude, (start, values), history, run.fresh()) for history in histories)
@@ -274,17 +274,17 @@ def find_rest(
 
     number: among the linear modes with sticking pairs; of a joint with fewer such modes, among those with sliding ones.
     """
-    friction, unworn = friction_of_pairs(model, friction_coefficient), np.zeros(model.contact.n_contact)
-    closed, omega = np.ones(unworn.size, bool), None
+    friction = friction_of_pairs(model, friction_coefficient)
+    closed, omega = np.ones(friction.size, bool), None
     # first with all pairs closed, then with those that the static load closes
     while True:
         glued = linear_mode(model, closed, friction, number=number)
-        linear = glued or linear_mode(model, closed, unworn, number=number)
+        linear = glued or linear_mode(model, closed, 0.0 * friction, number=number)
         if linear is None:
             return Failure(Outcome.START_FAILED, f"mode = {number}: the loaded joint has fewer linear modes")
         # without the spring on the modal coordinate the held structure is singular at its own frequency
         case = build_case(modal_model(model, linear, 0.0), friction_coefficient, omega or linear.omega, settings)
-        rest = state_at_rest(case, linear.omega, unworn, run)
+        rest = state_at_rest(case, linear.omega, run)
         if isinstance(rest, Failure):
             return rest
         if omega is not None:

@@ -261,26 +261,24 @@ class Run:
         """Steps (k, n_rel, m), N, with Jacobian times step = right (n_rel, m), N, in a state; as `JacobianSolver`."""
         return self.solver.solve(balance.linearise(at), rights, residual)
 
-    def is_stable(self, balance: Balance, at: Evaluation) -> bool:
-        """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`).
-
-        balance: of the state at a fixed wear depth, as the vibration is fast and the wear is slow.
+    def is_stable(self, joint: Joint, at: Evaluation) -> bool:
+        """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`) at
+        its wear depth, as the vibration is fast and the wear is slow.
         """
-        return bool(self.solver.determinant_sign(balance.linearise(at)) >= 0.0)
+        return bool(self.solver.determinant_sign(Balance(joint, at.history).linearise(at)) >= 0.0)
 
-    def is_stable_finely(self, balance: Balance, at: Evaluation) -> bool:
+    def is_stable_finely(self, joint: Joint, at: Evaluation) -> bool:
         """As `is_stable`, but a state is unstable only where it is so with more samples, too: with too few the sign of
         the determinant may turn where many pairs slip and open.
         """
-        joint, basis = balance.joint, balance.joint.basis
-        if self.is_stable(balance, at):
+        if self.is_stable(joint, at):
             return True
         # the predicted force of masses on rigid ground depends on the length of a sample
         if joint.law.rate_dependent:
             return False
-        finer = replace(joint, basis=build_basis(basis.orders, SAMPLES_OF_SIGN * basis.n_samples))
-        balance = replace(balance, joint=finer)
-        return self.fresh().is_stable(balance, balance.evaluate(at.predicted_h))
+        finer = replace(joint, basis=build_basis(joint.basis.orders, SAMPLES_OF_SIGN * joint.basis.n_samples))
+        sampled = Balance(finer, at.history, at.wear_depth).evaluate(at.predicted_h)
+        return self.fresh().is_stable(finer, sampled)
 
     def move(self, old: Case, joint: Joint, state: State, *, with_tail: bool = False) -> State | None:
         """The state of a case with the harmonics and samples of another joint; None where it is not found.

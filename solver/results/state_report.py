@@ -14,7 +14,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, largest_responses
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.results.history import PeriodicState
-from solver.structure.condensation import relative_indices, whole_motion
+from solver.structure.condensation import whole_motion
 from solver.structure.fourier import derivative, from_complex, synthesis, to_complex
 from solver.structure.joint import Joint
 
@@ -80,7 +80,7 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
     """
     linear = joint.model.harmonic_structure(1)
-    relative, _ = relative_indices(joint.contact)
+    relative = joint.contact.relative
     force = joint.excitation_amplitude * linear.load_harmonic
     first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
     moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
@@ -197,7 +197,7 @@ def _coefficients(values_h: FloatArray) -> ComplexArray:
 
 def _all_displacements(joint: Joint, moved: FloatArray) -> FloatArray:
     """Displacements (n, 2H+1), m, of the whole model from the relative displacements (n_rel, 2H+1), m."""
-    relative, _ = relative_indices(joint.contact)
+    relative = joint.contact.relative
     found = []
     for order, amplitude in zip((0, *joint.basis.orders), _coefficients(moved).T, strict=True):
         linear = joint.model.harmonic_structure(order)

@@ -22,7 +22,6 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.law import SampledLaw, sampled_law
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel
-from solver.structure.condensation import relative_indices
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
 
@@ -169,7 +168,7 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     )
     rate = derivative(np.eye(m), np.array(fine.basis.orders, np.float64)).T
     motion, force = tangent.matrices(np.arange(joint.contact.n_contact)).reshape(2, n_rel * m, n_rel * m)
-    select = np.kron(np.eye(n)[relative_indices(joint.contact)[0]], np.eye(m))
+    select = np.kron(np.eye(n)[joint.contact.relative], np.eye(m))
     left = np.zeros((2 * n * m + n_rel * m, 2 * n * m + n_rel * m))
     right, one = left.copy(), np.eye(m)
     x, v, p = slice(0, n * m), slice(n * m, 2 * n * m), slice(2 * n * m, None)

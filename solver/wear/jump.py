@@ -48,11 +48,9 @@ def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bo
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    balance = Balance(
-        replace(case, hold=hold).joint(state.omega, setup.excitation_amplitude), state.point.history, worn
-    )
-    found = setup.run.state(balance, state.at.predicted_h)
-    if found is None or not setup.run.is_stable(balance, found.evaluation):
+    joint = replace(case, hold=hold).joint(state.omega, setup.excitation_amplitude)
+    found = setup.run.state(Balance(joint, state.point.history, worn), state.at.predicted_h)
+    if found is None or not setup.run.is_stable(joint, found.evaluation):
         return None
     if creeps(joint, hold, found.evaluation) or vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
         return None

@@ -161,7 +161,7 @@ class WearingJoint:
 
     def is_stable(self, state: WearState) -> bool:
         """Whether a state is stable at constant wear depth."""
-        return self.run.is_stable_finely(self.balance_of(state), state.at)
+        return self.run.is_stable_finely(self.joint_of(state), state.at)
 
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""

@@ -127,9 +127,8 @@ def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep, omegas, fold):
 )
 def test_the_harmonics_of_a_node_are_checked_by_the_force_that_they_leave_out(highest, foreseen, suits):
     """The error where they were chosen grows with this force: an error above rtol, or far below, asks for others."""
-    model, unworn = random_model(2, ("3d",) * 5), np.zeros(5)
-    case = build_case(model, 0.4, OMEGA, AUTOMATIC, Resolution(all_orders(highest), 64))
-    path, found = LoadingPath(case, 30.0, OMEGA), [first_point(case, OMEGA, load, unworn) for load in (15.0, 30.0)]
+    case = build_case(random_model(2, ("3d",) * 5), 0.4, OMEGA, AUTOMATIC, Resolution(all_orders(highest), 64))
+    path, found = LoadingPath(case, 30.0, OMEGA), [first_point(case, OMEGA, load) for load in (15.0, 30.0)]
     checked, state = (replace(each, parameter=part) for each, part in zip(found, (0.5, 1.0), strict=True))
     before, now = (left_out(case.resolution.orders, each.evaluation) for each in (checked, state))
     assert path.differs(checked, state) > VIBRATION_RECHECK
