@@ -66,12 +66,9 @@ class Certificate:
         """Value and limit of each violation above its limit; NaN counts as such. tolerance: of the scaled residual."""
         # twice the tolerance: a state evaluated again from its harmonics has lost some digits to round-off
         limits = {"residual": 2.0 * max(tolerance, ROUND_OFF)} | VIOLATION_LIMITS
-        values = {name: (getattr(self, name), limit) for name, limit in limits.items()}
-        return {name: (value, limit) for name, (value, limit) in values.items() if not value <= limit}
-
-    def holds(self, tolerance: float) -> bool:
-        """Whether equilibrium, contact law, energy and periodicity hold within their limits."""
-        return not self.failures(tolerance)
+        return {
+            name: (getattr(self, name), limit) for name, limit in limits.items() if not getattr(self, name) <= limit
+        }
 
     def sentence(self, tolerance: float) -> str:
         """The violations above their limits, with their values, in words for the user."""

@@ -107,9 +107,7 @@ class Arc:
         return None if found is None else State(found.at, self.start.history, float(found.values[0] * self.span))
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
-        """State behind a corner, where a contact sample changes its status; None where none is found. The plane across
-        the old tangent may not meet the branch behind: the tangent a little ahead is taken, with both signs.
-        """
+        """State behind a corner, along the tangent a little ahead, with both signs; None where none is found."""
         base = self.place(state)
         ahead = base + CORNER_ARC * tangent
         parameter, predicted_h = float(ahead[-1] * self.span), ahead[:-1].reshape(state.evaluation.predicted_h.shape)

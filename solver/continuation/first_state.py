@@ -102,7 +102,6 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
     """Predicted force (n_rel, m), N, of a joint all of whose pairs slide; None where friction may hold one of them.
 
     The motion is that without friction; friction acts against it with its first harmonic, 4 / pi times its limit.
-    A motion with this friction, found in 3 or 20 iterations, saves no Newton iteration of the slider.
     """
     joint, at = balance.joint, rest.evaluation
     load, stiffness = joint.structure.harmonic_force, joint.structure.dynamic_stiffness[0]

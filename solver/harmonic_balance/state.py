@@ -48,14 +48,6 @@ def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
     return balance.joint.law.final_history(evaluation, evaluation.displacement_h)
 
 
-def history_at_rest(joint: Joint, state: State) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick: a range of slip
-    that shrinks to zero ends in its middle. Behind the resonance of the dovetail the motion after a sweep is 0.5 %
-    wrong with the middle, and 2.3 % with `final_history`.
-    """
-    return joint.law.middle_history(state.evaluation, state.history)
-
-
 def vibration_change(before: Evaluation, after: Evaluation) -> float:
     """Norm of the change of the vibrating part of the predicted force, over its norm in the state `before`."""
     return float(np.linalg.norm(after.predicted_h[:, 1:] - before.predicted_h[:, 1:])) / vibration_size(before)

@@ -22,7 +22,7 @@ from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State, history_at_rest, transfer, vibration_change, vibration_size
+from solver.harmonic_balance.state import Failure, State, transfer, vibration_change, vibration_size
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -35,11 +35,9 @@ FREE_STEP = 1e-3
 Also the load factor at which a ramp begins, and the first amplitude of a mode, as vibrating contact forces over the
 friction limits (with ten times the value and with a tenth the damping of the dovetail changes by 7e-5 and 1e-3)."""
 
-LONGEST_STEP = 0.1
-"""Longest step, as a fraction of the parameter."""
-
-SHORTEST_STEP = 2e-5
-"""Shortest step, as a fraction of the parameter. An undamped slider passes its resonance in such steps."""
+STEP_LIMITS = (2e-5, 0.1)
+"""Limits of the length of a step along frequency or load, as a fraction of the parameter. An undamped slider passes its
+resonance in the shortest steps."""
 
 CHANGE_PER_RTOL = 20.0
 """Largest relative change of the vibration in a step, over rtol."""
@@ -88,8 +86,8 @@ class Path(ABC, Generic[S]):
     """
 
     case: Case
-    shortest: ClassVar[float] = SHORTEST_STEP
-    longest: ClassVar[float] = LONGEST_STEP
+    shortest: ClassVar[float]
+    longest: ClassVar[float]
 
     @abstractmethod
     def joint_of(self, state: S) -> Joint:
@@ -166,6 +164,7 @@ class LoadingPath(Path[State]):
 
     excitation_amplitude: float
     omega: float | None = None
+    shortest, longest = STEP_LIMITS
 
     def joint_at(self, parameter: float) -> Joint:
         """Joint at a value of the parameter."""
@@ -194,7 +193,7 @@ class LoadingPath(Path[State]):
         for place, state in enumerate(states):
             others = np.delete(at, place)
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
-        history = history_at_rest(self.joint_at(target), start)
+        history = self.joint_at(target).law.history_at_rest(start.evaluation, start.history)
         return self.near(replace(start, parameter=target), begin, history, run)
 
     def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:
@@ -207,7 +206,7 @@ class LoadingPath(Path[State]):
         """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the
         machine; both in turns until the target.
         """
-        state = replace(start, history=history_at_rest(self.joint_of(start), start))
+        state = replace(start, history=self.joint_of(start).law.history_at_rest(start.evaluation, start.history))
         fine, folds = FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)

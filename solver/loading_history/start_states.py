@@ -18,14 +18,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from solver.accuracy.certificate import certify
 from solver.accuracy.refinement import Refined, refine
 from solver.accuracy.resolved_state import NOTHING, ResolvedState
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State, history_at_rest
+from solver.harmonic_balance.state import Failure, State
 from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, cell_of, edge_of, first_frequency
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep
 from solver.model import FloatArray, ReducedModel
@@ -240,7 +239,7 @@ class FrequencySweep:
         folds: that the sweep has jumped over between its last node and the state.
         """
         joint, at, estimate = found.joint, found.point.evaluation, found.estimate
-        if not certify(joint, at).holds(self.settings.tolerance):
+        if not found.holds():
             return Failure(Outcome.CERTIFICATE_FAILED)
         if unstable := find_instability(found.case, joint, at, self.run, self.with_switching):
             return unstable
@@ -306,7 +305,7 @@ def _resonance_between(
         return None
     part = 0.0 if step.folds else one / (one - other)
     joint = path.case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
-    balance = Balance(joint, history_at_rest(joint, here), here.evaluation.wear_depth)
+    balance = Balance(joint, joint.law.history_at_rest(here.evaluation, here.history))
     before = here.evaluation.predicted_h
     run = Run(sweeps.settings.tolerance, Budget(deadline=sweeps.run.budget.deadline))
     start = before + part * (ahead.evaluation.predicted_h - before)

@@ -20,7 +20,7 @@ from typing import Any, Generic
 
 from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
-from solver.harmonic_balance.state import Failure, carried_history, history_at_rest
+from solver.harmonic_balance.state import Failure, carried_history
 from solver.loading_history.path import FREE_STEP, Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
@@ -120,7 +120,7 @@ class Sweep(Generic[S]):
         if self.here is None or self.reference is None:
             return None
         of, node = self.path.at(self.reference.resolution), self.reference.states[-1]
-        at = replace(node.evaluation, history=history_at_rest(of.joint_of(node), node))
+        at = replace(node.evaluation, history=of.joint_of(node).law.history_at_rest(node.evaluation, node.history))
         history = carried_history(of.case, path.joint_of(state), at)
         return path.near(state, state.evaluation.predicted_h, history, run.fresh())
 

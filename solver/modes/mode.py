@@ -22,7 +22,7 @@ from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest
+from solver.harmonic_balance.state import Failure, State, final_history
 from solver.loading_history.path import FREE_STEP, Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
@@ -127,7 +127,8 @@ class NonlinearMode(Path[ModeState]):
         Nodes, too, are solved to the tolerance of results: otherwise the dovetail comes to another branch.
         """
         here, run = states[-1], run.with_tolerance(self.case.settings.tolerance)
-        history, last = history_at_rest(self.joint_of(here), here), here.evaluation.predicted_h
+        history = self.joint_of(here).law.history_at_rest(here.evaluation, here.history)
+        last = here.evaluation.predicted_h
         growth = target / here.parameter
         grown = np.concatenate([last[:, :1], growth * last[:, 1:]], axis=1)
         starts = [(grown, here.values * np.array([1.0, 1.0, growth]))]

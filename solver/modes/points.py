@@ -201,7 +201,7 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     mode, found = (mode, found) if moved is None else (other, moved)
     joint, at, resolution = mode.joint_of(found), found.evaluation, mode.case.resolution
     certificate = certify(joint, at)
-    if not certificate.holds(settings.tolerance):
+    if certificate.failures(settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
     errors = _errors_by_resolution(mode, found, run)
     if sweep is not None and (reference := sweep.reference_of(mode, found, run)) is not None:
@@ -254,7 +254,7 @@ def _lost(sweep: Sweep[ModeState]) -> Failure:
 
 
 def _slips(at: Evaluation) -> BoolArray:
-    """Samples (n_contact, N) in which a pair slips; a pair at its friction limit that does not move sticks."""
+    """Samples (n_contact, N) in which a pair slips and moves."""
     moved = np.abs(np.diff(at.state_t, axis=2)).max(axis=1)
     least = ROUND_OFF * np.abs(at.state_t).max(axis=(1, 2))
     return np.asarray((at.status_t == SLIP) & (moved > least[:, None]))

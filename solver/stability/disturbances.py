@@ -144,8 +144,8 @@ def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:
 def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     """Floquet multipliers exp(2 pi sigma / omega) of a state of a small real joint without masses on rigid ground.
 
-    Empty where the eigenvalue problem is large. A disturbance x(t) exp(sigma t) obeys the
-    linearised balance of all displacements x and predicted forces p, with d = d/dt + sigma:
+    Empty where the eigenvalue problem is large. A disturbance x(t) exp(sigma t) obeys the linearised balance of all
+    displacements x and predicted forces p, with d = d/dt + sigma:
 
         M d^2 x + C d x + K x + S^T dlambda/dp p = 0,        S x = du/dp p.
 

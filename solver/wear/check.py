@@ -73,7 +73,7 @@ def _certificate(setup: WearingJoint, state: WearState) -> Certificate | None:
     found, estimate = certify(setup.joint_of(state), state.at), state.estimate
     wear_rate_error = setup.wearing.amplification(*worn_by(state.at)) * estimate.wear_rate
     found = replace(found, response_error=estimate.response, wear_rate_error=wear_rate_error)
-    return found if found.holds(setup.case.settings.tolerance) else None
+    return None if found.failures(setup.case.settings.tolerance) else found
 
 
 def report_only(
