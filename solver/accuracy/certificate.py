@@ -66,9 +66,8 @@ class Certificate:
         """Value and limit of each violation above its limit; NaN counts as such. tolerance: of the scaled residual."""
         # twice the tolerance: a state evaluated again from its harmonics has lost some digits to round-off
         limits = {"residual": 2.0 * max(tolerance, ROUND_OFF)} | VIOLATION_LIMITS
-        return {
-            name: (getattr(self, name), limit) for name, limit in limits.items() if not getattr(self, name) <= limit
-        }
+        values = ((name, getattr(self, name), limit) for name, limit in limits.items())
+        return {name: (value, limit) for name, value, limit in values if not value <= limit}
 
     def sentence(self, tolerance: float) -> str:
         """The violations above their limits, with their values, in words for the user."""

@@ -27,9 +27,6 @@ MOST_CORRECTED = 60
 """Most directions in which a factorisation is corrected. With 0, 60, 120: 17.4, 12.0, 11.4 products of a solve and 52,
 42, 42 CPU s with 160 pairs; 6.3, 6.0, 6.0 s with 48."""
 
-FEWEST_CORRECTED = 3
-"""Fewest products of a solve that a correction is made of."""
-
 MOST_PRODUCTS = 80
 """Most products of a solve, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32."""
 
@@ -160,7 +157,7 @@ class JacobianSolver:
 
         solution, found, basis, hessenberg = solve_gmres(product, active(right.copy()), residual, most)
         n_new = hessenberg.shape[1]
-        if n_new >= FEWEST_CORRECTED:
+        if n_new:
             n_corrected = n_new + sum(len(images) for images, _ in corrections)
             own = build_correction(basis, hessenberg) if n_corrected <= MOST_CORRECTED else None
             # where the directions become too many all are dropped
