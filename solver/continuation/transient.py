@@ -28,7 +28,7 @@ from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
 from solver.structure.condensation import condense, whole_motion
-from solver.structure.fourier import from_complex, to_complex
+from solver.structure.fourier import from_complex, with_static
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Joint
 
@@ -88,8 +88,7 @@ class Transient:
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
         """Motion at the end of a step, from the solution of the balance of the step."""
-        relative_h = self.joint.to_relative(evaluation.displacement_h)
-        amplitudes = np.concatenate([relative_h[:, :1].astype(complex), to_complex(relative_h)], axis=1).T
+        amplitudes = with_static(self.joint.to_relative(evaluation.displacement_h)).T
         rates = self.rates + inverse
         each = zip(self.linear, rates, self._loads(before, inverse), amplitudes, strict=True)
         displacement = np.array([whole_motion(of, rate, self.relative, load, moved) for of, rate, load, moved in each])
