@@ -80,11 +80,18 @@ UNKNOWN = Estimate(np.inf, np.inf)
 
 @dataclass(frozen=True)
 class ResolvedState:
-    """A state with the case and the joint of its solution."""
+    """A state with the case and the joint of its solution.
+
+    estimate: estimated errors, as far as estimated.
+    accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given.
+        Always true for fixed settings.
+    """
 
     case: Case
     joint: Joint
     point: State
+    estimate: Estimate = NOTHING
+    accurate: bool = True
 
     def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedState | None:
         """The state with other harmonics and samples; None where it is not found. with_tail: as in `transfer`."""

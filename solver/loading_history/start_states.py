@@ -18,8 +18,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from solver.accuracy.refinement import Refined, refine
-from solver.accuracy.resolved_state import NOTHING, ResolvedState
+from solver.accuracy.refinement import refine
+from solver.accuracy.resolved_state import ResolvedState
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
@@ -181,9 +181,9 @@ class FrequencySweep:
             if isinstance(first, Failure):
                 return _lost(present, first)
             path, reached = first[0], Step(first[1])
-        refined = self._at_known(path, reached.state) if self.known else None
-        refined = refined or refine(path.case, path.joint_of(reached.state), reached.state, run)
-        return self._judged(refined, present, reached.folds)
+        found = self._at_known(path, reached.state) if self.known else None
+        found = found or refine(path.case, path.joint_of(reached.state), reached.state, run)
+        return self._judged(found, present, reached.folds)
 
     def _without_state(self, failure: Failure) -> StartState:
         """No state at the current frequency, and why."""
@@ -225,15 +225,15 @@ class FrequencySweep:
                 break
         return why[0]
 
-    def _at_known(self, path: Path[State], state: State) -> Refined | None:
+    def _at_known(self, path: Path[State], state: State) -> ResolvedState | None:
         """The state with the known resolution; None where it is not found with it."""
         omega = path.joint_of(state).omega
         _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - omega))
         wanted = path.at(resolution)
         moved = state if wanted.case is path.case else path.move(state, wanted, self.run)
-        return None if moved is None else Refined(wanted.case, wanted.joint_of(moved), moved, NOTHING, accurate=True)
+        return None if moved is None else ResolvedState(wanted.case, wanted.joint_of(moved), moved)
 
-    def _judged(self, found: Refined, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
+    def _judged(self, found: ResolvedState, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
         """A refined state with its errors and the state of the reference sweep, or why it is no result.
 
         folds: that the sweep has jumped over between its last node and the state.
