@@ -155,11 +155,16 @@ class NonlinearMode(Path[ModeState]):
 
     def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:
         """As in Path."""
-        found = refine(self.case_of(state.values), self.joint_of(state), state, run, node=True)
-        other = self.at(found.case.resolution)
-        moved = state if other.case is self.case else self.move(state, other, run)
         # the error of the first response is judged in a sweep of the frequency only
-        return (self, state, NOTHING) if moved is None else (other, moved, NOTHING)
+        return *self.refined(state, run, node=True), NOTHING
+
+    def refined(self, state: ModeState, run: Run, *, node: bool = False, part: float = 1.0) -> tuple[Self, ModeState]:
+        """Mode and state with the harmonics that the state needs for a part of rtol. node: as in `refine`."""
+        settings = replace(self.case.settings, rtol=part * self.case.settings.rtol)
+        case = replace(self.case_of(state.values), settings=settings)
+        other = self.at(refine(case, self.joint_of(state), state, run, node=node).case.resolution)
+        moved = None if other.case is self.case else self.move(state, other, run)
+        return (self, state) if moved is None else (other, moved)
 
     def describe(self, state: ModeState) -> str:
         """As in Path."""

@@ -15,7 +15,6 @@ from typing import Literal
 import numpy as np
 
 from solver.accuracy.certificate import certify
-from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import first_response, shifted
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
@@ -195,10 +194,7 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     """
     settings = mode.case.settings
     # half of rtol is left for the error by the steps of the sweep
-    case = replace(mode.case_of(found.values), settings=replace(settings, rtol=0.5 * settings.rtol))
-    other = mode.at(refine(case, mode.joint_of(found), found, run).case.resolution)
-    moved = None if other.case is mode.case else mode.move(found, other, run)
-    mode, found = (mode, found) if moved is None else (other, moved)
+    mode, found = mode.refined(found, run, part=0.5)
     joint, at, resolution = mode.joint_of(found), found.evaluation, mode.case.resolution
     certificate = certify(joint, at)
     if certificate.failures(settings.tolerance):
