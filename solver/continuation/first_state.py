@@ -149,7 +149,7 @@ def solve_static_state(joint: Joint, run: Run) -> State | Failure:
         if found is None:
             used, found = run.budget.iterations, _settle(balance, state.evaluation, run)
             # every search needs a static state, whose steps have a limit of their own
-            run.budget.limit += run.budget.iterations - used
+            run.budget.most_iterations += run.budget.iterations - used
         if isinstance(found, Failure):
             return found
         state = found

@@ -150,7 +150,7 @@ class FrequencySweep:
             if ramp or beyond or not passed:
                 return present
         present = self._new_sweep(cell, ramp)
-        present.budget.limit = FIRST_ITERATIONS
+        present.budget.most_iterations = FIRST_ITERATIONS
         place = 2.0 * np.pi * first_frequency(self.model, cell, self.direction) if ramp is None else FREE_STEP
         present.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
         first = self._first(present.path, place, present.run)
@@ -170,13 +170,13 @@ class FrequencySweep:
             frequency = float(frequencies[index])
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
-        run.budget.iterations, run.budget.limit = 0, NODE_ITERATIONS
+        run.budget.iterations, run.budget.most_iterations = 0, NODE_ITERATIONS
         present = self.sweep_to(frequency)
         target = 2.0 * np.pi * frequency if self.omega is None else 1.0
         present.advance_to(target)
         path, reached = present.path, present.state_at(target, run.fresh())
         if isinstance(reached, Failure):
-            run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
+            run.budget.most_iterations = run.budget.iterations + FIRST_ITERATIONS
             first = self._first(path, target, run)
             if isinstance(first, Failure):
                 return _lost(present, first)

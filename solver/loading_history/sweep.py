@@ -180,7 +180,7 @@ class Sweep(Generic[S]):
         """Find the next node, or lose the sweep."""
         budget, path, before, self.rate = self.budget, self.path, self.rate, 0.0
         budget.report(path.describe(here))
-        budget.limit = budget.iterations + NODE_ITERATIONS
+        budget.most_iterations = budget.iterations + NODE_ITERATIONS
         taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST)
         if budget.iterations <= SWEEP_ITERATIONS:
             taken = take_step(self, here, self.length, Lengths(1, AIMED_CHANGE, path.shortest, FREE_STEP))

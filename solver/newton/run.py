@@ -176,14 +176,14 @@ class Budget:
     """
 
     iterations: int = 0
-    limit: float = np.inf
+    most_iterations: float = np.inf
     deadline: float = np.inf
     report: Callable[[str], None] = lambda _: None
 
     @property
     def exhausted(self) -> bool:
-        """Whether the limit is passed and no new step may begin."""
-        return self.iterations > self.limit
+        """Whether no new step may begin."""
+        return self.iterations > self.most_iterations
 
 
 @dataclass
