@@ -134,7 +134,7 @@ class _Way:
             return _NO_FIRST if node is None else _judged(rest.mode, node, None, run)
         lowered, top = self.direction == "down", _top_of(amplitude)
         sweep = self._lowered_from(rest, top, deadline) if lowered else self._raised_to(rest, amplitude, deadline)
-        if sweep is None:
+        if sweep.last is None:
             return _NO_FIRST
         self.spent = sweep.budget.iterations
         if self.up is not None and lowered and sweep.here is not None and sweep.here.parameter < amplitude:
@@ -148,37 +148,36 @@ class _Way:
             return _lost(sweep)
         return _judged(_mode_of(sweep.path), found.state, sweep, run)
 
-    def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState] | None:
-        """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
+    def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState]:
+        """The sweep with rising amplitude at the node before an amplitude; without a node where it does not begin."""
         if self.up is None:
             budget = Budget(self.to_rest, deadline=deadline)
             first = rest.raised(rest.first_amplitude, Run(rest.mode.case.settings.tolerance, budget))
             self.up = _begun(rest.mode, first, 1.0, budget)
-        if self.up is not None:
-            self.up.budget.deadline = deadline
-            self.up.advance_to(amplitude)
+        self.up.budget.deadline = deadline
+        self.up.advance_to(amplitude)
         return self.up
 
-    def _lowered_from(self, rest: Rest, top: float, deadline: float) -> Sweep[ModeState] | None:
+    def _lowered_from(self, rest: Rest, top: float, deadline: float) -> Sweep[ModeState]:
         """The sweep with falling amplitude from a top, m sqrt(kg), to which the mode is raised first, as far as it
-        goes; None where it does not begin. A joint that has its mode only while it slides begins at the top.
+        goes. A joint that has its mode only while it slides begins at the top.
         """
-        if top != self.top:
-            mode, first, budget = rest.mode, None, Budget(self.to_rest, deadline=deadline)
-            if not rest.glued:
-                first = rest.sliding(top, Run(mode.case.settings.tolerance, budget))
-            elif (raised := self._raised_to(rest, top, deadline)) is not None:
+        if self.down is None or top != self.top:
+            mode, budget = rest.mode, Budget(self.to_rest, deadline=deadline)
+            if rest.glued:
+                raised = self._raised_to(rest, top, deadline)
                 first = raised.last if raised.ahead is None else raised.ahead.state
                 mode, budget.iterations = _mode_of(raised.path), raised.budget.iterations
+            else:
+                first = rest.sliding(top, Run(mode.case.settings.tolerance, budget))
             self.down, self.top = _begun(mode, first, -1.0, budget), top
         return self.down
 
 
-def _begun(mode: NonlinearMode, first: ModeState | None, sign: float, budget: Budget) -> Sweep[ModeState] | None:
-    if first is None:
-        return None
+def _begun(mode: NonlinearMode, first: ModeState | None, sign: float, budget: Budget) -> Sweep[ModeState]:
     sweep: Sweep[ModeState] = Sweep(mode, sign, budget)
-    sweep.begin(mode, first)
+    if first is not None:
+        sweep.begin(mode, first)
     return sweep
 
 
