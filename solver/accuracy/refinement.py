@@ -130,9 +130,7 @@ class _Search:
             here = following
 
     def _linear(self, here: ResolvedState) -> tuple[ResolvedState, bool]:
-        """Result for a state in which nothing slips or opens, or the state with more samples that show some slip; and
-        whether these do.
-        """
+        """A state without slip and opening, with its error, or with more samples that show some; whether they do."""
         settings, samples = here.case.settings, here.case.resolution.samples
         lowest = first_resolution(settings).orders if self.node else (1,)
         if settings.harmonics == "auto" and here.case.resolution.orders != lowest:
@@ -153,10 +151,8 @@ class _Search:
         return finest, True
 
     def _samples_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
-        """Estimated error by missing samples, and the state with more samples that gave it.
-
-        With 2 N samples an event (slip, stick, lift) may stay next to the same one, and both states have one error. So
-        the other state has 3 N + 2 samples. Many unknowns mean many events: then 2 N samples suffice.
+        """Estimated error by missing samples, and the state with more samples that gave it: 3 N + 2, as an event may
+        stay next to the same one of 2 N samples. Many unknowns mean many events: then 2 N suffice.
         """
         orders, samples = here.case.resolution.orders, here.case.resolution.samples
         few = here.unknowns(here.case.resolution) <= EXPENSIVE_UNKNOWNS
@@ -166,10 +162,7 @@ class _Search:
         return here.difference(finer).times(TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY), finer
 
     def _harmonics_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
-        """Estimated error by missing harmonics, and the state with more harmonics that gave it.
-
-        The error is the difference to a state with more harmonics, else to one with fewer, which is larger.
-        """
+        """Estimated error by missing harmonics, by a state with more, else with fewer; and the state with more."""
         resolution, higher = here.case.resolution, _richer(here)
         richer, found = self._compared(here, higher[-1]) if higher else None, len(higher)
         above, below = shifted(resolution, 1), shifted(resolution, -1)
@@ -191,7 +184,7 @@ class _Search:
     def _next(
         self, here: ResolvedState, wanted: Resolution, finer: ResolvedState | None, richer: ResolvedState | None
     ) -> ResolvedState | None:
-        """The state with the wanted resolution, or a known state with more harmonics; None where none is found.
+        """The state with the wanted resolution, or else `richer`; None where none is found.
 
         finer, richer: known states with more samples and with more harmonics.
         """
@@ -239,8 +232,8 @@ class _Search:
 
 
 def _richer(here: ResolvedState) -> list[Resolution]:
-    """Resolutions with more harmonics, level by level, up to that of a comparison, two levels up. As far as cheap, also
-    one period of its highest harmonic is as short as the shortest contact, and structure and penalty agree beyond.
+    """Resolutions with more harmonics, level by level, up to that of a comparison, two levels up or, where cheap, one
+    that resolves the shortest contact and beyond which structure and penalty agree.
     """
     resolution, at, model = here.case.resolution, here.point.evaluation, here.case.model
     levels = enumerate(shifted(resolution, level) for level in range(1, len(HARMONIC_LEVELS)))

@@ -156,8 +156,8 @@ class ResolvedState:
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))
 
     def _least_response(self) -> float:
-        """Response, m, below which a relative error has no meaning, as for a mass that friction holds: a small fraction
-        of the response that the excitation would cause on the stiffness of the joint alone.
+        """Response, m, below which a relative error has no meaning: a small fraction of that to the excitation on the
+        stiffness of the joint alone.
         """
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty

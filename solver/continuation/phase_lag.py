@@ -166,8 +166,6 @@ def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencySlope:
 
 
 def _changes(joint: Joint, motion_h: FloatArray) -> tuple[complex, ComplexArray]:
-    """Changes of `F^H x`, N m, and of the first harmonic of the responses (n_response,), m, with a motion
-    (n_contact, 3, 2H+1), m.
-    """
+    """Changes of `F^H x`, N m, and of the responses (n_response,), m, in the first harmonic with a motion, m."""
     first = to_complex(joint.to_relative(motion_h))[:, 0]
     return complex(joint.structure.drive @ first), np.asarray(joint.structure.dynamic_response[0] @ first)

@@ -209,9 +209,7 @@ class FrequencySweep:
         return self.present
 
     def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Failure:
-        """A state from the static one at a value of the parameter, and its path, with the harmonics of a path, or else
-        with one; or the reason of the first attempt.
-        """
+        """First state at a value of the parameter, and its path, with the harmonics of a path, or else with one."""
         others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
         omega, load = (place, 1.0) if self.omega is None else (self.omega, place)
         why = list[Failure]()
@@ -234,10 +232,7 @@ class FrequencySweep:
         return None if moved is None else ResolvedState(wanted.case, wanted.joint_of(moved), moved)
 
     def _judged(self, found: ResolvedState, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
-        """A refined state with its errors and the state of the reference sweep, or why it is no result.
-
-        folds: that the sweep has jumped over between its last node and the state.
-        """
+        """A state with all its errors, or why it is no result. folds: jumped over behind the last node."""
         joint, at, estimate = found.joint, found.point.evaluation, found.estimate
         if not found.holds():
             return Failure(Outcome.CERTIFICATE_FAILED)
@@ -270,10 +265,7 @@ def _lost(present: Sweep[State], failure: Failure) -> Failure:
 
 
 def find_resonance(sweeps: FrequencySweep, follow: FollowedFrequency) -> float | Failure:
-    """Frequency of the first resonance that a sweep meets in a range, Hz, or why it meets none.
-
-    sweeps: "up" or "down", at their beginning or as saved on their way.
-    """
+    """Frequency of the first resonance that a sweep "up" or "down" meets in a range, Hz, or why it meets none."""
     # parts of the range in each of which one sweep passes all frequencies
     edges = [edge_of(cell) for cell in range(cell_of(follow.low) + 1, cell_of(follow.high) + 1)]
     ends = [follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high]

@@ -221,9 +221,7 @@ class Sweep(Generic[S]):
                 self.reference = reference
 
     def _led(self, nodes: Nodes, *targets: float) -> Nodes | None:
-        """Nodes of the reference sweep at the last of some targets, with one level of harmonics fewer than the sweep;
-        None where none is found.
-        """
+        """Nodes of the reference sweep, with fewer harmonics, at the last of some targets; None where none is found."""
         path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
         states: tuple[S, ...] = nodes.states
         if nodes.resolution != path.case.resolution:

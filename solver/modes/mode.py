@@ -173,8 +173,8 @@ class NonlinearMode(Path[ModeState]):
 
 @dataclass(frozen=True)
 class _AtAmplitude:
-    """As BorderedProblem: the equations at an amplitude, m sqrt(kg), over the amplitude, with a tangential history
-    (n_contact, 2), m. Values: frequency, damping ratio and drive. Extra: x_1 (n,), m.
+    """As BorderedProblem: the equations at an amplitude over the amplitude. Values: frequency, damping ratio and drive.
+    Extra: x_1 (n,), m.
     """
 
     mode: NonlinearMode
@@ -241,9 +241,7 @@ class Rest:
         return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
 
     def raised(self, amplitude: float, run: Run) -> ModeState | None:
-        """The mode at a small amplitude, m sqrt(kg), from rest, or from smaller static friction forces, as in
-        `solve_first_state`; None where it is not found.
-        """
+        """The mode at a small amplitude, m sqrt(kg), from rest or from smaller static friction forces; None if none."""
         linear = self.mode.linear
         joint = self.mode.case.joint(linear.omega, amplitude)
         start = self.state.evaluation.predicted_h.copy()

@@ -187,10 +187,7 @@ def _mode_of(path: Path[ModeState]) -> NonlinearMode:
 
 
 def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | None, run: Run) -> ModePoint | Failure:
-    """The point with the harmonics that it needs, and its errors.
-
-    mode, found: the state, with the harmonics of the mode. sweep: that has led to the state, if any.
-    """
+    """The point with the harmonics that it needs, and its errors. sweep: that has led to the state, if any."""
     settings = mode.case.settings
     # half of rtol is left for the error by the steps of the sweep
     mode, found = mode.refined(found, run, part=0.5)

@@ -283,10 +283,7 @@ class Run:
         return self.fresh().is_stable(finer, sampled)
 
     def move(self, old: Case, joint: Joint, state: State, *, with_tail: bool = False) -> State | None:
-        """The state of a case with the harmonics and samples of another joint; None where it is not found.
-
-        with_tail: as in `transfer`.
-        """
+        """The state of a case with the harmonics and samples of another joint, as `transfer`; None where not found."""
         balance, start = transfer(old, joint, state.evaluation, with_tail=with_tail)
         return self.fresh().state(balance, start, state.parameter)
 

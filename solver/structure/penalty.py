@@ -95,10 +95,8 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
 
 
 def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
-    """Stiffness of each pair that moves alone, normal and (larger) tangential, (n_contact, 2), N/m.
-
-    On the dovetail at resonance three times the value takes four times the Newton iterations, half the value an equal
-    number; all responses agree within 1 %.
+    """Stiffness of each pair that moves alone, normal and (larger) tangential, (n_contact, 2), N/m. With three times
+    the value the dovetail at resonance takes four times the Newton iterations; its responses agree within 1 %.
     """
     relative, components = model.contact.relative, model.contact.component_index
     size = np.zeros((model.contact.n_contact, 2))
