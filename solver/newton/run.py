@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -67,23 +67,16 @@ EvaluationT = TypeVar("EvaluationT", Evaluation, Bordered)
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class NewtonResult(Generic[EvaluationT]):
-    """End of an iteration: its last point, or the point of the lowest norm where it has not converged."""
-
-    converged: bool
-    evaluation: EvaluationT
-    iterations: int
-
-
 def solve_newton(
     evaluate: Callable[[FloatArray], EvaluationT],
     direction: Callable[[EvaluationT], FloatArray],
     start: FloatArray,
     tolerance: float,
     most: int = MOST_ITERATIONS,
-) -> NewtonResult[EvaluationT]:
+) -> tuple[EvaluationT | None, int]:
     """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
+
+    Returns the evaluation of the solution, None where none is found, and the number of iterations.
 
     The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution. So full
     steps come first, as long as the lowest norm is improved once in `FULL_STEPS` iterations. Then the iteration returns
@@ -95,7 +88,7 @@ def solve_newton(
     for iteration in range(most + 1):
         norm = current.scaled_residual()
         if norm <= tolerance:
-            return NewtonResult(True, current, iteration)
+            return current, iteration
         if norm < best_norm:
             best, best_norm, since_best = (unknown, current), norm, 0
         else:
@@ -112,10 +105,10 @@ def solve_newton(
         while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual():
             length *= 0.5
             if length <= SHORTEST_STEP:
-                return NewtonResult(False, best[1], most)
+                return None, most
             trial = evaluate(unknown + length * step)
         unknown, current = unknown + length * step, trial
-    return NewtonResult(False, best[1], most)
+    return None, most
 
 
 class BorderedProblem(Protocol):
@@ -253,9 +246,9 @@ class Run:
 
         # an iteration that diverges ends by its residual, without a warning of numpy
         with np.errstate(over="ignore", invalid="ignore"):
-            end = solve_newton(evaluate, within_time, start, self.tolerance, most)
-        self.budget.iterations += end.iterations
-        return end.evaluation if end.converged else None
+            found, iterations = solve_newton(evaluate, within_time, start, self.tolerance, most)
+        self.budget.iterations += iterations
+        return found
 
     def steps(
         self, balance: Balance, at: Evaluation, rights: Sequence[FloatArray] | FloatArray, residual: float = FORCING

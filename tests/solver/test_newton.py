@@ -45,9 +45,9 @@ class Problem:
 
 def test_convergence_is_quadratic_on_a_smooth_function():
     problem = Problem(lambda x: np.exp(x) - 2.0, lambda x: np.diag(np.exp(x)))
-    result = problem.solve([1.5], 1e-14)
-    assert result.converged
-    assert result.iterations <= 6
+    found, iterations = problem.solve([1.5], 1e-14)
+    assert found is not None
+    assert iterations <= 6
     errors = [abs(float(point[0]) - np.log(2.0)) for point in problem.calls]
     assert errors[3] < errors[2] ** 2
 
@@ -57,20 +57,18 @@ def test_a_cycle_of_plain_newton_is_broken():
     problem = Problem(
         lambda x: 5 * np.clip(x, -1, 1) + (x - np.clip(x, -1, 1)), lambda x: np.diag(np.where(np.abs(x) < 1, 5.0, 1.0))
     )
-    result = problem.solve(np.linspace(2.0, 3.0, 3))
+    found, _ = problem.solve(np.linspace(2.0, 3.0, 3))
     for point, expected in zip(problem.calls[1:4], (-4.0, 4.0, -4.0), strict=True):
         assert point == pytest.approx(expected * np.ones(3))
-    assert result.converged
-    assert result.evaluation.point == pytest.approx(np.zeros(3), abs=1e-10)
+    assert found.point == pytest.approx(np.zeros(3), abs=1e-10)
 
 
 def test_a_residual_that_is_not_finite_sends_the_iteration_back():
     # the full step leads to where the logarithm is undefined
     problem = Problem(lambda x: np.log(x) if x[0] > 0 else np.full(1, np.nan), lambda x: np.diag(1 / x))
-    result = problem.solve([10.0], 1e-12)
+    found, _ = problem.solve([10.0], 1e-12)
     assert problem.calls[1][0] < 0.0
-    assert result.converged
-    assert result.evaluation.point[0] == pytest.approx(1.0, rel=1e-10, abs=0.0)
+    assert found.point[0] == pytest.approx(1.0, rel=1e-10, abs=0.0)
 
 
 def test_compiling_takes_no_computing_time():
