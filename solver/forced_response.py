@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.accuracy.resolved_state import first_response
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import largest_responses
+from solver.harmonic_balance.state import first_response, largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import first_response
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import HarmonicBalance, balance_at_start, functions_of
-from solver.harmonic_balance.state import State, largest_responses
+from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.loading_history.path import LoadingPath
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run

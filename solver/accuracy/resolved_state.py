@@ -18,12 +18,11 @@ from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import State, largest_responses
+from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, SolverSettings, all_orders, samples_for
-from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 from solver.structure.penalty import build_penalty, compliance_at
 
@@ -40,11 +39,6 @@ contact need not be resolved."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
-
-
-def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
-    """First harmonic of the responses (n_response,), m, of a state."""
-    return to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
 
 
 @packable

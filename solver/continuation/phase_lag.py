@@ -17,6 +17,7 @@ import numpy as np
 
 from solver.continuation.natural import ATTEMPTS
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
+from solver.harmonic_balance.state import first_response
 from solver.model import ComplexArray, FloatArray
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import MOST_ITERATIONS, Bordered, Run
@@ -142,8 +143,7 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     by_frequency = frequency_derivative(fixed, at)
     (step,) = run.steps(fixed, at, [-by_frequency.force], min(FORCING, 0.1 * accuracy))
     product, response = _changes(joint, fixed.linearise(at).motion(step))
-    amplitude = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
-    rise = (by_frequency.response[0] + response[0]) / amplitude
+    rise = (by_frequency.response[0] + response[0]) / first_response(joint, at)[0]
     turn = (by_frequency.product + product) / excitation_product(joint, at.displacement_h)
     return float(rise.real), -turn.imag
 

@@ -1,4 +1,4 @@
-"""A converged state: the history that it leaves, other harmonics, its largest response; or a failure."""
+"""A converged state: the history that it leaves, other harmonics, its responses; or a failure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.model import FloatArray
+from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC
@@ -91,7 +91,12 @@ def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArr
     return joint.law.history_from(old.penalty, evaluation.history, tangential[:, :, 0], last)
 
 
-# --- the largest response ---
+# --- responses ---
+
+
+def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
+    """First harmonic of the responses (n_response,), m, of a state."""
+    return to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
 
 
 def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:

@@ -31,9 +31,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.resolved_state import first_response
 from solver.clock import computing_time
-from solver.harmonic_balance.state import Failure, largest_responses
+from solver.harmonic_balance.state import Failure, first_response, largest_responses
 from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode

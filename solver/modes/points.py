@@ -15,11 +15,11 @@ from typing import Literal
 import numpy as np
 
 from solver.accuracy.certificate import certify
-from solver.accuracy.resolved_state import first_response, shifted
+from solver.accuracy.resolved_state import shifted
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, first_response
 from solver.loading_history.path import Path, Step
 from solver.loading_history.sweep import Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
