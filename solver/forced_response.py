@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.accuracy.resolved_state import first_response
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import largest_responses
+from solver.harmonic_balance.state import first_response, largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to
@@ -201,9 +200,9 @@ def balance_at_start(
     ((_, start),) = follow_branch(model, friction, load, np.array([frequency]), sweep, settings)
     fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)
     case = build_case(model, friction, start.penalty_omega, fixed, start.resolution)
-    joint, n_contact = case.joint(2.0 * np.pi * frequency, load), model.contact.n_contact
+    joint = case.joint(2.0 * np.pi * frequency, load)
     if start.state is None:
-        return start, case, Balance(joint, np.zeros((n_contact, 2)), np.zeros(n_contact)), None
+        return start, case, Balance(joint, np.zeros((model.contact.n_contact, 2))), None
     return start, case, *evaluated(joint, start.state)
 
 

@@ -50,6 +50,16 @@ class ContactInterface:
         return np.asarray(self.dofs[:, 0] >= 0)
 
     @cached_property
+    def component_index(self) -> IntArray:
+        """`3 pair + component` (n_rel,) of each relative displacement."""
+        return np.flatnonzero(self.dofs.ravel() >= 0)
+
+    @property
+    def relative(self) -> IntArray:
+        """Indices (n_rel,) of the relative displacements in a `LinearModel`."""
+        return self.dofs.ravel()[self.component_index]
+
+    @cached_property
     def line(self) -> IntArray:
         """0 or 1 (n_contact,) where a pair has the first or the second tangent only, else -1."""
         tangents = self.dofs[:, 1:] >= 0

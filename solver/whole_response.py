@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import first_response
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import HarmonicBalance, balance_at_start, functions_of
-from solver.harmonic_balance.state import State, largest_responses
+from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.loading_history.path import LoadingPath
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
@@ -187,7 +186,7 @@ def _reported(path: LoadingPath, branch: _Branch, errors: bool) -> ResponseCurve
             estimate = refine(case, joint, point, run).estimate.response
             error[index] = estimate if np.isfinite(estimate) else np.inf
         found.append(find_multipliers(case, joint, at, run))
-        stability.append(found[-1].stability(odd=not run.fresh().is_stable(balance, at)))
+        stability.append(found[-1].stability(odd=not run.fresh().is_stable(joint, at)))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
     return ResponseCurve(
         parameter="frequency" if path.omega is None else "excitation_amplitude",

@@ -192,13 +192,13 @@ def law_errors(joint: Joint, point: State) -> dict[str, float]:
     force, moved, friction = at.force_h[:, :, 0], at.displacement_h[:, :, 0], joint.friction_coefficient
     gap = joint.contact.gap + at.wear_depth
     condensed = joint.structure
-    largest_force = max(np.abs(force).max(), np.abs(condensed.static_force).max(), 1e-300)
+    largest_force = max(np.abs(force).max(), np.abs(condensed.force_h[:, 0]).max(), 1e-300)
     length = max(np.abs(moved).max(), np.abs(gap).max(), 1e-300)
     normal, tangential = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
     slip = moved[:, 1:] - at.history
     slid, limit = np.linalg.norm(slip, axis=1), friction * normal
     closed = normal > 0.0
-    out_of_balance = condensed.static_stiffness @ moved.ravel() + force.ravel() - condensed.static_force
+    out_of_balance = condensed.static_stiffness @ moved.ravel() + force.ravel() - condensed.force_h[:, 0]
     # an open pair may slide; a closed one slides at its limit alone, along the friction force
     off_limit = np.where(closed, slid * (limit - tangential), 0.0)
     off_direction = np.where(closed, slid * tangential - np.einsum("ij,ij->i", slip, force[:, 1:]), 0.0)
@@ -218,9 +218,9 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
     settings = SolverSettings()
     joint = build_case(deck.model, deck.friction, OMEGA, settings).joint(OMEGA, 0.0)
     structure = joint.structure
-    possible = equilibrium_possible(structure.static_stiffness, structure.static_force, deck.friction)
+    possible = equilibrium_possible(structure.static_stiffness, structure.force_h[:, 0], deck.friction)
     exists = {True: "possible", False: "impossible", None: "at the limit"}[possible]
-    point = solve_static_state(joint, np.zeros(joint.contact.n_contact), Run(settings.tolerance))
+    point = solve_static_state(joint, Run(settings.tolerance))
     if isinstance(point, Failure):
         return exists, point.outcome, {}
     return exists, Outcome.CONVERGED, law_errors(joint, point)

@@ -66,12 +66,8 @@ class Certificate:
         """Value and limit of each violation above its limit; NaN counts as such. tolerance: of the scaled residual."""
         # twice the tolerance: a state evaluated again from its harmonics has lost some digits to round-off
         limits = {"residual": 2.0 * max(tolerance, ROUND_OFF)} | VIOLATION_LIMITS
-        values = {name: (getattr(self, name), limit) for name, limit in limits.items()}
-        return {name: (value, limit) for name, (value, limit) in values.items() if not value <= limit}
-
-    def holds(self, tolerance: float) -> bool:
-        """Whether equilibrium, contact law, energy and periodicity hold within their limits."""
-        return not self.failures(tolerance)
+        values = ((name, getattr(self, name), limit) for name, limit in limits.items())
+        return {name: (value, limit) for name, value, limit in values if not value <= limit}
 
     def sentence(self, tolerance: float) -> str:
         """The violations above their limits, with their values, in words for the user."""
@@ -128,7 +124,7 @@ def _series(joint: Joint, values_h: FloatArray) -> FloatArray:
 def _residual(joint: Joint, evaluation: Evaluation) -> float:
     """Scaled residual of the reported state, or that of Newton's iteration where larger."""
     motion = joint.to_relative(evaluation.displacement_h)
-    left = joint.structure.apply(motion) + joint.to_relative(evaluation.force_h) - joint.structure.force_h()
+    left = joint.structure.apply(motion) + joint.to_relative(evaluation.force_h) - joint.structure.force_h
     # at an unbounded resonance the forces are small differences of large ones: error that round-off may hide
     parts = np.abs(joint.structure.static_stiffness) @ np.abs(motion[:, 1:])
     hidden = np.finfo(float).eps * float(np.linalg.norm(parts)) / evaluation.scale[1]
@@ -163,7 +159,7 @@ def _amplitude(values_h: FloatArray) -> FloatArray:
 def _energy_error(joint: Joint, evaluation: Evaluation, flexed: FloatArray) -> float:
     """Energy imbalance of a period over the largest work in it."""
     motion, force = joint.to_relative(evaluation.displacement_h), joint.to_relative(evaluation.force_h)
-    load = joint.structure.force_h()
+    load = joint.structure.force_h
     excitation, damping, contact = (_work(joint, each, motion) for each in (load, joint.structure.apply(motion), force))
     dissipation = float(joint.law.friction_work(evaluation).sum())
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())

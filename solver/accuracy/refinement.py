@@ -8,14 +8,13 @@ the first harmonic only, which is then exact. Masses that ratchet are brought to
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver.accuracy.resolved_state import (
     FAINT_SHARE,
     HARMONIC_LEVELS,
-    NOTHING,
     UNKNOWN,
     Estimate,
     ResolvedState,
@@ -77,23 +76,10 @@ REFINEMENT_WORK = 1.2e6
 """Most Newton iterations of one refinement, times the unknowns two levels up: 200 of 48 pairs with nine harmonics."""
 
 
-@dataclass(frozen=True)
-class Refined(ResolvedState):
-    """A state with the harmonics and samples that it needs, or with the most that are allowed.
-
-    estimate: estimated errors of the state.
-    accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given.
-        Always true for fixed settings.
-    """
-
-    estimate: Estimate
-    accurate: bool
-
-
-def refine(case: Case, joint: Joint, point: State, run: Run, *, node: bool = False) -> Refined:
+def refine(case: Case, joint: Joint, point: State, run: Run, *, node: bool = False) -> ResolvedState:
     """Estimate the error of a state at fixed wear depth; refine the state to an error below rtol in automatic settings.
 
-    The result is the last state found, with its error, where none is accurate.
+    Returns the state with the harmonics and samples that it needs, or the last state found where none is accurate.
 
     case, joint, point: the state, its joint, and the case with its harmonics and samples.
     node: whether the state is a node of a sweep: with at least the first harmonics of automatic settings, as the next
@@ -110,22 +96,21 @@ class _Search:
     begun: int
     node: bool
 
-    def refined(self, here: ResolvedState) -> Refined:
+    def refined(self, here: ResolvedState) -> ResolvedState:
         """The state at the resolution that suffices, or the last state found."""
         settings, faint = here.case.settings, False
         while True:
             if nothing_happens(here.point.evaluation):
-                linear = self._linear(here)
-                if isinstance(linear, Refined):
-                    return linear
-                here, faint = linear, True
+                here, faint = self._linear(here)
+                if not faint:
+                    return here
             if settings.harmonics == "auto":
                 here = here.with_its_symmetry(self.run)
             by_samples, finer = self._samples_error(here)
             by_harmonics, richer = self._harmonics_error(here)
             estimate = by_samples + by_harmonics
             if not settings.automatic:
-                return _ended(here, estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan))
+                return replace(here, estimate=estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan))
             holds = here.holds()
             if holds and estimate.largest <= settings.rtol:
                 return self._relaxed(here, estimate)
@@ -141,11 +126,11 @@ class _Search:
             if following is None:
                 # slip that only many samples show is no reason to reject an accurate motion
                 judged = estimate.response if faint else estimate.largest
-                return _ended(here, estimate, accurate=judged <= settings.rtol)
+                return replace(here, estimate=estimate, accurate=judged <= settings.rtol)
             here = following
 
-    def _linear(self, here: ResolvedState) -> Refined | ResolvedState:
-        """Result for a state in which nothing slips or opens, or the state with more samples that show some slip."""
+    def _linear(self, here: ResolvedState) -> tuple[ResolvedState, bool]:
+        """A state without slip and opening, with its error, or with more samples that show some; whether they do."""
         settings, samples = here.case.settings, here.case.resolution.samples
         lowest = first_resolution(settings).orders if self.node else (1,)
         if settings.harmonics == "auto" and here.case.resolution.orders != lowest:
@@ -154,21 +139,20 @@ class _Search:
         orders = here.case.resolution.orders
         finest = here.solve_at(Resolution(orders, max(FINE_SAMPLES, 2 * samples)), self.run)
         if finest is None or nothing_happens(finest.point.evaluation):
-            return _ended(here, NOTHING)
+            return here, False
         if settings.samples != "auto":
             missing = here.difference(finest).times(TWO_LEVELS_SAFETY)
-            return _ended(here, missing, accurate=not settings.automatic or missing.largest <= settings.rtol)
+            accurate = not settings.automatic or missing.largest <= settings.rtol
+            return replace(here, estimate=missing, accurate=accurate), False
         while (samples := 2 * samples) < finest.case.resolution.samples:
             level = here.solve_at(Resolution(orders, samples), self.run)
             if level is not None and not nothing_happens(level.point.evaluation):
-                return level
-        return finest
+                return level, True
+        return finest, True
 
     def _samples_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
-        """Estimated error by missing samples, and the state with more samples that gave it.
-
-        With 2 N samples an event (slip, stick, lift) may stay next to the same one, and both states have one error. So
-        the other state has 3 N + 2 samples. Many unknowns mean many events: then 2 N samples suffice.
+        """Estimated error by missing samples, and the state with more samples that gave it: 3 N + 2, as an event may
+        stay next to the same one of 2 N samples. Many unknowns mean many events: then 2 N suffice.
         """
         orders, samples = here.case.resolution.orders, here.case.resolution.samples
         few = here.unknowns(here.case.resolution) <= EXPENSIVE_UNKNOWNS
@@ -178,10 +162,7 @@ class _Search:
         return here.difference(finer).times(TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY), finer
 
     def _harmonics_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
-        """Estimated error by missing harmonics, and the state with more harmonics that gave it.
-
-        The error is the difference to a state with more harmonics, else to one with fewer, which is larger.
-        """
+        """Estimated error by missing harmonics, by a state with more, else with fewer; and the state with more."""
         resolution, higher = here.case.resolution, _richer(here)
         richer, found = self._compared(here, higher[-1]) if higher else None, len(higher)
         above, below = shifted(resolution, 1), shifted(resolution, -1)
@@ -203,7 +184,7 @@ class _Search:
     def _next(
         self, here: ResolvedState, wanted: Resolution, finer: ResolvedState | None, richer: ResolvedState | None
     ) -> ResolvedState | None:
-        """The state with the wanted resolution, or a known state with more harmonics; None where none is found.
+        """The state with the wanted resolution, or else `richer`; None where none is found.
 
         finer, richer: known states with more samples and with more harmonics.
         """
@@ -219,7 +200,7 @@ class _Search:
 
     def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
-        unknowns, most = here.unknowns(resolution), here.limit(NODE_UNKNOWNS if self.node else MOST_UNKNOWNS)
+        unknowns, most = here.unknowns(resolution), here.most_unknowns(NODE_UNKNOWNS if self.node else MOST_UNKNOWNS)
         if 2 * resolution.highest >= resolution.samples:  # which are given
             return False
         # the contact law costs unknowns times samples
@@ -234,7 +215,7 @@ class _Search:
         in_levels = resolution.highest <= HARMONIC_LEVELS[-3] and here.case.model.has_harmonics(resolution.highest)
         return in_levels and resolution.samples <= MOST_SAMPLES and unknowns <= most
 
-    def _relaxed(self, here: ResolvedState, estimate: Estimate) -> Refined:
+    def _relaxed(self, here: ResolvedState, estimate: Estimate) -> ResolvedState:
         """An accurate state with as few harmonics and samples as it needs for a fraction of rtol."""
         settings = here.case.settings
         enough, lowest = RELAXED_FRACTION * settings.rtol, first_resolution(settings).highest if self.node else 1
@@ -247,20 +228,16 @@ class _Search:
             if level is None or larger.largest > enough or not level.holds():
                 break
             here, estimate = level, larger
-        return _ended(here, estimate)
-
-
-def _ended(here: ResolvedState, estimate: Estimate, *, accurate: bool = True) -> Refined:
-    return Refined(here.case, here.joint, here.point, estimate, accurate)
+        return replace(here, estimate=estimate)
 
 
 def _richer(here: ResolvedState) -> list[Resolution]:
-    """Resolutions with more harmonics, level by level, up to that of a comparison, two levels up. As far as cheap, also
-    one period of its highest harmonic is as short as the shortest contact, and structure and penalty agree beyond.
+    """Resolutions with more harmonics, level by level, up to that of a comparison, two levels up or, where cheap, one
+    that resolves the shortest contact and beyond which structure and penalty agree.
     """
     resolution, at, model = here.case.resolution, here.point.evaluation, here.case.model
     levels = enumerate(shifted(resolution, level) for level in range(1, len(HARMONIC_LEVELS)))
-    most = here.limit(COMPARED_UNKNOWNS), FAR_UNKNOWNS
+    most = here.most_unknowns(COMPARED_UNKNOWNS), FAR_UNKNOWNS
     found = [
         each for place, each in levels if model.has_harmonics(each.highest) and here.unknowns(each) <= most[place > 1]
     ]

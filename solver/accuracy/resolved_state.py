@@ -18,13 +18,11 @@ from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import State, largest_responses, transfer
+from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, SolverSettings, all_orders, samples_for
-from solver.structure.condensation import relative_indices
-from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 from solver.structure.penalty import build_penalty, compliance_at
 
@@ -35,18 +33,12 @@ Hz 5 and 7 agree by chance (errors of the worn volume with 5, 7, 9: 1.9, 1.2, 0.
 STIFFNESS_MISMATCH = 0.25
 """Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
 
-
 FAINT_SHARE = 0.1
 """Fraction of rtol: part of the slip work that may be creep, and normal force over the largest one below which a
 contact need not be resolved."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
-
-
-def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
-    """First harmonic of the responses (n_response,), m, of a state."""
-    return to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
 
 
 @packable
@@ -82,18 +74,24 @@ UNKNOWN = Estimate(np.inf, np.inf)
 
 @dataclass(frozen=True)
 class ResolvedState:
-    """A state with the case and the joint of its solution."""
+    """A state with the case and the joint of its solution.
+
+    estimate: estimated errors, as far as estimated.
+    accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given.
+        Always true for fixed settings.
+    """
 
     case: Case
     joint: Joint
     point: State
+    estimate: Estimate = NOTHING
+    accurate: bool = True
 
     def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedState | None:
         """The state with other harmonics and samples; None where it is not found. with_tail: as in `transfer`."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        balance, start = transfer(self.case, joint, self.point.evaluation, with_tail=with_tail)
-        point = run.fresh().state(balance, start, self.point.parameter)
+        point = run.move(self.case, joint, self.point, with_tail=with_tail)
         # the mean position of a mass depends a little on the harmonics
         return None if point is None else ResolvedState(case, joint, point).at_rest(run)
 
@@ -119,13 +117,13 @@ class ResolvedState:
         """Number of unknowns of the balance with other harmonics."""
         return self.joint.component_index.size * (2 * len(resolution.orders) + 1)
 
-    def limit(self, unknowns: float) -> float:
+    def most_unknowns(self, unknowns: float) -> float:
         """A limit of the unknowns with 48 pairs for this joint: of a larger joint it limits the harmonics only."""
         return unknowns * max(1.0, self.joint.component_index.size / 144)
 
     def holds(self) -> bool:
-        """Whether all violations of the certificate are below their limits."""
-        return certify(self.joint, self.point.evaluation).holds(self.case.settings.tolerance)
+        """Whether equilibrium, contact law, energy and periodicity hold within the limits of the certificate."""
+        return not certify(self.joint, self.point.evaluation).failures(self.case.settings.tolerance)
 
     def response(self) -> ComplexArray:
         """First harmonic of the responses (n_response,), m."""
@@ -139,7 +137,8 @@ class ResolvedState:
     def difference(self, better: ResolvedState) -> Estimate:
         """Relative differences of response and wear rate to a better state."""
         mine, its = self.response(), better.response()
-        least, work = better._least_response(), max(self._least_work(), better._least_work())
+        # slip work whose error has less weight: a fraction of the work of the excitation
+        least, work = better._least_response(), SMALL_WORK * max(self._input_work(), better._input_work())
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
         size = np.maximum(better.peaks, max(SMALL_PEAK * float(better.peaks.max(initial=0.0)), least))
         response = max(first, float((np.abs(self.peaks - better.peaks) / size).max(initial=0.0)))
@@ -151,18 +150,16 @@ class ResolvedState:
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))
 
     def _least_response(self) -> float:
-        """Response, m, below which a relative error has no meaning, as for a mass that friction holds: a small fraction
-        of the response that the excitation would cause on the stiffness of the joint alone.
+        """Response, m, below which a relative error has no meaning: a small fraction of that to the excitation on the
+        stiffness of the joint alone.
         """
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
         return max(NEGLIGIBLE * float(np.linalg.norm(response)), 1e-300)
 
-    def _least_work(self) -> float:
-        """Slip work, N m, below which its error has less weight: a fraction of the work of the excitation."""
-        motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        return SMALL_WORK * abs(self.joint.structure.input_work(motion))
+    def _input_work(self) -> float:
+        return abs(self.joint.structure.input_work(self.joint.to_relative(self.point.evaluation.displacement_h)))
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:
@@ -194,8 +191,8 @@ def reach(model: ReducedModel, omega: float, highest: int) -> int:
     G is evaluated at real rates (growth instead of vibration), where the structure has no resonances. omega: rad/s.
     The last level where there is none.
     """
-    _, component_index = relative_indices(model.contact)
-    pair, tangent = component_index // 3, np.minimum(component_index % 3, 1)
+    pair, component = np.divmod(model.contact.component_index, 3)
+    tangent = np.minimum(component, 1)
     for level in (highest, *(level for level in HARMONIC_LEVELS if level > highest)):
         penalty = build_penalty(model, omega, level)
         half_octaves = np.arange(0.0, 2.0 * np.log2(HARMONIC_LEVELS[-1] / (level + 1)) + 1.0)
@@ -219,7 +216,7 @@ def nothing_happens(evaluation: Evaluation) -> bool:
 
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
-    """Whether a state has odd harmonics only although its contact forces have even ones: its symmetry is lost."""
+    """Whether a state has odd harmonics only although its contact forces have even ones."""
     return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, NEGLIGIBLE)
 
 

@@ -175,10 +175,8 @@ def _advance(
     friction: float,
     basis: FloatArray,
 ) -> tuple[float, float, int]:
-    """State and status at a sample; derivatives `dforce` (2, w) of friction and `dstate` (2, w), in place.
-
-    Eqs. (13)-(15), with the dependence on all earlier samples of the period. dstate, first, second: at the sample
-    before. predicted (3,): N. basis (m,): derivative of a time sample by its harmonics.
+    """State and status at a sample, Eqs. (13)-(15); derivatives `dforce` (2, w) of friction and `dstate` (2, w), in
+    place. dstate, first, second: at the sample before. basis (m,): derivative of a time sample by its harmonics.
     """
     pressed, pull_1, pull_2 = predicted[0], predicted[1], predicted[2]
     normal, _, _, next_1, next_2, status = contact_sample(pressed, pull_1, pull_2, friction, first, second)
@@ -204,10 +202,7 @@ def _advance(
 def _add_slip_work(
     work: FloatArray, n: int, normal_t: FloatArray, state_t: FloatArray, moved: FloatArray, basis_t: FloatArray
 ) -> None:
-    """Add the derivative of the slip work of sample n to `work` (w,).
-
-    normal_t (N,): predicted normal force, N. moved (2, w): derivative of the increment of the state.
-    """
+    """Add the derivative of the slip work of sample n to `work` (w,); moved (2, w): that of the slip of the sample."""
     step_1 = state_t[0, n + 1] - state_t[0, n]
     step_2 = state_t[1, n + 1] - state_t[1, n]
     slip = np.hypot(step_1, step_2)
@@ -226,10 +221,8 @@ def _add_slip_work(
 def _start_tangent(
     dstate: FloatArray, predicted_t: FloatArray, friction: float, start: FloatArray, periods: int, basis_t: FloatArray
 ) -> FloatArray:
-    """Derivative (2, w - 2) of the start of the last period, from that of its end (2, w).
-
-    Where the periodicity does not determine the start (the pair has come to stick), from the `periods` before, from
-    the `start` (2,), N, of the first one.
+    """Derivative (2, w - 2) of the start of the last period, from that of its end (2, w). Where a pair has come to
+    stick, the periodicity does not determine it: then through the `periods` before, from the `start` (2,), N.
     """
     width = dstate.shape[1] - 2
     if periods == 0:

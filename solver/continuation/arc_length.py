@@ -7,7 +7,7 @@ tangent of the branch.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -88,7 +88,7 @@ class Arc:
     def tangent(self, parameter: float, evaluation: Evaluation, along: FloatArray) -> FloatArray | None:
         """Unit tangent of the branch, of the sign of a direction `along`; None where the tangent is not defined."""
         balance, slope = self.balance_at(parameter, self.start.history), self.slope(parameter, evaluation)
-        tangent = np.append((self.run.step(balance, evaluation, -slope) / self.size).ravel(), 1.0)
+        tangent = np.append((self.run.steps(balance, evaluation, [-slope]) / self.size).ravel(), 1.0)
         largest = float(np.abs(tangent).max())
         if not np.isfinite(largest):
             return None
@@ -107,9 +107,7 @@ class Arc:
         return None if found is None else State(found.at, self.start.history, float(found.values[0] * self.span))
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
-        """State behind a corner, where a contact sample changes its status; None where none is found. The plane across
-        the old tangent may not meet the branch behind: the tangent a little ahead is taken, with both signs.
-        """
+        """State behind a corner, along the tangent a little ahead, with both signs; None where none is found."""
         base = self.place(state)
         ahead = base + CORNER_ARC * tangent
         parameter, predicted_h = float(ahead[-1] * self.span), ahead[:-1].reshape(state.evaluation.predicted_h.shape)
@@ -132,8 +130,8 @@ class Arc:
         fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
         balance = self.balance_at(target, self.start.history)
-        result = self.run.solve(balance, one + fraction * (other - one), NEAR_ITERATIONS)
-        return State(result.evaluation, self.start.history, target) if result.converged else None
+        found = self.run.state(balance, one + fraction * (other - one), target, NEAR_ITERATIONS)
+        return None if found is None else replace(found, history=self.start.history)
 
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
         """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""
@@ -171,6 +169,6 @@ class _Plane:
     def by_step(self, _: Bordered, __: Linearisation, step: FloatArray) -> FloatArray:
         return np.array([self.tangent[:-1] @ step.ravel() / self.arc.size])
 
-    def fraction(self, here: Bordered, _: FloatArray, __: FloatArray) -> float:
+    def fraction(self, here: Bordered, _: FloatArray) -> float:
         far = np.linalg.norm(here.extra) > ARC_WANDER * abs(self.length)
         return np.nan if far else 1.0

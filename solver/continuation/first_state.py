@@ -30,7 +30,7 @@ from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 
 LOAD_STEPS = 20
-"""Steps of the static load of a joint with gaps, wear or given normal forces, which may change the state."""
+"""Steps of the static load of a joint with gaps or given normal forces, which may change the state."""
 
 VISCOSITY_CUT, VISCOSITY_RISE = 0.2, 10.0
 """Factors on the viscosity after a step in time, and after a step that was not found. With a cut of 0.05 as many random
@@ -44,10 +44,9 @@ RELIEF = (0.1, 0.4)
 Other fractions lead to other states that friction allows: 5 % for a mass that ratchets."""
 
 
-def solve_first_state(
-    case: Case, omega: float, excitation_amplitude: float, wear_depth: FloatArray, run: Run
-) -> State | Failure:
-    """First periodic state. These ways are tried in turn until one leads to a stable state:
+def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run: Run) -> State | Failure:
+    """First periodic state of a joint, unworn or with its depths as gaps. These ways are tried in turn until one leads
+    to a stable state:
 
     1. Where friction can hold no pair against the whole excitation, Newton's method starts from a vibration in which
        all slide (four iterations for the slider, which takes 50 with the next way).
@@ -56,21 +55,21 @@ def solve_first_state(
        limit slip under the smallest vibration, in states far from the static one, and shake down.
     4. The vibration builds up in time under the whole excitation (`transient`).
 
-    omega, excitation_amplitude: rad/s, N. wear_depth (n_contact,): m.
+    omega, excitation_amplitude: rad/s, N.
     Returns the state, or START_FAILED, UNSTABLE, UNSETTLED, ADRIFT or the failure of `solve_static_state`.
     """
-    rest = state_at_rest(case, omega, wear_depth, run)
+    rest = state_at_rest(case, omega, run)
     if isinstance(rest, Failure):
         return rest
     quiet, unstable = case.joint(omega, 0.0), False
 
     def balance_at(load_factor: float, history: FloatArray) -> Balance:
-        return Balance(case.joint(omega, load_factor * excitation_amplitude), history, wear_depth)
+        return Balance(case.joint(omega, load_factor * excitation_amplitude), history)
 
     whole = balance_at(1.0, rest.history)
     sliding = sliding_start(whole, rest)
     slid = None if sliding is None else run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
-    if slid is not None and run.is_stable(balance_at(1.0, slid.evaluation.history), slid.evaluation):
+    if slid is not None and run.is_stable(whole.joint, slid.evaluation):
         return slid
     for fraction in (0.0, *RELIEF):
         relieved = balance_at(0.0, relieved_history(quiet, rest, fraction))
@@ -78,23 +77,23 @@ def solve_first_state(
         if begun is None:
             continue
         raised, arrived = follow_naturally(balance_at, begun, 1.0, run)
-        if arrived and run.is_stable(balance_at(1.0, raised.evaluation.history), raised.evaluation):
+        if arrived and run.is_stable(whole.joint, raised.evaluation):
             return raised
         unstable |= arrived
-    settled = relax_to_periodic(whole.joint, wear_depth, rest, quiet, run)
+    settled = relax_to_periodic(whole.joint, whole.wear_depth, rest, quiet, run)
     return Failure(Outcome.UNSTABLE) if unstable and isinstance(settled, Failure) else settled
 
 
-def state_at_rest(case: Case, omega: float, wear_depth: FloatArray, run: Run) -> State | Failure:
+def state_at_rest(case: Case, omega: float, run: Run) -> State | Failure:
     """The static state with the harmonics of a case, none of which vibrates, and with the parameter 0.
 
     Arguments as in `solve_first_state`. Returns the state, START_FAILED or the failure of `solve_static_state`.
     """
     quiet = case.joint(omega, 0.0)
-    static = solve_static_state(quiet, wear_depth, run)
+    static = solve_static_state(quiet, run)
     if isinstance(static, Failure):
         return static
-    balance, at, orders = Balance(quiet, static.history, wear_depth), static.evaluation, case.resolution.orders
+    balance, at, orders = Balance(quiet, static.history), static.evaluation, case.resolution.orders
     start = balance.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
     return run.state(balance, start, 0.0) or Failure(Outcome.START_FAILED)
 
@@ -103,7 +102,6 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
     """Predicted force (n_rel, m), N, of a joint all of whose pairs slide; None where friction may hold one of them.
 
     The motion is that without friction; friction acts against it with its first harmonic, 4 / pi times its limit.
-    A motion with this friction, found in 3 or 20 iterations, saves no Newton iteration of the slider.
     """
     joint, at = balance.joint, rest.evaluation
     load, stiffness = joint.structure.harmonic_force, joint.structure.dynamic_stiffness[0]
@@ -130,29 +128,28 @@ def relieved_history(joint: Joint, rest: State, fraction: float) -> FloatArray:
     return rest.history + fraction * rest.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
 
 
-def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Failure:
+def solve_static_state(joint: Joint, run: Run) -> State | Failure:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
-    Without gaps, wear and given normal forces all states of a rising load are proportional, and one step is enough.
+    Without gaps and given normal forces all states of a rising load are proportional, and one step is enough.
 
-    joint: its excitation is left out. wear_depth (n_contact,): m.
+    joint: its excitation is left out.
     Returns the state; STATIC_SLIDING or STATIC_OPEN where there is no static state, STATIC_FAILED where none is found.
     """
     run, contact = run.fresh(), joint.contact
-    proportional = not contact.gap.any() and not wear_depth.any() and contact.has_normal.all()
-    n_steps = 1 if proportional else LOAD_STEPS
-    unmoved = np.zeros((joint.contact.n_contact, 3, 1))
-    rest = Balance(static_joint(joint, 0.0), unmoved[:, 1:, 0], wear_depth)
+    n_steps = LOAD_STEPS if contact.gap.any() or not contact.has_normal.all() else 1
+    unmoved = np.zeros((contact.n_contact, 3, 1))
+    rest = Balance(static_joint(joint, 0.0), unmoved[:, 1:, 0])
     state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history)
     for step in range(1, n_steps + 1):
-        balance = Balance(static_joint(joint, step / n_steps), state.history, wear_depth)
+        balance = Balance(static_joint(joint, step / n_steps), state.history)
         before = state.evaluation.predicted_h
-        start = balance.joint.structure.force_h() if step == 1 else before * (step / (step - 1.0))
+        start = balance.joint.structure.force_h if step == 1 else before * (step / (step - 1.0))
         found: State | Failure | None = run.state(balance, start)
         if found is None:
             used, found = run.budget.iterations, _settle(balance, state.evaluation, run)
             # every search needs a static state, whose steps have a limit of their own
-            run.budget.limit += run.budget.iterations - used
+            run.budget.most_iterations += run.budget.iterations - used
         if isinstance(found, Failure):
             return found
         state = found
@@ -162,7 +159,7 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State 
 def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Failure:
     """Static state to which viscous pairs come from the state `before`, or why there is none."""
     viscosity, begun = 1.0, before.displacement_h
-    far, moved = float((balance.joint.contact.gap + balance.wear_depth).max()), np.zeros_like(begun)
+    far, moved = float(balance.joint.contact.gap.max()), np.zeros_like(begun)
     for _ in range(VISCOUS_STEPS):
         viscous = replace(balance, joint=viscous_joint(balance.joint, viscosity, before.displacement_h))
         ahead = run.state(viscous, viscous.predict(before.displacement_h, before.force_h), most=NEAR_ITERATIONS)

@@ -14,7 +14,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import BalanceAt, Failure, State, final_history
+from solver.harmonic_balance.state import BalanceAt, Failure, State
 from solver.model import FloatArray
 from solver.newton.run import MOST_ITERATIONS, SHORTEST_STEP, Run
 from solver.structure.joint import Joint
@@ -99,9 +99,7 @@ def follow_naturally(
 ) -> tuple[State, bool]:
     """Step the parameter to the target; returns the last state, and whether it is at the target.
 
-    The first Newton iteration from the last state is a tangent predictor (for wear: Eq. (19)).
-
-    fine: longest step of the parameter, as each step leaves a history to the next one.
+    The first Newton iteration from the last state is a tangent predictor (for wear: Eq. (19)). fine: longest step.
     """
     state, whole = start, target - start.parameter
     # fractions of two: sums of them are exact, so that the last step ends at the target
@@ -112,10 +110,8 @@ def follow_naturally(
         reach = target if ahead == 1.0 else start.parameter + ahead * whole
         balance = balance_at(reach, state.history)
         most = MOST_ITERATIONS if fraction <= 2.0 * shortest else NEAR_ITERATIONS
-        result = run.solve(balance, state.evaluation.predicted_h, most)
-        if result.converged:
-            state = State(result.evaluation, final_history(balance, result.evaluation), reach)
-            done, fraction = ahead, min(2.0 * fraction, longest)
+        if (found := run.state(balance, state.evaluation.predicted_h, reach, most)) is not None:
+            state, done, fraction = found, ahead, min(2.0 * fraction, longest)
             continue
         fraction, failures = 0.5 * (ahead - done), failures + 1
         if fraction < shortest or failures > ATTEMPTS or run.budget.exhausted:
@@ -126,19 +122,17 @@ def follow_naturally(
 def ratchets(joint: Joint, at: Evaluation, fraction: float) -> bool:
     """Whether the work of ratcheting in a period exceeds a fraction of the slip work.
 
-    A very small stiffness (`penalty.mean`) holds the mean position of a mass on a slider. Where the vibration lets the
-    mass slip to another mean position, the law ratchets in each period, although the Fourier series are periodic. This
-    slip counts as wear, but its work, mean normal force times ratcheting, is not in the balance of energy.
+    Only a very small stiffness (`penalty.mean`) keeps the mean position of a mass on a slider, so that the law may
+    ratchet in each period although the Fourier series are periodic. This slip counts as wear, but its work is not in
+    the balance of energy.
     """
     work = float(np.abs(at.force_h[:, 0, 0]) @ np.hypot(*joint.law.drift(at).T))
     return work > fraction * float(at.slip_work.sum())
 
 
 def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
-    """State after shakedown of the masses, which slip to and fro or stick in the end, at an unchanged wear depth.
-
-    The mean position becomes the new history, with which a part of the ratcheting is left, and so on until its work is
-    at most a fraction of the slip work. The last state found where this does not end.
+    """State after shakedown of the masses at an unchanged wear depth: the mean position becomes the new history until
+    the work of ratcheting is at most a fraction of the slip work. The last state found where this does not end.
     """
     run, worn = run.fresh(), state.evaluation.wear_depth
     for _ in range(ATTEMPTS):

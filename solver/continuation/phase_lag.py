@@ -17,9 +17,10 @@ import numpy as np
 
 from solver.continuation.natural import ATTEMPTS
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
+from solver.harmonic_balance.state import first_response
 from solver.model import ComplexArray, FloatArray
 from solver.newton.linear_solver import FORCING
-from solver.newton.run import Bordered, Run
+from solver.newton.run import MOST_ITERATIONS, Bordered, Run
 from solver.settings import DIFFERENCE, NEGLIGIBLE, ROUND_OFF
 from solver.structure.condensation import FrequencySlope, frequency_slope
 from solver.structure.fourier import to_complex
@@ -77,7 +78,7 @@ class _AtLag:
         # of the equation times |F^H x|, whose derivative is linear in the motion
         return self._errors(_changes(here.balance.joint, tangent.motion(step))[0], here.extra)
 
-    def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
+    def fraction(self, here: Bordered, change: FloatArray) -> float:
         return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
 
     def _errors(self, part: complex, product: complex) -> FloatArray:
@@ -86,7 +87,7 @@ class _AtLag:
 
 
 def solve_at_lag(
-    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
+    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int = MOST_ITERATIONS
 ) -> Bordered | None:
     """The state of a balance, with fixed or with growing wear depths, at a phase lag, rad; None where it is not found.
 
@@ -97,7 +98,7 @@ def solve_at_lag(
 
 
 def solve_at_peak(
-    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
+    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int = MOST_ITERATIONS
 ) -> tuple[Bordered, float] | None:
     """The state of the largest amplitude near a phase lag, rad, and its lag; None where it is not found.
 
@@ -140,10 +141,9 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     joint, at = state.balance.joint, state.at
     fixed = Balance(joint, at.history, at.wear_depth)
     by_frequency = frequency_derivative(fixed, at)
-    step = run.step(fixed, at, -by_frequency.force, min(FORCING, 0.1 * accuracy))
+    (step,) = run.steps(fixed, at, [-by_frequency.force], min(FORCING, 0.1 * accuracy))
     product, response = _changes(joint, fixed.linearise(at).motion(step))
-    amplitude = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
-    rise = (by_frequency.response[0] + response[0]) / amplitude
+    rise = (by_frequency.response[0] + response[0]) / first_response(joint, at)[0]
     turn = (by_frequency.product + product) / excitation_product(joint, at.displacement_h)
     return float(rise.real), -turn.imag
 
@@ -166,8 +166,6 @@ def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencySlope:
 
 
 def _changes(joint: Joint, motion_h: FloatArray) -> tuple[complex, ComplexArray]:
-    """Changes of `F^H x`, N m, and of the first harmonic of the responses (n_response,), m, with a motion
-    (n_contact, 3, 2H+1), m.
-    """
+    """Changes of `F^H x`, N m, and of the responses (n_response,), m, in the first harmonic with a motion, m."""
     first = to_complex(joint.to_relative(motion_h))[:, 0]
     return complex(joint.structure.drive @ first), np.asarray(joint.structure.dynamic_response[0] @ first)

@@ -22,13 +22,13 @@ import numpy as np
 
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import Failure, State, final_history
-from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
+from solver.harmonic_balance.state import Failure, State
+from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
-from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
-from solver.structure.fourier import from_complex, to_complex
+from solver.structure.condensation import condense, whole_motion
+from solver.structure.fourier import from_complex, with_static
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Joint
 
@@ -53,70 +53,52 @@ class Motion:
     velocity: ComplexArray
 
 
-@dataclass(frozen=True, eq=False)
-class _LoadedStructure(CondensedStructure):
-    """A structure with a load in each harmonic, load_h (n_rel, 2H+1), N."""
-
-    load_h: FloatArray
-
-    def force_h(self) -> FloatArray:
-        return self.load_h
-
-
 class Transient:
     """Matrices and loads of a joint for steps in time."""
 
     def __init__(self, joint: Joint) -> None:
-        self.joint = joint
-        self.relative, _ = relative_indices(joint.contact)
-        orders = (0, *joint.basis.orders)
-        self.rates = 1j * joint.omega * np.array(orders)
-        self.parts: list[tuple[LinearModel, Matrix]] = []
-        for order in orders:
-            linear = joint.model.harmonic_structure(order)
-            loads: dict[int, Matrix] = {0: linear.load_static, 1: joint.excitation_amplitude * linear.load_harmonic}
-            self.parts.append((linear, loads.get(order, np.zeros(linear.load_static.size))))
+        self.joint, orders = joint, np.array((0, *joint.basis.orders))
+        self.relative = joint.contact.relative
+        self.rates: ComplexArray = 1j * joint.omega * orders
+        self.linear = [joint.model.harmonic_structure(order) for order in orders.tolist()]
+        self.loads: ComplexArray = np.zeros((orders.size, len(self.linear[0].mass)), complex)
+        self.loads[0] = self.linear[0].load_static
+        self.loads[orders == 1] = joint.excitation_amplitude * joint.model.harmonic_structure(1).load_harmonic
 
     def periodic(self, evaluation: Evaluation) -> Motion:
         """Motion of the whole structure in a periodic state of the joint: the end of an infinite step."""
-        nothing = np.zeros((len(self.parts), self.parts[0][1].size), complex)
+        nothing = np.zeros_like(self.loads)
         return self.after(evaluation, Motion(nothing, nothing), 0.0)
 
     def step(self, before: Motion, inverse: float) -> Joint:
         """Joint whose balance is an implicit Euler step of length 1/`inverse`, s, from a motion `before`."""
-        n_rel = self.relative.size
-        stiffness, force = (np.empty((len(self.parts), *each), complex) for each in ((n_rel, n_rel), (n_rel,)))
-        for place, load in enumerate(self._loads(before, inverse)):
-            linear, rate = self.parts[place][0], self.rates[place] + inverse
-            full = cast("Matrix", linear.stiffness + rate * linear.damping + rate**2 * linear.mass)
-            condensed = condense(full, self.relative, load)
-            stiffness[place], force[place] = condensed.stiffness, condensed.force
-        plain = {**vars(self.joint.structure), "static_stiffness": np.real(stiffness[0])}
-        plain["moving"] = DenseStiffness(stiffness[1:])
-        load_h = from_complex(np.real(force[0]), force[1:].T)
-        return replace(self.joint, structure=_LoadedStructure(**plain, load_h=load_h))
+        loads, rates = self._loads(before, inverse), self.rates + inverse
+        found = [
+            condense(cast("Matrix", of.stiffness + rate * of.damping + rate**2 * of.mass), self.relative, load)
+            for of, rate, load in zip(self.linear, rates, loads, strict=True)
+        ]
+        stiffness, force = (np.array([getattr(each, name) for each in found]) for name in ("stiffness", "force"))
+        structure = replace(
+            self.joint.structure,
+            static_stiffness=np.real(stiffness[0]),
+            moving=DenseStiffness(stiffness[1:]),
+            force_h=from_complex(np.real(force[0]), force[1:].T),
+        )
+        return replace(self.joint, structure=structure)
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
         """Motion at the end of a step, from the solution of the balance of the step."""
-        relative_h = self.joint.to_relative(evaluation.displacement_h)
-        amplitudes = np.concatenate([relative_h[:, :1].astype(complex), to_complex(relative_h)], axis=1).T
-        loads, rates = self._loads(before, inverse), np.asarray(self.rates + inverse, np.complex128)
-        displacement = np.array(
-            [
-                whole_motion(linear, rate, self.relative, cast("ComplexArray", load), amplitude)
-                for (linear, _), rate, load, amplitude in zip(self.parts, rates, loads, amplitudes, strict=True)
-            ]
-        )
+        amplitudes = with_static(self.joint.to_relative(evaluation.displacement_h)).T
+        rates = self.rates + inverse
+        each = zip(self.linear, rates, self._loads(before, inverse), amplitudes, strict=True)
+        displacement = np.array([whole_motion(of, rate, self.relative, load, moved) for of, rate, load, moved in each])
         return Motion(displacement, rates[:, None] * displacement - inverse * before.displacement)
 
-    def _loads(self, before: Motion, inverse: float) -> list[Matrix]:
-        loads: list[Matrix] = []
-        for (linear, load), rate, moved, velocity in zip(
-            self.parts, self.rates, before.displacement, before.velocity, strict=True
-        ):
-            inertia = linear.mass @ ((rate + inverse) * moved + velocity) + linear.damping @ moved
-            loads.append(load + inverse * inertia)
-        return loads
+    def _loads(self, before: Motion, inverse: float) -> ComplexArray:
+        """Right-hand side of the step (1 + H, n), N."""
+        each = zip(self.linear, self.rates + inverse, before.displacement, before.velocity, strict=True)
+        inertia = [of.mass @ (rate * moved + velocity) + of.damping @ moved for of, rate, moved, velocity in each]
+        return self.loads + inverse * np.array(inertia)
 
 
 def relax_to_periodic(
@@ -145,21 +127,21 @@ def relax_to_periodic(
     while left > 0 and length >= SHORTEST_STEP and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance(transient.step(motion, inverse), history, wear_depth)
-        result = run.solve(balance, predicted, NEAR_ITERATIONS)
-        left -= max(result.iterations, 1)
-        ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
+        before = budget.iterations
+        end = run.state(balance, predicted, most=NEAR_ITERATIONS)
+        left -= max(budget.iterations - before, 1)
+        ahead = motion if end is None else transient.after(end.evaluation, motion, inverse)
         change = _change(motion, ahead)
         too_far = change > 2.0 * SMOOTH_CHANGE and length > 1.0
         # a step over more than the time in which a motion grows would damp this motion
-        damped = grows and result.converged and not run.is_stable(balance, result.evaluation)
-        if damped and result.iterations == 0:
+        damped = grows and end is not None and not run.is_stable(balance.joint, end.evaluation)
+        if damped and budget.iterations == before:
             return Failure(Outcome.UNSTABLE)
-        if not result.converged or too_far or damped:
+        if end is None or too_far or damped:
             length *= TRANSIENT_CUT
             continue
-        motion, predicted = ahead, result.evaluation.predicted_h
-        history = final_history(balance, result.evaluation)
-        moved = np.abs(result.evaluation.displacement_h)
+        motion, predicted, history = ahead, end.evaluation.predicted_h, end.history
+        moved = np.abs(end.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > RUNAWAY * size:
             return Failure(Outcome.ADRIFT)
@@ -168,11 +150,10 @@ def relax_to_periodic(
         if change < RELAXED_CHANGE and renewed:
             tried = change
             before = budget.iterations
-            balance = Balance(joint, history, wear_depth)
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
-            found = run.state(balance, predicted)
+            found = run.state(Balance(joint, history, wear_depth), predicted)
             left -= budget.iterations - before
-            if found is not None and not run.is_stable(balance, found.evaluation):
+            if found is not None and not run.is_stable(joint, found.evaluation):
                 grows = True
             elif found and _change(transient.periodic(found.evaluation), motion) < SMOOTH_CHANGE:
                 return found

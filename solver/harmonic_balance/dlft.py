@@ -13,7 +13,7 @@ The wear rate of a pair depends on p of this pair alone, so that W is eliminated
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -32,13 +32,13 @@ class Balance:
     """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
     - history (n_contact, 2): tangential history, m (`ContactLaw`).
-    - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6).
+    - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6). Default: 0.
     - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given. wearing: this work.
     """
 
     joint: Joint
     history: FloatArray
-    wear_depth: FloatArray
+    wear_depth: FloatArray = field(default_factory=lambda: np.zeros(1))
     wear_gain: FloatArray | float = 0.0
     wearing: WearingWork = ARCHARDS_WORK
 
@@ -63,7 +63,7 @@ class Balance:
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
         displacement_h[:, 1:, 0] += joint.law.origin(self.history)
         motion, force = joint.to_relative(displacement_h), joint.to_relative(marched.force_h)
-        reduced_force = joint.structure.force_h()
+        reduced_force = joint.structure.force_h
         residual = joint.structure.apply(motion) + force - reduced_force
         return Evaluation(
             **vars(marched),
@@ -129,9 +129,7 @@ class Linearisation:
     """`dR/dp = Z_r motion_tangent + force_tangent` at a point, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
 
     growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, which is a part of the static normal motion.
-
-    The motion of a pair that sticks during the whole period does not depend on p: the columns of its unknowns are those
-    of the identity. They are left out of the coupled system of the `active` pairs.
+    Columns of pairs that stick during the whole period are those of the identity: only `active` pairs are coupled.
     """
 
     joint: Joint

@@ -1,4 +1,4 @@
-"""A converged state: the history that it leaves, the state with other harmonics, its largest response; or a failure."""
+"""A converged state: the history that it leaves, other harmonics, its responses; or a failure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.model import FloatArray
+from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC
@@ -46,15 +46,6 @@ class Failure:
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
     """Tangential history (n_contact, 2), m, that a state of a balance leaves."""
     return balance.joint.law.final_history(evaluation, evaluation.displacement_h)
-
-
-def history_at_rest(joint: Joint, state: State) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick.
-
-    A pair whose range of slip shrinks to zero comes to stick in the middle of the range. Behind the resonance of the
-    dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 % with `final_history`.
-    """
-    return joint.law.middle_history(state.evaluation, state.history)
 
 
 def vibration_change(before: Evaluation, after: Evaluation) -> float:
@@ -100,14 +91,18 @@ def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArr
     return joint.law.history_from(old.penalty, evaluation.history, tangential[:, :, 0], last)
 
 
-# --- the largest response ---
+# --- responses ---
+
+
+def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
+    """First harmonic of the responses (n_response,), m, of a state."""
+    return to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
 
 
 def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
     """Largest magnitudes over a period of the responses (n_response,), m, the static ones included.
 
-    With the tail of friction on rigid ground: without it the error of the peak falls only with the square of the
-    highest harmonic.
+    With the tail of friction on rigid ground: else the error of the peak falls as the square of the highest harmonic.
     """
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     response_t = response_h @ build_basis(joint.basis.orders, FINE_SAMPLES).synthesis

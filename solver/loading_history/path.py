@@ -1,7 +1,15 @@
-"""What a sweep goes along (`Path`), and the unworn joint along its frequency or its excitation (`LoadingPath`)."""
+"""What a sweep goes along (`Path`), the unworn joint along its frequency or its excitation (`LoadingPath`), and where a
+sweep along the frequency begins.
+
+It begins well away from the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85
+times. All points of a cell, a quarter octave, have one first frequency: the one at which the vibration loads the stuck
+joint least, so that no sweep begins at a resonance. It depends on the scene and on the cell, not on the other points of
+a study.
+"""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import ClassVar, Generic, Self, TypeVar
@@ -14,11 +22,12 @@ from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State, history_at_rest, transfer, vibration_change, vibration_size
-from solver.model import FloatArray
+from solver.harmonic_balance.state import Failure, State, transfer, vibration_change, vibration_size
+from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.settings import Resolution, first_resolution
+from solver.settings import Direction, Resolution, first_resolution
+from solver.structure.condensation import build_structure
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
@@ -26,11 +35,9 @@ FREE_STEP = 1e-3
 Also the load factor at which a ramp begins, and the first amplitude of a mode, as vibrating contact forces over the
 friction limits (with ten times the value and with a tenth the damping of the dovetail changes by 7e-5 and 1e-3)."""
 
-LONGEST_STEP = 0.1
-"""Longest step, as a fraction of the parameter."""
-
-SHORTEST_STEP = 2e-5
-"""Shortest step, as a fraction of the parameter. An undamped slider passes its resonance in such steps."""
+STEP_LIMITS = (2e-5, 0.1)
+"""Limits of the length of a step along frequency or load, as a fraction of the parameter. An undamped slider passes its
+resonance in the shortest steps."""
 
 CHANGE_PER_RTOL = 20.0
 """Largest relative change of the vibration in a step, over rtol."""
@@ -49,6 +56,16 @@ of the dovetail at 211 Hz is three times as large, with 0 there are a few nodes 
 
 LEAST_SLIP = 1e-3
 """Slip of a pair over its motion above which it forgets its history."""
+
+BEGIN_AWAY = 0.3
+"""Least distance from the start of a sweep to the point over its frequency. With 0.22 and 0.38 the dovetail has the
+same state within 2e-3."""
+
+CELLS_PER_OCTAVE = 4
+"""Cells in an octave. The first frequency of the dovetail is 105 Hz, half the resonance."""
+
+START_CANDIDATES = 8
+"""Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen."""
 
 S = TypeVar("S", bound=State)
 
@@ -69,8 +86,8 @@ class Path(ABC, Generic[S]):
     """
 
     case: Case
-    shortest: ClassVar[float] = SHORTEST_STEP
-    longest: ClassVar[float] = LONGEST_STEP
+    shortest: ClassVar[float]
+    longest: ClassVar[float]
 
     @abstractmethod
     def joint_of(self, state: S) -> Joint:
@@ -147,6 +164,7 @@ class LoadingPath(Path[State]):
 
     excitation_amplitude: float
     omega: float | None = None
+    shortest, longest = STEP_LIMITS
 
     def joint_at(self, parameter: float) -> Joint:
         """Joint at a value of the parameter."""
@@ -160,7 +178,7 @@ class LoadingPath(Path[State]):
 
     def balance_at(self, parameter: float, history: FloatArray) -> Balance:
         """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
-        return Balance(self.joint_at(parameter), history, np.zeros(self.case.model.contact.n_contact))
+        return Balance(self.joint_at(parameter), history)
 
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""
@@ -175,31 +193,29 @@ class LoadingPath(Path[State]):
         for place, state in enumerate(states):
             others = np.delete(at, place)
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
-        history = history_at_rest(self.joint_at(target), start)
+        history = self.joint_at(target).law.history_at_rest(start.evaluation, start.history)
         return self.near(replace(start, parameter=target), begin, history, run)
 
     def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:
         """As in Path."""
         balance = self.balance_at(state.parameter, history)
         found = run.state(balance, predicted_h, state.parameter, NEAR_ITERATIONS)
-        return found if found is not None and run.is_stable_finely(balance, found.evaluation) else None
+        return found if found is not None and run.is_stable_finely(balance.joint, found.evaluation) else None
 
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Failure:
         """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the
         machine; both in turns until the target.
         """
-        state = replace(start, history=history_at_rest(self.joint_of(start), start))
+        state = replace(start, history=self.joint_of(start).law.history_at_rest(start.evaluation, start.history))
         fine, folds = FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
-            balance = self.balance_at(end.parameter, end.evaluation.history)
-            if arrived and run.is_stable(balance, end.evaluation):
+            if arrived and run.is_stable(self.joint_of(end), end.evaluation):
                 return Step(end, tuple(folds))
             # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
-            joints = self.joint_at(beyond), self.joint_of(end)
-            settled = relax_to_periodic(joints[0], balance.wear_depth, end, joints[1], run)
+            settled = relax_to_periodic(self.joint_at(beyond), end.evaluation.wear_depth, end, self.joint_of(end), run)
             if isinstance(settled, Failure):
                 return settled
             # a fold with a smaller change is a corner of the branch
@@ -267,3 +283,30 @@ class LoadingPath(Path[State]):
         at = f"{state.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {state.parameter:.3g}"
         moving = int(np.count_nonzero((state.evaluation.status_t != STICK).any(axis=1)))
         return f"at {at}, {moving} of {len(state.evaluation.status_t)} pairs slip or open"
+
+
+# --- where a sweep begins ---
+
+
+def cell_of(frequency: float) -> int:
+    """Number of the cell of a frequency, Hz."""
+    return math.floor(CELLS_PER_OCTAVE * math.log2(frequency))
+
+
+def edge_of(cell: int) -> float:
+    """Lower end of a cell, Hz."""
+    return float(2.0 ** (cell / CELLS_PER_OCTAVE))
+
+
+def first_frequency(model: ReducedModel, cell: int, sweep: Direction) -> float:
+    """Frequency, Hz, with which a sweep "up" or "down" to the points of a cell begins."""
+    width = 2.0 ** (1.0 / CELLS_PER_OCTAVE)
+    near, away = (1.0 - BEGIN_AWAY) * edge_of(cell), 1.0 / width
+    if sweep == "down":
+        near, away = (1.0 + BEGIN_AWAY) * edge_of(cell + 1), width
+    frequencies = [float(at) for at in np.geomspace(near * away, near, START_CANDIDATES + 1)]
+    structures = (build_structure(model, 2.0 * np.pi * at, 1.0, (1,)) for at in frequencies)
+    loads = [float(np.linalg.norm(each.harmonic_force)) for each in structures]
+    # of equally good frequencies the farthest: round-off must not decide
+    least = min(loads) * (1.0 + 1e-6)
+    return next(at for at, load in zip(frequencies, loads, strict=True) if load <= least)

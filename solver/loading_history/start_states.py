@@ -12,25 +12,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
+from solver.accuracy.refinement import refine
+from solver.accuracy.resolved_state import ResolvedState
 from solver.clock import computing_time
+from solver.continuation.first_state import solve_first_state
 from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State, history_at_rest
-from solver.loading_history.frequency_sweep import FrequencySweep, cell_of, edge_of, lost
-from solver.loading_history.path import FREE_STEP, Step
-from solver.loading_history.sweep import Sweep
+from solver.harmonic_balance.state import Failure, State
+from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, cell_of, edge_of, first_frequency
+from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Outcome
-from solver.packing import Packed
+from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
-from solver.settings import Direction, FollowedFrequency, SolverSettings
+from solver.results.state_report import periodic_state
+from solver.settings import Direction, FollowedFrequency, Resolution, SolverSettings, allowed
+from solver.stability.floquet import find_instability
+from solver.structure.joint import Case, build_case
+
+FIRST_ITERATIONS = SWEEP_ITERATIONS // 8
+"""Most Newton iterations to begin a sweep, or to find a state where the sweep is lost. Tens to hundreds suffice."""
+
+OTHER_START = Resolution((1,), 64)
+"""Harmonics and samples of a further attempt to find a first state: four of 54 random scenes need it."""
 
 
 def follow_branch(
@@ -40,59 +51,225 @@ def follow_branch(
     frequencies: FloatArray | FollowedFrequency,
     sweep: Direction,
     settings: SolverSettings,
-    keep: Callable[[Packed | str], None] | None = None,
+    keep: Callable[[Packed | str], None] = lambda _: None,
     resume: Packed | None = None,
 ) -> Iterator[tuple[int, StartState]]:
-    """Unworn periodic states at given frequencies, one by one, in the order of the sweep: index and state.
-
-    A state depends on its own frequency only.
+    """Unworn periodic states, one by one, in the order of the sweep, as `FrequencySweep.states`.
 
     friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
-    frequencies: Hz, ascending. Or what is sought in a range of frequencies: the first resonance that the sweep meets.
     keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
         position and the activity of the sweep, in words.
     resume: progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there
         to frequencies not yet passed. The states are equal to the last bit, except `run_time`.
     """
-    asked = model, friction_coefficient, excitation_amplitude, sweep, settings
-    sweeps = FrequencySweep(*asked, keep=keep or (lambda _: None))
+    sweeps = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings, keep=keep)
     if resume is not None:
         sweeps.load(resume)
-    return states_of_sweeps(sweeps, frequencies)
+    return sweeps.states(frequencies)
 
 
-def states_of_sweeps(
-    sweeps: FrequencySweep, frequencies: FloatArray | FollowedFrequency
-) -> Iterator[tuple[int, StartState]]:
-    """The states of `follow_branch`, from sweeps before their first state."""
-    n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
-    started = computing_time()
-    for index in np.arange(n_states)[:: -1 if sweeps.direction == "down" else 1].tolist():
-        sweeps.set_deadline(started + sweeps.settings.time_limit)
-        ended = guarded(partial(_next_state, sweeps, frequencies, index))
-        found = sweeps.without_state(ended) if isinstance(ended, Failure) else ended
-        now = computing_time()
-        yield index, replace(found, newton_iterations=sweeps.n_iterations, run_time=now - started)
-        started = now
-        sweeps.save()
+@dataclass(eq=False)
+class FrequencySweep:
+    """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
+
+    with_switching: for which states stability is tested, as in `find_instability`.
+    known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
+        is not estimated, and there is no reference sweep.
+    keep: called with the saved state, and with the position in words.
+    present, cell, omega: the present sweep, its cell, and the frequency of a ramp, rad/s, else None.
+    run: of the state at the current frequency, without the sweep to this frequency.
+    """
+
+    model: ReducedModel
+    friction_coefficient: float | FloatArray | None
+    excitation_amplitude: float
+    direction: Direction
+    settings: SolverSettings
+    with_switching: bool = True
+    known: tuple[tuple[float, Resolution], ...] = ()
+    keep: Callable[[Packed | str], None] = lambda _: None
+    present: Sweep[State] | None = None
+    cell: int = 0
+    omega: float | None = None
+    run: Run = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.run = Run(self.settings.tolerance, Budget(report=self.keep))
+
+    def states(self, frequencies: FloatArray | FollowedFrequency) -> Iterator[tuple[int, StartState]]:
+        """Index and state, one by one, in the order of the sweep. A state depends on its own frequency only.
+
+        frequencies: Hz, ascending. Or the resonance that is sought: the first one that the sweep meets in a range.
+        """
+        n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
+        started = computing_time()
+        for index in np.arange(n_states)[:: -1 if self.direction == "down" else 1].tolist():
+            self.set_deadline(started + self.settings.time_limit)
+            found = guarded(partial(self._next, frequencies, index))
+            iterations = self.run.budget.iterations + (0 if self.present is None else self.present.budget.iterations)
+            start, now = self._without_state(found) if isinstance(found, Failure) else found, computing_time()
+            yield index, replace(start, newton_iterations=iterations, run_time=now - started)
+            started = now
+            self.save()
+
+    def set_deadline(self, deadline: float) -> None:
+        """Set the CPU time of the thread, s, after which the search for the present state ends."""
+        for budget in (self.run.budget, *([] if self.present is None else [self.present.budget])):
+            budget.deadline = deadline
+
+    def save(self) -> None:
+        """Give `keep` what another sweep needs to go on."""
+        if self.present is not None and self.present.saved:
+            self.keep(pack((self.cell, self.omega, self.present.saved)))
+
+    def load(self, saved: Packed) -> None:
+        """Go on from what another sweep has given to `keep`."""
+        cell, omega, present = unpack(saved)
+        self._new_sweep(cell, omega).load(present)
+
+    def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
+        """Begin at a known state; False where the state is rejected.
+
+        case: harmonics, samples and penalty of the state. state: its parameter is the frequency, rad/s, or for a ramp
+        its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
+        """
+        omega = 2.0 * np.pi * frequency
+        present = self._new_sweep(cell_of(frequency), omega if self.direction == "ramp" else None)
+        present.sign = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
+        return present.begin(replace(present.path, case=case), state)
+
+    def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
+        """The sweep that leads to a frequency, Hz, at its first node or farther on; without a state if none is found.
+
+        beyond: whether the present sweep will do although it has passed the frequency.
+        """
+        omega, cell, present = 2.0 * np.pi * frequency, cell_of(frequency), self.present
+        ramp = omega if self.direction == "ramp" else None
+        if present is not None and (self.cell, self.omega) == (cell, ramp):
+            passed = present.last is not None and (omega - present.last.parameter) * present.sign < 0.0
+            if ramp or beyond or not passed:
+                return present
+        present = self._new_sweep(cell, ramp)
+        present.budget.most_iterations = FIRST_ITERATIONS
+        place = 2.0 * np.pi * first_frequency(self.model, cell, self.direction) if ramp is None else FREE_STEP
+        present.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
+        first = self._first(present.path, place, present.run)
+        if isinstance(first, Failure):
+            present.failure = first
+        else:
+            present.begin(*first)
+        return present
+
+    def _next(self, frequencies: FloatArray | FollowedFrequency, index: int) -> StartState | Failure:
+        """State at the next frequency, with the harmonics it needs, or why there is none. Raises LinAlgError."""
+        if isinstance(frequencies, FollowedFrequency):
+            frequency = find_resonance(self, frequencies)
+            if isinstance(frequency, Failure):
+                return frequency
+        else:
+            frequency = float(frequencies[index])
+        # the state must not depend on those at other frequencies
+        self.run = run = self.run.fresh()
+        run.budget.iterations, run.budget.most_iterations = 0, NODE_ITERATIONS
+        present = self.sweep_to(frequency)
+        target = 2.0 * np.pi * frequency if self.omega is None else 1.0
+        present.advance_to(target)
+        path, reached = present.path, present.state_at(target, run.fresh())
+        if isinstance(reached, Failure):
+            run.budget.most_iterations = run.budget.iterations + FIRST_ITERATIONS
+            first = self._first(path, target, run)
+            if isinstance(first, Failure):
+                return _lost(present, first)
+            path, reached = first[0], Step(first[1])
+        found = self._at_known(path, reached.state) if self.known else None
+        found = found or refine(path.case, path.joint_of(reached.state), reached.state, run)
+        return self._judged(found, present, reached.folds)
+
+    def _without_state(self, failure: Failure) -> StartState:
+        """No state at the current frequency, and why."""
+        case = None if self.present is None else self.present.path.case
+        return StartState(
+            outcome=failure.outcome,
+            state=None,
+            penalty_omega=math.nan if case is None else case.penalty_omega,
+            resolution=Resolution((1,), 4) if case is None else case.resolution,
+            response_error=math.inf,
+            wear_rate_error=math.inf,
+            message=failure.message,
+        )
+
+    def _new_sweep(self, cell: int, omega: float | None) -> Sweep[State]:
+        """A sweep before its first node. omega: of a ramp, rad/s, else None."""
+        # the penalty belongs to the upper end of the cell
+        case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * edge_of(cell + 1), self.settings)
+        path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
+        budget, sign = Budget(deadline=of.deadline, report=of.report), -1.0 if self.direction == "down" else 1.0
+        self.cell, self.omega = cell, omega
+        self.present = Sweep(path, sign, budget, with_reference=not self.known, save=self.save)
+        return self.present
+
+    def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Failure:
+        """First state at a value of the parameter, and its path, with the harmonics of a path, or else with one."""
+        others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
+        omega, load = (place, 1.0) if self.omega is None else (self.omega, place)
+        why = list[Failure]()
+        for resolution in (path.case.resolution, *others):
+            at = path.at(resolution)
+            found = solve_first_state(at.case, omega, load * self.excitation_amplitude, run.fresh())
+            if isinstance(found, State):
+                return at, replace(found, parameter=place)
+            why.append(found)
+            if found.outcome.static or run.budget.exhausted:
+                break
+        return why[0]
+
+    def _at_known(self, path: Path[State], state: State) -> ResolvedState | None:
+        """The state with the known resolution; None where it is not found with it."""
+        omega = path.joint_of(state).omega
+        _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - omega))
+        wanted = path.at(resolution)
+        moved = state if wanted.case is path.case else path.move(state, wanted, self.run)
+        return None if moved is None else ResolvedState(wanted.case, wanted.joint_of(moved), moved)
+
+    def _judged(self, found: ResolvedState, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
+        """A state with all its errors, or why it is no result. folds: jumped over behind the last node."""
+        joint, at, estimate = found.joint, found.point.evaluation, found.estimate
+        if not found.holds():
+            return Failure(Outcome.CERTIFICATE_FAILED)
+        if unstable := find_instability(found.case, joint, at, self.run, self.with_switching):
+            return unstable
+        reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
+        if reference is not None:
+            estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
+        # folds of a ramp are load factors
+        fold = (present.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
+        return StartState(
+            outcome=Outcome.CONVERGED if found.accurate else Outcome.INACCURATE,
+            state=periodic_state(joint, found.point),
+            penalty_omega=found.case.penalty_omega,
+            resolution=found.case.resolution,
+            response_error=estimate.response,
+            wear_rate_error=estimate.wear_rate,
+            branch=present.branch + len(folds),
+            fold_frequency=float(fold),
+            reference=None if reference is None else periodic_state(joint, reference),
+        )
 
 
-def _next_state(
-    sweeps: FrequencySweep, frequencies: FloatArray | FollowedFrequency, index: int
-) -> StartState | Failure:
-    if not isinstance(frequencies, FollowedFrequency):
-        return sweeps.advance(float(frequencies[index]))
-    resonance = find_resonance(sweeps, frequencies)
-    return resonance if isinstance(resonance, Failure) else sweeps.advance(resonance)
+def _lost(present: Sweep[State], failure: Failure) -> Failure:
+    """Why a sweep has no state, and where its states end. failure: of the last search."""
+    if present.last is None:
+        return failure
+    reason = Outcome.BRANCH_LOST if failure.outcome is Outcome.START_FAILED else failure.outcome
+    return Failure(reason, f"stable states end {present.path.describe(present.last)}")
 
 
 def find_resonance(sweeps: FrequencySweep, follow: FollowedFrequency) -> float | Failure:
-    """Frequency of the first resonance that a sweep meets in a range, Hz, or why it meets none.
-
-    sweeps: "up" or "down", at their beginning or as saved on their way.
-    """
-    for near, far in _segments(follow, sweeps.direction == "down"):
-        # the state at a frequency belongs to the sweep of its cell
+    """Frequency of the first resonance that a sweep "up" or "down" meets in a range, Hz, or why it meets none."""
+    # parts of the range in each of which one sweep passes all frequencies
+    edges = [edge_of(cell) for cell in range(cell_of(follow.low) + 1, cell_of(follow.high) + 1)]
+    ends = [follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high]
+    for near, far in pairwise(ends[::-1] if sweeps.direction == "down" else ends):
         present = sweeps.sweep_to(0.5 * (near + far), beyond=True)
         present.advance_to(2.0 * math.pi * near)
         while (here := present.here) is not None and (step := present.ahead) is not None:
@@ -104,16 +281,9 @@ def find_resonance(sweeps: FrequencySweep, follow: FollowedFrequency) -> float |
                 break
             present.advance_to(float(np.nextafter(end, present.sign * math.inf)))
         else:
-            return lost(present, present.failure or Failure(Outcome.BRANCH_LOST))
+            return _lost(present, present.failure or Failure(Outcome.BRANCH_LOST))
     within = f"between {follow.low:g} and {follow.high:g} Hz: give another range"
     return Failure(Outcome.RESONANCE_LOST, f"the sweep {sweeps.direction} meets no {follow.of} {within}")
-
-
-def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, float]]:
-    """Parts of a range, Hz, in each of which one sweep passes all frequencies, in the order of the sweep."""
-    edges = [edge_of(cell) for cell in range(cell_of(follow.low) + 1, cell_of(follow.high) + 1)]
-    parts = pairwise([follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high])
-    return ((high, low) for low, high in reversed(list(parts))) if down else parts
 
 
 def _resonance_between(
@@ -127,7 +297,7 @@ def _resonance_between(
         return None
     part = 0.0 if step.folds else one / (one - other)
     joint = path.case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
-    balance = Balance(joint, history_at_rest(joint, here), here.evaluation.wear_depth)
+    balance = Balance(joint, joint.law.history_at_rest(here.evaluation, here.history))
     before = here.evaluation.predicted_h
     run = Run(sweeps.settings.tolerance, Budget(deadline=sweeps.run.budget.deadline))
     start = before + part * (ahead.evaluation.predicted_h - before)
@@ -138,7 +308,7 @@ def _resonance_between(
         found = None
     for fold in step.folds:
         before_fold = (fold - omega) * present.sign > FREE_STEP * fold
-        if found is None or not before_fold or not run.is_stable(found.balance, found.at):
+        if found is None or not before_fold or not run.is_stable(found.balance.joint, found.at):
             way = f'give sweep = "{"down" if sweeps.direction == "up" else "up"}"'
             over = f"the sweep {sweeps.direction} jumps over the resonance at {fold / (2.0 * math.pi):.6g} Hz"
             return Failure(Outcome.RESONANCE_LOST, f"{over}: {way}")

@@ -20,7 +20,7 @@ from typing import Any, Generic
 
 from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
-from solver.harmonic_balance.state import Failure, carried_history, history_at_rest
+from solver.harmonic_balance.state import Failure, carried_history
 from solver.loading_history.path import FREE_STEP, Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
@@ -50,19 +50,15 @@ STEPS_OF_REFERENCE = 3
 
 @packable
 @dataclass(frozen=True)
-class Nodes:
-    """The last nodes of a sweep, with equal harmonics; the current one is the last."""
+class ReferenceNodes:
+    """The last nodes of a reference sweep, with equal harmonics; the current one is the last."""
 
     resolution: Resolution
-    states: tuple[Any, ...] = ()
-
-    def then(self, state: Any) -> Nodes:
-        """With one node more."""
-        return replace(self, states=(*self.states, state)[-LAST_NODES:])
+    states: tuple[Any, ...]
 
 
 _SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
-"""Attributes of a `Sweep` with which it goes on from a node, and the Newton iterations so far."""
+"""Attributes of a `Sweep` with which it goes on from a node, beside its harmonics and the iterations so far."""
 
 
 class Sweep(Generic[S]):
@@ -89,7 +85,7 @@ class Sweep(Generic[S]):
         self.path, self.sign, self.budget, self.save = path, sign, budget, save
         self.with_reference = with_reference
         self.run = self._reference_run = Run(path.case.settings.tolerance, budget)
-        self.nodes = Nodes(path.case.resolution)
+        self.nodes: tuple[S, ...] = ()
         self.ahead: Step[S] | None = None
         self.passed: list[float] = []
         self.failure: Failure | None = Failure(Outcome.START_FAILED)
@@ -97,7 +93,7 @@ class Sweep(Generic[S]):
         self.checked: S | None = None
         self.error = 0.0
         self.branch, self.fold = 0, math.nan
-        self.reference: Nodes | None = None
+        self.reference: ReferenceNodes | None = None
         self.skipped: tuple[float, ...] = ()
         self.saved: dict[str, Any] = {}
 
@@ -105,14 +101,14 @@ class Sweep(Generic[S]):
         """Go on from what another sweep has saved."""
         self.saved, self.budget.iterations = saved, saved["iterations"]
         vars(self).update({name: saved[name] for name in _SAVED})
-        self.path = self.path.at(self.nodes.resolution)
+        self.path = self.path.at(saved["resolution"])
         # without the factorisations that are kept from node to node, and the next node
         self.run, self._reference_run, self.ahead = self.run.fresh(), self.run.fresh(), None
 
     @property
     def last(self) -> S | None:
         """The current node, or the last one of a lost sweep; None where there was none."""
-        return self.nodes.states[-1] if self.nodes.states else None
+        return self.nodes[-1] if self.nodes else None
 
     @property
     def here(self) -> S | None:
@@ -124,7 +120,7 @@ class Sweep(Generic[S]):
         if self.here is None or self.reference is None:
             return None
         of, node = self.path.at(self.reference.resolution), self.reference.states[-1]
-        at = replace(node.evaluation, history=history_at_rest(of.joint_of(node), node))
+        at = replace(node.evaluation, history=of.joint_of(node).law.history_at_rest(node.evaluation, node.history))
         history = carried_history(of.case, path.joint_of(state), at)
         return path.near(state, state.evaluation.predicted_h, history, run.fresh())
 
@@ -134,9 +130,9 @@ class Sweep(Generic[S]):
         One harmonic can give a joint that slips and opens everywhere a state that does not exist: more harmonics change
         it by more than half.
         """
-        self.path, self.passed, self.nodes = path, [state.parameter], Nodes(path.case.resolution, (state,))
+        self.path, self.passed, self.nodes = path, [state.parameter], (state,)
         if self._choose_resolution() > SENSITIVE_ERROR:
-            self.nodes, self.failure = Nodes(self.path.case.resolution), Failure(Outcome.UNSETTLED)
+            self.nodes, self.failure = (), Failure(Outcome.UNSETTLED)
             return False
         self.failure = None
         self._save()
@@ -159,7 +155,7 @@ class Sweep(Generic[S]):
         """
         if self.here is None or self.ahead is None:
             return self.failure or Failure(Outcome.BRANCH_LOST)
-        before, path = self.nodes.states[:-1], self.path
+        before, path = self.nodes[:-1], self.path
         near = before if self.ahead.folds else (*before[-1:], self.ahead.state)
         found = path.solve((*near, self.here), parameter, run)
         return path.rescue(self.here, parameter, run) if found is None else Step(found)
@@ -167,7 +163,7 @@ class Sweep(Generic[S]):
     def attempt(self, here: S, length: float) -> Step[S] | None:
         """As in SteppedProblem."""
         run = self.run.with_tolerance(self.path.case.settings.rough_tolerance)
-        found = self.path.solve(self.nodes.states, self.path.ahead(here.parameter, self.sign * length), run)
+        found = self.path.solve(self.nodes, self.path.ahead(here.parameter, self.sign * length), run)
         return None if found is None else Step(found)
 
     def ratio(self, here: S, end: Step[S], length: float) -> float:
@@ -184,7 +180,7 @@ class Sweep(Generic[S]):
         """Find the next node, or lose the sweep."""
         budget, path, before, self.rate = self.budget, self.path, self.rate, 0.0
         budget.report(path.describe(here))
-        budget.limit = budget.iterations + NODE_ITERATIONS
+        budget.most_iterations = budget.iterations + NODE_ITERATIONS
         taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST)
         if budget.iterations <= SWEEP_ITERATIONS:
             taken = take_step(self, here, self.length, Lengths(1, AIMED_CHANGE, path.shortest, FREE_STEP))
@@ -200,7 +196,7 @@ class Sweep(Generic[S]):
         """Make the next node the current one."""
         self.ahead = None
         self.passed.append(step.state.parameter)
-        self.nodes = replace(self.nodes, states=(step.state,)) if step.folds else self.nodes.then(step.state)
+        self.nodes = (step.state,) if step.folds else (*self.nodes, step.state)[-LAST_NODES:]
         self.branch, self.fold = self.branch + len(step.folds), (self.fold, *step.folds)[-1]
         if self.with_reference:
             self._lead_reference(before, step)
@@ -214,7 +210,7 @@ class Sweep(Generic[S]):
         if step.folds or self.path.forgets(step.state):
             self.reference, self.skipped = None, ()
         elif self.reference is not None or not self.path.rests(step.state):
-            reference = self.reference or Nodes(self.path.case.resolution, (before,))
+            reference = self.reference or ReferenceNodes(self.path.case.resolution, (before,))
             self.skipped = (*self.skipped, step.state.parameter)
             if len(self.skipped) == STEPS_OF_REFERENCE:
                 middle = 0.5 * (before.parameter + step.state.parameter)
@@ -223,10 +219,8 @@ class Sweep(Generic[S]):
             else:
                 self.reference = reference
 
-    def _led(self, nodes: Nodes, *targets: float) -> Nodes | None:
-        """Nodes of the reference sweep at the last of some targets, with one level of harmonics fewer than the sweep;
-        None where none is found.
-        """
+    def _led(self, nodes: ReferenceNodes, *targets: float) -> ReferenceNodes | None:
+        """Nodes of the reference sweep, with fewer harmonics, at the last of some targets; None where none is found."""
         path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
         states: tuple[S, ...] = nodes.states
         if nodes.resolution != path.case.resolution:
@@ -237,22 +231,22 @@ class Sweep(Generic[S]):
         for target in targets:
             found = path.solve(states, target, run) if states else None
             states = () if found is None else (*states, found)[-LAST_NODES:]
-        return Nodes(path.case.resolution, states) if states else None
+        return ReferenceNodes(path.case.resolution, states) if states else None
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
-        self.checked, error = self.nodes.states[-1], NOTHING
+        self.checked, error = self.nodes[-1], NOTHING
         if self.path.case.settings.automatic:
             path, self.checked, error = self.path.choose(self.checked, self.run)
-            if path.case.resolution == self.nodes.resolution:
-                self.nodes = replace(self.nodes, states=(*self.nodes.states[:-1], self.checked))
+            if path.case.resolution == self.path.case.resolution:
+                self.nodes = (*self.nodes[:-1], self.checked)
             else:
-                self.nodes, self.path = Nodes(path.case.resolution, (self.checked,)), path
-                self.run = self.run.fresh()
+                self.nodes, self.path, self.run = (self.checked,), path, self.run.fresh()
         self.error = error.largest
         return error.response
 
     def _save(self) -> None:
         """Save the current node, and go on as a sweep that is resumed there."""
-        self.load(in_rows({name: vars(self)[name] for name in _SAVED} | {"iterations": self.budget.iterations}))
+        others = {"resolution": self.path.case.resolution, "iterations": self.budget.iterations}
+        self.load(in_rows({name: vars(self)[name] for name in _SAVED} | others))
         self.save()

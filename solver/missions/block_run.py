@@ -12,9 +12,8 @@ from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, State, vibration_change
-from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.start_states import states_of_sweeps
+from solver.loading_history.start_states import FrequencySweep
 from solver.loading_history.sweep import LAST_NODES, STEPS_OF_REFERENCE
 from solver.missions.mission import Block, MissionRequest
 from solver.model import ComplexArray, FloatArray, ReducedModel
@@ -228,7 +227,7 @@ def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
         return again, given.earlier
     direction = given.mission.first if block.way == "continue" else block.way
     sweeps = given.sweeps(direction, block.excitation_amplitude)
-    _, start = next(states_of_sweeps(sweeps, np.array([block.ends[0]])))
+    _, start = next(sweeps.states(np.array([block.ends[0]])))
     present = sweeps.present
     if start.state is None or present is None or block.way == "continue":
         return start, None
@@ -270,8 +269,8 @@ def _through_nodes(path: LoadingPath, earlier: EarlierSweep, target: float, stri
     if not earlier.nodes or earlier.resolution is None:
         return None
     coarse, (first, *nodes) = path.at(earlier.resolution), earlier.nodes[::stride]
-    joint, unworn = coarse.joint_at(first), np.zeros(path.case.model.contact.n_contact)
-    begin = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
+    joint = coarse.joint_at(first)
+    begin = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, run)
     if not isinstance(begin, State):
         return None
     states: tuple[State, ...] = (replace(begin, parameter=first),)
@@ -321,7 +320,7 @@ def _continued(given: BlockInput, before: StartState) -> StartState:
         parameter = here.excitation_amplitude / load if direction == "ramp" else here.omega
         if not sweeps.go_on_from(wearing.case, replace(unworn.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)
-        _, after = next(states_of_sweeps(sweeps, np.array([target])))
+        _, after = next(sweeps.states(np.array([target])))
         start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)
         iterations += after.newton_iterations
     return replace(start, newton_iterations=iterations)

@@ -31,10 +31,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.resolved_state import first_response
 from solver.clock import computing_time
-from solver.harmonic_balance.state import Failure, largest_responses
-from solver.loading_history.start_states import states_of_sweeps
+from solver.harmonic_balance.state import Failure, first_response, largest_responses
 from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
@@ -227,7 +225,7 @@ def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | 
     if given.guide is not None:
         # errors of a reference solution are not used
         sweeps.known = given.guide.resolutions
-    for index, start in states_of_sweeps(sweeps, frequencies):
+    for index, start in sweeps.states(frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() > given.deadline:

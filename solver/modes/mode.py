@@ -22,15 +22,15 @@ from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest
+from solver.harmonic_balance.state import Failure, State, final_history
 from solver.loading_history.path import FREE_STEP, Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
-from solver.newton.run import Bordered, Run
+from solver.newton.run import MOST_ITERATIONS, Bordered, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.settings import DIFFERENCE, SolverSettings
-from solver.structure.condensation import relative_indices, whole_motion
+from solver.structure.condensation import whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
 
@@ -102,12 +102,12 @@ class NonlinearMode(Path[ModeState]):
         start: tuple[FloatArray, FloatArray],
         history: FloatArray,
         run: Run,
-        most: int | None = None,
+        most: int = MOST_ITERATIONS,
     ) -> ModeState | None:
         """The mode at an amplitude a, m sqrt(kg); None where Newton's method fails.
 
         start: first predicted force (n_rel, 2H+1), N, and values (3,). history (n_contact, 2): tangential history, m.
-        run, most: as in `Run.solve`.
+        most: iterations.
         """
         found = run.solve_bordered(_AtAmplitude(self, amplitude, history), *start, most)
         # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states; below
@@ -127,7 +127,8 @@ class NonlinearMode(Path[ModeState]):
         Nodes, too, are solved to the tolerance of results: otherwise the dovetail comes to another branch.
         """
         here, run = states[-1], run.with_tolerance(self.case.settings.tolerance)
-        history, last = history_at_rest(self.joint_of(here), here), here.evaluation.predicted_h
+        history = self.joint_of(here).law.history_at_rest(here.evaluation, here.history)
+        last = here.evaluation.predicted_h
         growth = target / here.parameter
         grown = np.concatenate([last[:, :1], growth * last[:, 1:]], axis=1)
         starts = [(grown, here.values * np.array([1.0, 1.0, growth]))]
@@ -154,11 +155,16 @@ class NonlinearMode(Path[ModeState]):
 
     def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:
         """As in Path."""
-        found = refine(self.case_of(state.values), self.joint_of(state), state, run, node=True)
-        other = self.at(found.case.resolution)
-        moved = state if other.case is self.case else self.move(state, other, run)
         # the error of the first response is judged in a sweep of the frequency only
-        return (self, state, NOTHING) if moved is None else (other, moved, NOTHING)
+        return *self.refined(state, run, node=True), NOTHING
+
+    def refined(self, state: ModeState, run: Run, *, node: bool = False, part: float = 1.0) -> tuple[Self, ModeState]:
+        """Mode and state with the harmonics that the state needs for a part of rtol. node: as in `refine`."""
+        settings = replace(self.case.settings, rtol=part * self.case.settings.rtol)
+        case = replace(self.case_of(state.values), settings=settings)
+        other = self.at(refine(case, self.joint_of(state), state, run, node=node).case.resolution)
+        moved = None if other.case is self.case else self.move(state, other, run)
+        return (self, state) if moved is None else (other, moved)
 
     def describe(self, state: ModeState) -> str:
         """As in Path."""
@@ -167,8 +173,8 @@ class NonlinearMode(Path[ModeState]):
 
 @dataclass(frozen=True)
 class _AtAmplitude:
-    """As BorderedProblem: the equations at an amplitude, m sqrt(kg), over the amplitude, with a tangential history
-    (n_contact, 2), m. Values: frequency, damping ratio and drive. Extra: x_1 (n,), m.
+    """As BorderedProblem: the equations at an amplitude over the amplitude. Values: frequency, damping ratio and drive.
+    Extra: x_1 (n,), m.
     """
 
     mode: NonlinearMode
@@ -176,7 +182,7 @@ class _AtAmplitude:
     history: FloatArray
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        balance = Balance(self.mode.joint_with(values), self.history, np.zeros(len(self.history)))
+        balance = Balance(self.mode.joint_with(values), self.history)
         at = balance.evaluate(predicted_h)
         shape = _shape(balance.joint, at.displacement_h, float(values[2]))
         real, imaginary, square = self._products(shape, shape)
@@ -201,13 +207,13 @@ class _AtAmplitude:
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         return self._products(here.extra, _shape(here.balance.joint, tangent.motion(step), 0.0))
 
-    def fraction(self, _: Bordered, __: FloatArray, ___: FloatArray) -> float:
+    def fraction(self, _: Bordered, __: FloatArray) -> float:
         return 1.0
 
 
 def _shape(joint: Joint, displacement_h: FloatArray, drive: float) -> ComplexArray:
     """x_1 (n,), m, of relative displacements and a drive, m sqrt(kg)."""
-    linear, (relative, _) = joint.model.harmonic_structure(1), relative_indices(joint.model.contact)
+    linear, relative = joint.model.harmonic_structure(1), joint.contact.relative
     moved = to_complex(joint.to_relative(displacement_h))[:, 0]
     return whole_motion(linear, 1j * joint.omega, relative, drive * linear.load_harmonic, moved)
 
@@ -231,17 +237,15 @@ class Rest:
         """Amplitude, m sqrt(kg), of the first node: the vibration is far too small for slip or separation."""
         case, normal_force = self.mode.case, self.state.evaluation.force_h[:, 0, 0]
         limit = np.linalg.norm(friction_limit(case.friction_coefficient, normal_force))
-        force = np.linalg.norm(case.joint(self.mode.linear.omega, 1.0).structure.force_h()[:, 1:])
+        force = np.linalg.norm(case.joint(self.mode.linear.omega, 1.0).structure.force_h[:, 1:])
         return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
 
     def raised(self, amplitude: float, run: Run) -> ModeState | None:
-        """The mode at a small amplitude, m sqrt(kg), from rest, or from smaller static friction forces, as in
-        `solve_first_state`; None where it is not found.
-        """
+        """The mode at a small amplitude, m sqrt(kg), from rest or from smaller static friction forces; None if none."""
         linear = self.mode.linear
         joint = self.mode.case.joint(linear.omega, amplitude)
         start = self.state.evaluation.predicted_h.copy()
-        start[:, 1:] = joint.structure.force_h()[:, 1:]
+        start[:, 1:] = joint.structure.force_h[:, 1:]
         values = np.array([linear.omega, linear.damping_ratio, amplitude])
         histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, *RELIEF))
         found = (self.mode.find(amplitude, (start, values), history, run.fresh()) for history in histories)
@@ -274,17 +278,17 @@ def find_rest(
 
     number: among the linear modes with sticking pairs; of a joint with fewer such modes, among those with sliding ones.
     """
-    friction, unworn = friction_of_pairs(model, friction_coefficient), np.zeros(model.contact.n_contact)
-    closed, omega = np.ones(unworn.size, bool), None
+    friction = friction_of_pairs(model, friction_coefficient)
+    closed, omega = np.ones(friction.size, bool), None
     # first with all pairs closed, then with those that the static load closes
     while True:
         glued = linear_mode(model, closed, friction, number=number)
-        linear = glued or linear_mode(model, closed, unworn, number=number)
+        linear = glued or linear_mode(model, closed, 0.0 * friction, number=number)
         if linear is None:
             return Failure(Outcome.START_FAILED, f"mode = {number}: the loaded joint has fewer linear modes")
         # without the spring on the modal coordinate the held structure is singular at its own frequency
         case = build_case(modal_model(model, linear, 0.0), friction_coefficient, omega or linear.omega, settings)
-        rest = state_at_rest(case, linear.omega, unworn, run)
+        rest = state_at_rest(case, linear.omega, run)
         if isinstance(rest, Failure):
             return rest
         if omega is not None:

@@ -15,12 +15,11 @@ from typing import Literal
 import numpy as np
 
 from solver.accuracy.certificate import certify
-from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import first_response, shifted
+from solver.accuracy.resolved_state import shifted
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, first_response
 from solver.loading_history.path import Path, Step
 from solver.loading_history.sweep import Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
@@ -135,7 +134,7 @@ class _Way:
             return _NO_FIRST if node is None else _judged(rest.mode, node, None, run)
         lowered, top = self.direction == "down", _top_of(amplitude)
         sweep = self._lowered_from(rest, top, deadline) if lowered else self._raised_to(rest, amplitude, deadline)
-        if sweep is None:
+        if sweep.last is None:
             return _NO_FIRST
         self.spent = sweep.budget.iterations
         if self.up is not None and lowered and sweep.here is not None and sweep.here.parameter < amplitude:
@@ -149,37 +148,36 @@ class _Way:
             return _lost(sweep)
         return _judged(_mode_of(sweep.path), found.state, sweep, run)
 
-    def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState] | None:
-        """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
+    def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState]:
+        """The sweep with rising amplitude at the node before an amplitude; without a node where it does not begin."""
         if self.up is None:
             budget = Budget(self.to_rest, deadline=deadline)
             first = rest.raised(rest.first_amplitude, Run(rest.mode.case.settings.tolerance, budget))
             self.up = _begun(rest.mode, first, 1.0, budget)
-        if self.up is not None:
-            self.up.budget.deadline = deadline
-            self.up.advance_to(amplitude)
+        self.up.budget.deadline = deadline
+        self.up.advance_to(amplitude)
         return self.up
 
-    def _lowered_from(self, rest: Rest, top: float, deadline: float) -> Sweep[ModeState] | None:
+    def _lowered_from(self, rest: Rest, top: float, deadline: float) -> Sweep[ModeState]:
         """The sweep with falling amplitude from a top, m sqrt(kg), to which the mode is raised first, as far as it
-        goes; None where it does not begin. A joint that has its mode only while it slides begins at the top.
+        goes. A joint that has its mode only while it slides begins at the top.
         """
-        if top != self.top:
-            mode, first, budget = rest.mode, None, Budget(self.to_rest, deadline=deadline)
-            if not rest.glued:
-                first = rest.sliding(top, Run(mode.case.settings.tolerance, budget))
-            elif (raised := self._raised_to(rest, top, deadline)) is not None:
+        if self.down is None or top != self.top:
+            mode, budget = rest.mode, Budget(self.to_rest, deadline=deadline)
+            if rest.glued:
+                raised = self._raised_to(rest, top, deadline)
                 first = raised.last if raised.ahead is None else raised.ahead.state
                 mode, budget.iterations = _mode_of(raised.path), raised.budget.iterations
+            else:
+                first = rest.sliding(top, Run(mode.case.settings.tolerance, budget))
             self.down, self.top = _begun(mode, first, -1.0, budget), top
         return self.down
 
 
-def _begun(mode: NonlinearMode, first: ModeState | None, sign: float, budget: Budget) -> Sweep[ModeState] | None:
-    if first is None:
-        return None
+def _begun(mode: NonlinearMode, first: ModeState | None, sign: float, budget: Budget) -> Sweep[ModeState]:
     sweep: Sweep[ModeState] = Sweep(mode, sign, budget)
-    sweep.begin(mode, first)
+    if first is not None:
+        sweep.begin(mode, first)
     return sweep
 
 
@@ -189,19 +187,13 @@ def _mode_of(path: Path[ModeState]) -> NonlinearMode:
 
 
 def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | None, run: Run) -> ModePoint | Failure:
-    """The point with the harmonics that it needs, and its errors.
-
-    mode, found: the state, with the harmonics of the mode. sweep: that has led to the state, if any.
-    """
+    """The point with the harmonics that it needs, and its errors. sweep: that has led to the state, if any."""
     settings = mode.case.settings
     # half of rtol is left for the error by the steps of the sweep
-    case = replace(mode.case_of(found.values), settings=replace(settings, rtol=0.5 * settings.rtol))
-    other = mode.at(refine(case, mode.joint_of(found), found, run).case.resolution)
-    moved = None if other.case is mode.case else mode.move(found, other, run)
-    mode, found = (mode, found) if moved is None else (other, moved)
+    mode, found = mode.refined(found, run, part=0.5)
     joint, at, resolution = mode.joint_of(found), found.evaluation, mode.case.resolution
     certificate = certify(joint, at)
-    if not certificate.holds(settings.tolerance):
+    if certificate.failures(settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
     errors = _errors_by_resolution(mode, found, run)
     if sweep is not None and (reference := sweep.reference_of(mode, found, run)) is not None:
@@ -254,7 +246,7 @@ def _lost(sweep: Sweep[ModeState]) -> Failure:
 
 
 def _slips(at: Evaluation) -> BoolArray:
-    """Samples (n_contact, N) in which a pair slips; a pair at its friction limit that does not move sticks."""
+    """Samples (n_contact, N) in which a pair slips and moves."""
     moved = np.abs(np.diff(at.state_t, axis=2)).max(axis=1)
     least = ROUND_OFF * np.abs(at.state_t).max(axis=(1, 2))
     return np.asarray((at.status_t == SLIP) & (moved > least[:, None]))

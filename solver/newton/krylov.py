@@ -30,14 +30,14 @@ Product = Callable[[FloatArray], FloatArray]
 
 
 def solve_gmres(
-    product: Product, right: FloatArray, rtol: float, most: int
+    product: Product, right: FloatArray, residual: float, most: int
 ) -> tuple[FloatArray, bool, FloatArray, FloatArray]:
-    """Solve `A x = right` (n,) by GMRES from zero, with at most `most` products, to the relative residual `rtol`.
+    """Solve `A x = right` (n,) by GMRES from zero, with at most `most` products, to a relative residual.
 
     Returns x, whether it has converged, and basis and Hessenberg matrix (`_arnoldi`).
     """
     norms, null = [float(np.linalg.norm(right))], np.ones(min(most, right.size) + 1)
-    wanted = rtol * norms[0]
+    wanted = residual * norms[0]
     if not 0.0 < norms[0] < math.inf:
         return np.zeros_like(right), norms[0] == 0.0, right[None], np.zeros((1, 0))
 
@@ -100,10 +100,8 @@ def ritz_values(
 def _arnoldi(
     product: Product, start: FloatArray, most: int, enough: Callable[[FloatArray], bool]
 ) -> tuple[FloatArray, FloatArray]:
-    """Orthonormal basis W (k + 1, n) of the Krylov space of `start`, and the Hessenberg matrix H (k + 1, k).
-
-    The operator maps the first k vectors V to `A V = W H`; the last vector is 0 where the space is invariant.
-    Ends after `most` products, where the space is invariant, before an image that is not finite, or by `enough`.
+    """Orthonormal basis W (k + 1, n) of the Krylov space, and the Hessenberg matrix H (k + 1, k): `A V = W H` for the
+    first k vectors V. Ends after `most` products, where the space is invariant or an image not finite, or by `enough`.
     """
     size, k = min(most, start.size), 0
     basis, hessenberg = np.zeros((size + 1, start.size)), np.zeros((size + 1, size))
@@ -121,9 +119,8 @@ def _arnoldi(
 
 @njit(cache=True)
 def _extend(basis: FloatArray, k: int, image: FloatArray) -> FloatArray:
-    """Vector k + 1 of an orthonormal basis (most + 1, n), in place; returns the components (k + 2,) of the image (n,).
-
-    The last component is 0 where the new part is round-off.
+    """Vector k + 1 of an orthonormal basis, in place; returns the components (k + 2,) of the image (n,), the last one 0
+    where the new part is round-off.
     """
     column = np.zeros(k + 2)
     length = np.linalg.norm(image)

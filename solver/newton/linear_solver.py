@@ -1,7 +1,6 @@
 """Newton directions: solves with the exact Jacobian, Eqs. (16) and (17), and the sign of its determinant.
 
-A small Jacobian is factorised. A large one is solved by GMRES. Its preconditioner serves for many solves: a
-factorisation, corrected where GMRES has been.
+A small Jacobian is factorised, a large one is solved by GMRES with an earlier factorisation, corrected where GMRES was.
 """
 
 from __future__ import annotations
@@ -27,9 +26,6 @@ with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 
 MOST_CORRECTED = 60
 """Most directions in which a factorisation is corrected. With 0, 60, 120: 17.4, 12.0, 11.4 products of a solve and 52,
 42, 42 CPU s with 160 pairs; 6.3, 6.0, 6.0 s with 48."""
-
-FEWEST_CORRECTED = 3
-"""Fewest products of a solve that a correction is made of."""
 
 MOST_PRODUCTS = 80
 """Most products of a solve, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32."""
@@ -111,9 +107,9 @@ class JacobianSolver:
     _corrections: tuple[tuple[FloatArray, FloatArray], ...] = ()
 
     def solve(
-        self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
+        self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, residual: float = FORCING
     ) -> FloatArray:
-        """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
+        """Steps (k, n_rel, m) with Jacobian times step = right (n_rel, m), N, to a relative residual."""
         rows, rest = tangent.active_rows, tangent.passive_rows
         steps = np.zeros((len(rights), *rights[0].shape))
         direct = None
@@ -123,24 +119,24 @@ class JacobianSolver:
             direct = direct if direct.sign else build_dense_factor(tangent, NEUTRAL_SHIFT)
         for step, right in zip(steps, rights, strict=True):
             if rows.size:
-                step[rows] = (direct.solve(right) if direct else self._solve_large(tangent, right, rtol))[rows]
+                step[rows] = (direct.solve(right) if direct else self._solve_large(tangent, right, residual))[rows]
             if rest.size:
                 # the columns of all other unknowns are those of the identity
                 step[rest] = (right - tangent.apply(step, roughly=True))[rest]
         return steps
 
-    def _solve_large(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
+    def _solve_large(self, tangent: Linearisation, right: FloatArray, residual: float) -> FloatArray:
         """Solution in the rows of the active pairs, with an earlier factorisation while products are few."""
         if self._factor is not None:
-            solution, found = self._iterate(self._factor, tangent, right, rtol, REUSE_PRODUCTS)
+            solution, found = self._iterate(self._factor, tangent, right, residual, REUSE_PRODUCTS)
             if found:
                 return solution
         self._factor, self._corrections = build_factor(tangent), ()
         # convergence is not required: Newton's method judges by the true residual
-        return self._iterate(self._factor, tangent, right, rtol, MOST_PRODUCTS)[0]
+        return self._iterate(self._factor, tangent, right, residual, MOST_PRODUCTS)[0]
 
     def _iterate(
-        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, most: int
+        self, factor: Factor, tangent: Linearisation, right: FloatArray, residual: float, most: int
     ) -> tuple[FloatArray, bool]:
         """Solution by GMRES, and whether it has converged; corrects the factorisation by the space of the solve."""
         corrections, passive = self._corrections, tangent.passive_rows
@@ -159,9 +155,9 @@ class JacobianSolver:
             # preconditioned from the right: the residual of GMRES is the true one
             return active(tangent.apply(solved(vector), roughly=True))
 
-        solution, found, basis, hessenberg = solve_gmres(product, active(right.copy()), rtol, most)
+        solution, found, basis, hessenberg = solve_gmres(product, active(right.copy()), residual, most)
         n_new = hessenberg.shape[1]
-        if n_new >= FEWEST_CORRECTED:
+        if n_new:
             n_corrected = n_new + sum(len(images) for images, _ in corrections)
             own = build_correction(basis, hessenberg) if n_corrected <= MOST_CORRECTED else None
             # where the directions become too many all are dropped

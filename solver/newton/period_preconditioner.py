@@ -6,7 +6,7 @@ this holds sample by sample,
 
     dp(t) + (Z / eps - 1) dx(t) = r(t),      dx(t) = A(t) dp(t) + B(t) dx(t - 1),
 
-with the derivatives A and B of the contact law at a sample (`sampled_law`), in blocks of the pairs. So
+with the derivatives A and B of the contact law at a sample (`law`), in blocks of the pairs. So
 
     dx(t) = B(t) dx(t - 1) + [1 + A(t) (Z / eps - 1)]^-1 A(t) [r(t) - (Z / eps - 1) B(t) dx(t - 1)]
 
@@ -26,7 +26,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.contact.sampled_law import sample_tangents
+from solver.contact.law import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.structure.condensation import CACHED_STRUCTURES, CondensedStructure

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -40,9 +40,8 @@ from 273.7 Hz on: 128 samples find four unstable, 512 samples none. A stable sta
 
 @dataclass(frozen=True)
 class Bordered:
-    """Evaluation of a balance with further equations.
+    """Balance and evaluation at values of the further unknowns (k,), with the errors (k,) of the further equations, 1.
 
-    balance, at: at the values of the further unknowns (k,). errors (k,): of the further equations, dimensionless.
     reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
     extra: what the problem needs again for its derivatives.
     """
@@ -68,23 +67,16 @@ EvaluationT = TypeVar("EvaluationT", Evaluation, Bordered)
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class NewtonResult(Generic[EvaluationT]):
-    """End of an iteration: its last point, or that of the lowest norm where it has not converged."""
-
-    converged: bool
-    evaluation: EvaluationT
-    iterations: int
-
-
 def solve_newton(
     evaluate: Callable[[FloatArray], EvaluationT],
     direction: Callable[[EvaluationT], FloatArray],
     start: FloatArray,
     tolerance: float,
     most: int = MOST_ITERATIONS,
-) -> NewtonResult[EvaluationT]:
+) -> tuple[EvaluationT | None, int]:
     """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
+
+    Returns the evaluation of the solution, None where none is found, and the number of iterations.
 
     The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution. So full
     steps come first, as long as the lowest norm is improved once in `FULL_STEPS` iterations. Then the iteration returns
@@ -96,7 +88,7 @@ def solve_newton(
     for iteration in range(most + 1):
         norm = current.scaled_residual()
         if norm <= tolerance:
-            return NewtonResult(True, current, iteration)
+            return current, iteration
         if norm < best_norm:
             best, best_norm, since_best = (unknown, current), norm, 0
         else:
@@ -113,10 +105,10 @@ def solve_newton(
         while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual():
             length *= 0.5
             if length <= SHORTEST_STEP:
-                return NewtonResult(False, best[1], most)
+                return None, most
             trial = evaluate(unknown + length * step)
         unknown, current = unknown + length * step, trial
-    return NewtonResult(False, best[1], most)
+    return None, most
 
 
 class BorderedProblem(Protocol):
@@ -131,12 +123,12 @@ class BorderedProblem(Protocol):
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         """Change (k,) of the errors with a step (n_rel, m), N, of the predicted force."""
 
-    def fraction(self, here: Bordered, step: FloatArray, change: FloatArray) -> float:
-        """Fraction of a Newton step that is taken: 1 for a usual one, NaN to give up."""
+    def fraction(self, here: Bordered, change: FloatArray) -> float:
+        """Fraction of a Newton step, with a change (k,) of the values, that is taken: 1 for all, NaN to give up."""
 
 
 def bordered_step(
-    problem: BorderedProblem, here: Bordered, solver: JacobianSolver, rtol: float
+    problem: BorderedProblem, here: Bordered, solver: JacobianSolver, residual: float
 ) -> tuple[FloatArray, FloatArray]:
     """Newton step of all unknowns (n_rel m + k,), and the derivative `reduced` (k, k) as in `Bordered`.
 
@@ -145,12 +137,12 @@ def bordered_step(
 
         (de/dq + de/dp B) dq = -e - de/dp a,      dp = a + B dq.
 
-    rtol: relative residual of the linear solves.
+    residual: relative one of the linear solves.
     """
     tangent = here.balance.linearise(here.at)
     slopes, by_values = problem.by_values(here)
     rights = np.array([-here.at.residual, *(-slope for slope in slopes)])
-    steps = solver.solve(tangent, rights, rtol)
+    steps = solver.solve(tangent, rights, residual)
     own, *others = (problem.by_step(here, tangent, step) for step in steps)
     reduced = by_values + np.stack(others, axis=1)
     if not np.isfinite(reduced).all():
@@ -159,9 +151,9 @@ def bordered_step(
     step, right = (np.tensordot(np.append(1.0, change), parts, 1) for parts in (steps, rights))
     # the steps may cancel each other, not so their errors
     left = right - tangent.apply(step)
-    if np.linalg.norm(left) > rtol * np.linalg.norm(here.at.residual):
+    if np.linalg.norm(left) > residual * np.linalg.norm(here.at.residual):
         step = step + solver.solve(tangent, [left])[0]
-    return problem.fraction(here, step, change) * np.concatenate([step.ravel(), change]), reduced
+    return problem.fraction(here, change) * np.concatenate([step.ravel(), change]), reduced
 
 
 class OutOfTimeError(Exception):
@@ -170,27 +162,26 @@ class OutOfTimeError(Exception):
 
 @dataclass
 class Budget:
-    """Limits of one computation with all its parts.
+    """Limits of a computation: Newton iterations so far, and those after which no new step of a search begins.
 
-    iterations, limit: Newton iterations so far, and those after which no new step of a search begins.
     deadline: CPU time of the thread, s, after which the whole computation ends.
     report: called with a description of the progress, in words, at every change.
     """
 
     iterations: int = 0
-    limit: float = np.inf
+    most_iterations: float = np.inf
     deadline: float = np.inf
     report: Callable[[str], None] = lambda _: None
 
     @property
     def exhausted(self) -> bool:
-        """Whether the limit is passed and no new step may begin."""
-        return self.iterations > self.limit
+        """Whether no new step may begin."""
+        return self.iterations > self.most_iterations
 
 
 @dataclass
 class Run:
-    """Solves of one computation, one after the other. Each raises OutOfTimeError after the deadline of the budget.
+    """The solves of a computation. Each raises OutOfTimeError after the deadline of the budget.
 
     tolerance: of the scaled residual. budget: shared by all parts of the computation. solver: keeps a factorisation.
     """
@@ -207,48 +198,44 @@ class Run:
         """The same run with another tolerance."""
         return replace(self, tolerance=tolerance)
 
-    def solve(self, balance: Balance, start: FloatArray, most: int | None = None) -> NewtonResult[Evaluation]:
-        """Solve Eq. (8), with an implicit step Eq. (26), by Newton's method on the exact Jacobian, Eq. (16).
-
-        start (n_rel, 2H+1): first predicted force, N. most: iterations, `MOST_ITERATIONS` by default.
+    def state(
+        self, balance: Balance, start: FloatArray, parameter: float = np.nan, most: int = MOST_ITERATIONS
+    ) -> State | None:
+        """The state of a balance, Eq. (8), in an implicit step Eq. (26), by Newton's method on the exact Jacobian,
+        Eq. (16); None where it fails. start (n_rel, 2H+1): first predicted force, N. most: iterations.
         """
 
-        def direction(at: Evaluation, rtol: float) -> FloatArray:
-            return np.asarray(self.solver.solve(balance.linearise(at), [-at.residual], rtol)[0])
+        def direction(at: Evaluation, residual: float) -> FloatArray:
+            (step,) = self.steps(balance, at, [-at.residual], residual)
+            return np.asarray(step)
 
-        return self._iterate(balance.evaluate, direction, start, most)
-
-    def state(
-        self, balance: Balance, start: FloatArray, parameter: float = np.nan, most: int | None = None
-    ) -> State | None:
-        """The state of a balance, as `solve`; None where Newton's method fails."""
-        end = self.solve(balance, start, most)
-        return State(end.evaluation, final_history(balance, end.evaluation), parameter) if end.converged else None
+        at = self._iterate(balance.evaluate, direction, start, most)
+        return None if at is None else State(at, final_history(balance, at), parameter)
 
     def solve_bordered(
-        self, problem: BorderedProblem, start: FloatArray, values: FloatArray, most: int | None = None
+        self, problem: BorderedProblem, start: FloatArray, values: FloatArray, most: int = MOST_ITERATIONS
     ) -> Bordered | None:
-        """Solve a balance with further equations, as `solve`, from first values (k,) of the further unknowns."""
+        """A state with further equations, as `state`, from first values (k,) of the further unknowns."""
         last: FloatArray | None = None
 
         def evaluate(unknown: FloatArray) -> Bordered:
             return problem.evaluate(unknown[: start.size].reshape(start.shape), unknown[start.size :])
 
-        def direction(here: Bordered, rtol: float) -> FloatArray:
+        def direction(here: Bordered, residual: float) -> FloatArray:
             nonlocal last
-            step, last = bordered_step(problem, here, self.solver, rtol)
+            step, last = bordered_step(problem, here, self.solver, residual)
             return step
 
         end = self._iterate(evaluate, direction, np.concatenate([start.ravel(), values]), most)
-        return replace(end.evaluation, reduced=last) if end.converged else None
+        return None if end is None else replace(end, reduced=last)
 
     def _iterate(
         self,
         evaluate: Callable[[FloatArray], EvaluationT],
         direction: Callable[[EvaluationT, float], FloatArray],
         start: FloatArray,
-        most: int | None,
-    ) -> NewtonResult[EvaluationT]:
+        most: int,
+    ) -> EvaluationT | None:
         """`solve_newton` within the budget; direction: of an evaluation, and the relative residual of its solve."""
 
         def within_time(at: EvaluationT) -> FloatArray:
@@ -259,44 +246,38 @@ class Run:
 
         # an iteration that diverges ends by its residual, without a warning of numpy
         with np.errstate(over="ignore", invalid="ignore"):
-            end = solve_newton(evaluate, within_time, start, self.tolerance, MOST_ITERATIONS if most is None else most)
-        self.budget.iterations += end.iterations
-        return end
-
-    def step(self, balance: Balance, at: Evaluation, right: FloatArray, rtol: float = FORCING) -> FloatArray:
-        """Step (n_rel, m), N, with Jacobian times step = right (n_rel, m), N, in a state, to a relative residual."""
-        return np.asarray(self.steps(balance, at, [right], rtol)[0])
+            found, iterations = solve_newton(evaluate, within_time, start, self.tolerance, most)
+        self.budget.iterations += iterations
+        return found
 
     def steps(
-        self, balance: Balance, at: Evaluation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
+        self, balance: Balance, at: Evaluation, rights: Sequence[FloatArray] | FloatArray, residual: float = FORCING
     ) -> FloatArray:
-        """Steps (k, n_rel, m), N, for k right-hand sides, as `step`."""
-        return self.solver.solve(balance.linearise(at), rights, rtol)
+        """Steps (k, n_rel, m), N, with Jacobian times step = right (n_rel, m), N, in a state; as `JacobianSolver`."""
+        return self.solver.solve(balance.linearise(at), rights, residual)
 
-    def is_stable(self, balance: Balance, at: Evaluation) -> bool:
-        """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`).
-
-        balance: of the state at a fixed wear depth, as the vibration is fast and the wear is slow.
+    def is_stable(self, joint: Joint, at: Evaluation) -> bool:
+        """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`) at
+        its wear depth, as the vibration is fast and the wear is slow.
         """
-        return bool(self.solver.determinant_sign(balance.linearise(at)) >= 0.0)
+        return bool(self.solver.determinant_sign(Balance(joint, at.history).linearise(at)) >= 0.0)
 
-    def is_stable_finely(self, balance: Balance, at: Evaluation) -> bool:
+    def is_stable_finely(self, joint: Joint, at: Evaluation) -> bool:
         """As `is_stable`, but a state is unstable only where it is so with more samples, too: with too few the sign of
         the determinant may turn where many pairs slip and open.
         """
-        joint, basis = balance.joint, balance.joint.basis
-        if self.is_stable(balance, at):
+        if self.is_stable(joint, at):
             return True
         # the predicted force of masses on rigid ground depends on the length of a sample
         if joint.law.rate_dependent:
             return False
-        finer = replace(joint, basis=build_basis(basis.orders, SAMPLES_OF_SIGN * basis.n_samples))
-        balance = replace(balance, joint=finer)
-        return self.fresh().is_stable(balance, balance.evaluate(at.predicted_h))
+        finer = replace(joint, basis=build_basis(joint.basis.orders, SAMPLES_OF_SIGN * joint.basis.n_samples))
+        sampled = Balance(finer, at.history, at.wear_depth).evaluate(at.predicted_h)
+        return self.fresh().is_stable(finer, sampled)
 
-    def move(self, old: Case, joint: Joint, state: State) -> State | None:
-        """The state of a case with the harmonics and samples of another joint; None where it is not found."""
-        balance, start = transfer(old, joint, state.evaluation)
+    def move(self, old: Case, joint: Joint, state: State, *, with_tail: bool = False) -> State | None:
+        """The state of a case with the harmonics and samples of another joint, as `transfer`; None where not found."""
+        balance, start = transfer(old, joint, state.evaluation, with_tail=with_tail)
         return self.fresh().state(balance, start, state.parameter)
 
 

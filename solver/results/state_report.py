@@ -10,12 +10,13 @@ from numba import njit
 
 from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
+from solver.continuation.transient import Transient
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, largest_responses
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.results.history import PeriodicState
-from solver.structure.condensation import relative_indices, whole_motion
-from solver.structure.fourier import derivative, from_complex, synthesis, to_complex
+from solver.structure.condensation import whole_motion
+from solver.structure.fourier import derivative, from_complex, synthesis, to_complex, with_static
 from solver.structure.joint import Joint
 
 LOOP_PHASES = 128
@@ -80,7 +81,7 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
     """
     linear = joint.model.harmonic_structure(1)
-    relative, _ = relative_indices(joint.contact)
+    relative = joint.contact.relative
     force = joint.excitation_amplitude * linear.load_harmonic
     first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
     moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
@@ -170,17 +171,18 @@ def periodic_motion(joint: Joint, at: Evaluation) -> PeriodicMotion:
     """The motion of a state. A joint's displacements behind its pairs follow from the condensation of each harmonic."""
     basis = joint.basis
     moved = joint.to_relative(at.displacement_h)
-    displacement_h = _all_displacements(joint, moved)
+    whole = Transient(joint).periodic(at).displacement
+    displacement_h = from_complex(np.real(whole[0]), whole[1:].T)
     response_h = joint.structure.response_h(moved)
     rates = joint.omega * np.array(basis.orders, np.float64)
     return PeriodicMotion(
         frequency=joint.omega / (2.0 * np.pi),
         excitation_amplitude=joint.excitation_amplitude,
         orders=np.array((0, *basis.orders), np.int64),
-        displacement=_coefficients(displacement_h),
-        response=_coefficients(response_h),
-        relative_displacement=_coefficients(joint.to_pairs(moved)),
-        contact_force=_coefficients(at.force_h),
+        displacement=with_static(displacement_h),
+        response=with_static(response_h),
+        relative_displacement=with_static(joint.to_pairs(moved)),
+        contact_force=with_static(at.force_h),
         time=np.asarray(joint.law.sample_step * np.arange(basis.n_samples)),
         displacement_t=displacement_h @ basis.synthesis,
         velocity_t=derivative(displacement_h, rates) @ basis.synthesis,
@@ -189,19 +191,3 @@ def periodic_motion(joint: Joint, at: Evaluation) -> PeriodicMotion:
         status_t=at.status_t.copy(),
         residual=at.scaled_residual(),
     )
-
-
-def _coefficients(values_h: FloatArray) -> ComplexArray:
-    return np.concatenate([values_h[..., :1].astype(np.complex128), to_complex(values_h)], axis=-1)
-
-
-def _all_displacements(joint: Joint, moved: FloatArray) -> FloatArray:
-    """Displacements (n, 2H+1), m, of the whole model from the relative displacements (n_rel, 2H+1), m."""
-    relative, _ = relative_indices(joint.contact)
-    found = []
-    for order, amplitude in zip((0, *joint.basis.orders), _coefficients(moved).T, strict=True):
-        linear = joint.model.harmonic_structure(order)
-        none = np.zeros(len(linear.mass), np.complex128)
-        load = {0: linear.load_static + none, 1: joint.excitation_amplitude * linear.load_harmonic}.get(order, none)
-        found.append(whole_motion(linear, 1j * order * joint.omega, relative, load, amplitude))
-    return from_complex(np.real(found[0]), np.array(found[1:]).reshape(-1, len(found[0])).T)

@@ -4,7 +4,7 @@ The monodromy integrates a disturbance (dy, dlambda) of displacements and contac
 
     M dy'' + C dy' + K dy + dlambda = 0,                                                                     (1)
 
-with the derivative of the contact law at each sample (`contact.sampled_law`), by BDF2: the contact holds displacements
+with the derivative of the contact law at each sample (`contact.law`), by BDF2: the contact holds displacements
 suddenly, which needs damping at high rates. In N samples it damps a vibration at r times the frequency of the state by
 the fraction `(2 pi r)^4 / (4 N^3)`. Pairs that stick or are open during the whole period need no law.
 """
@@ -19,10 +19,9 @@ from numba import njit
 from scipy.linalg import eigvals
 
 from solver.contact.coulomb import SEPARATED, STICK
-from solver.contact.sampled_law import SampledLaw, sampled_law
+from solver.contact.law import SampledLaw, sampled_law
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel
-from solver.structure.condensation import relative_indices
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
 
@@ -145,8 +144,8 @@ def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:
 def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     """Floquet multipliers exp(2 pi sigma / omega) of a state of a small real joint without masses on rigid ground.
 
-    Empty where the eigenvalue problem is large. A disturbance x(t) exp(sigma t) obeys the
-    linearised balance of all displacements x and predicted forces p, with d = d/dt + sigma:
+    Empty where the eigenvalue problem is large. A disturbance x(t) exp(sigma t) obeys the linearised balance of all
+    displacements x and predicted forces p, with d = d/dt + sigma:
 
         M d^2 x + C d x + K x + S^T dlambda/dp p = 0,        S x = du/dp p.
 
@@ -169,7 +168,7 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     )
     rate = derivative(np.eye(m), np.array(fine.basis.orders, np.float64)).T
     motion, force = tangent.matrices(np.arange(joint.contact.n_contact)).reshape(2, n_rel * m, n_rel * m)
-    select = np.kron(np.eye(n)[relative_indices(joint.contact)[0]], np.eye(m))
+    select = np.kron(np.eye(n)[joint.contact.relative], np.eye(m))
     left = np.zeros((2 * n * m + n_rel * m, 2 * n * m + n_rel * m))
     right, one = left.copy(), np.eye(m)
     x, v, p = slice(0, n * m), slice(n * m, 2 * n * m), slice(2 * n * m, None)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.model import ComplexArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 
@@ -23,12 +23,6 @@ DENSE_BYTES = 2e6
 
 CACHED_STRUCTURES = 8
 """Condensed structures in the cache. A wear history with its errors uses six."""
-
-
-def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
-    """Indices (n_rel,) of the relative displacements in the linear model and component indices `3 pair + component`."""
-    components = np.flatnonzero(contact.dofs.ravel() >= 0)
-    return contact.dofs.ravel()[components], components
 
 
 def _others(n: int, relative: IntArray) -> IntArray:
@@ -49,7 +43,7 @@ class CondensedStructure:
     The `n_rel` relative displacements u are ordered pair by pair: closing, tangent 1, tangent 2, as far as they exist.
 
     - static_stiffness (n_rel, n_rel), moving: static Z_r, N/m, and Z_r at the H harmonics above the static one.
-    - static_force, harmonic_force (n_rel,): static F_r, and complex F_r of harmonic 1, N.
+    - force_h (n_rel, 2H+1): F_r, N.
     - static_response (n_response, n_rel), dynamic_response (H, n_response, n_rel): responses per relative displacement.
     - static_offset, harmonic_offset (n_response,): responses to the loads with u = 0, m.
     - drive (n_rel,), drive_offset: `drive . u + drive_offset` is `F^H x`, N m, of harmonic load and displacements x.
@@ -57,8 +51,7 @@ class CondensedStructure:
 
     static_stiffness: FloatArray
     moving: DenseStiffness | SharedStiffness
-    static_force: FloatArray
-    harmonic_force: ComplexArray
+    force_h: FloatArray
     static_response: FloatArray
     dynamic_response: ComplexArray
     static_offset: FloatArray
@@ -71,12 +64,10 @@ class CondensedStructure:
         """Z_r (H, n_rel, n_rel), N/m, at the harmonics above the static one."""
         return self.moving.dense
 
-    def force_h(self) -> FloatArray:
-        """Reduced force F_r of Eq. (8), (n_rel, 2H+1), N."""
-        amplitudes = np.zeros((self.static_force.size, len(self.dynamic_response)), complex)
-        if amplitudes.shape[1]:
-            amplitudes[:, 0] = self.harmonic_force
-        return from_complex(self.static_force, amplitudes)
+    @property
+    def harmonic_force(self) -> ComplexArray:
+        """Amplitude (n_rel,) of F_r in the lowest harmonic, N."""
+        return to_complex(self.force_h)[:, 0]
 
     def apply(self, displacement_h: FloatArray, *, roughly: bool = False) -> FloatArray:
         """`Z_r u` of Eq. (8), N, (n_rel, 2H+1) from u (n_rel, 2H+1), m.
@@ -109,7 +100,7 @@ def build_structure(
     orders: harmonics above the static one, ascending.
     Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular at a harmonic.
     """
-    relative, _ = relative_indices(model.contact)
+    relative = model.contact.relative
     still = model.linear[0]
     first = model.harmonic_structure(1) if orders else still
     n, n_rel = len(still.mass), relative.size
@@ -122,11 +113,12 @@ def build_structure(
     else:
         moving, force, rows, offset = _condense_each(model, relative, rates, orders, load)
     static_stiffness, static_force, static_response, static_offset = _static(still, tuple(relative.tolist()))
+    amplitudes = np.zeros((n_rel, len(orders)), complex)
+    amplitudes[:, :1] = force[:, None]
     return CondensedStructure(
         static_stiffness=static_stiffness,
         moving=moving,
-        static_force=static_force,
-        harmonic_force=force,
+        force_h=from_complex(static_force, amplitudes),
         static_response=static_response,
         dynamic_response=rows[:, :-1],
         static_offset=static_offset,
@@ -261,7 +253,7 @@ def frequency_slope(
     A difference of two condensations is not accurate: behind a joint that sticks A_ii is nearly singular close to the
     resonance that is followed.
     """
-    relative, _ = relative_indices(model.contact)
+    relative = model.contact.relative
     moving, still = to_complex(displacement_h), np.zeros(relative.size, complex)
     force, product = np.zeros((relative.size, len(orders)), complex), 0.0 + 0.0j
     response = np.zeros(model.linear[0].response.shape[0], complex)

@@ -68,6 +68,11 @@ def to_complex(values_h: FloatArray) -> ComplexArray:
     return values_h[..., 1::2] - 1j * values_h[..., 2::2]
 
 
+def with_static(values_h: FloatArray) -> ComplexArray:
+    """Complex amplitudes (..., H+1) of real coefficients (..., 2H+1), the static one first."""
+    return np.concatenate([values_h[..., :1].astype(np.complex128), to_complex(values_h)], axis=-1)
+
+
 def from_complex(static: FloatArray, amplitudes: ComplexArray) -> FloatArray:
     """Real coefficients (..., 2H+1) from the static part (...) and the complex amplitudes (..., H)."""
     values_h = np.empty((*static.shape, 2 * amplitudes.shape[-1] + 1))

@@ -11,7 +11,7 @@ from solver.contact.law import ContactLaw
 from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
-from solver.structure.condensation import CondensedStructure, build_structure, relative_indices
+from solver.structure.condensation import CondensedStructure, build_structure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.penalty import Penalty, build_penalty
@@ -34,10 +34,10 @@ class Joint:
         """The contact pairs."""
         return self.model.contact
 
-    @cached_property
+    @property
     def component_index(self) -> IntArray:
-        """`3 pair + component` (n_rel,) of each relative displacement."""
-        return relative_indices(self.contact)[1]
+        """As in `ContactInterface`."""
+        return self.contact.component_index
 
     @cached_property
     def law(self) -> ContactLaw:
@@ -113,8 +113,9 @@ class Case:
         structure = build_structure(self.model, omega, excitation_amplitude, orders)
         if hold is not None:
             spring = hold.stiffness * np.outer(hold.direction, hold.direction)
-            force = structure.static_force + hold.stiffness * hold.position * hold.direction
-            structure = replace(structure, static_stiffness=structure.static_stiffness + spring, static_force=force)
+            force_h = structure.force_h.copy()
+            force_h[:, 0] += hold.stiffness * hold.position * hold.direction
+            structure = replace(structure, static_stiffness=structure.static_stiffness + spring, force_h=force_h)
         friction, basis = self.friction_coefficient, build_basis(orders, samples)
         return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, self.penalty)
 
@@ -166,7 +167,7 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
         structure,
         moving=DenseStiffness(np.empty((0, *structure.static_stiffness.shape), complex)),
         dynamic_response=structure.dynamic_response[:0],
-        static_force=load_factor * structure.static_force,
+        force_h=load_factor * structure.force_h[:, :1],
         static_offset=load_factor * structure.static_offset,
     )
     # without velocities each pair is taken at displacement level
@@ -183,7 +184,7 @@ def viscous_joint(joint: Joint, viscosity: float, before: FloatArray) -> Joint:
     viscous = replace(
         structure,
         static_stiffness=structure.static_stiffness + np.diag(coefficient),
-        static_force=structure.static_force + coefficient * joint.to_relative(before)[:, 0],
+        force_h=structure.force_h + coefficient[:, None] * joint.to_relative(before),
     )
     # the penalty remains that of a pair which moves alone
     growth = 1.0 + viscosity

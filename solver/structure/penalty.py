@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
-from solver.structure.condensation import condense, relative_indices
+from solver.structure.condensation import condense
 
 INERTIAL_RATIO = 2.0
 """Ratio of the stiffness at twice a rate to the stiffness at the rate, above which a pair is inertial: 1 for a spring,
@@ -80,7 +80,7 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     if inertial.any():
         # the mass that a tangential force accelerates, with all other pairs free: 1 / G = k + m s^2, compliance G
         low, high = (1.0 / compliance_at(model, s) for s in (rate, 2.0 * rate))
-        pair, component = np.divmod(relative_indices(contact)[1], 3)
+        pair, component = np.divmod(contact.component_index, 3)
         least, tangent = np.full(contact.n_contact, np.inf), component > 0
         np.minimum.at(least, pair[tangent], ((high - low) / (3.0 * rate**2))[tangent])
         mass[inertial] = least[inertial]
@@ -95,12 +95,10 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
 
 
 def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
-    """Stiffness of each pair that moves alone, normal and (larger) tangential, (n_contact, 2), N/m.
-
-    On the dovetail at resonance three times the value takes four times the Newton iterations, half the value an equal
-    number; all responses agree within 1 %.
+    """Stiffness of each pair that moves alone, normal and (larger) tangential, (n_contact, 2), N/m. With three times
+    the value the dovetail at resonance takes four times the Newton iterations; its responses agree within 1 %.
     """
-    relative, components = relative_indices(model.contact)
+    relative, components = model.contact.relative, model.contact.component_index
     size = np.zeros((model.contact.n_contact, 2))
     diagonal = _diagonal(model.harmonic_structure(1), tuple(relative.tolist()), rate, compliance=False)
     np.maximum.at(size, (components // 3, np.minimum(components % 3, 1)), diagonal)
@@ -110,7 +108,7 @@ def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
 
 def compliance_at(model: ReducedModel, rate: float) -> FloatArray:
     """Compliance (n_rel,), m/N, of each relative displacement at a real rate, 1/s, with all others free."""
-    relative, _ = relative_indices(model.contact)
+    relative = model.contact.relative
     return _diagonal(model.harmonic_structure(1), tuple(relative.tolist()), rate, compliance=True)
 
 

@@ -72,7 +72,7 @@ def _certificate(wearing: WearingJoint, state: WearState) -> Certificate | None:
     wear_rate_error = wearing.wearing_work.amplification(*worn_by(state.at)) * estimate.wear_rate
     certificate = certify(wearing.joint_of(state), state.at)
     certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
-    return certificate if certificate.holds(wearing.case.settings.tolerance) else None
+    return None if certificate.failures(wearing.case.settings.tolerance) else certificate
 
 
 def report_only(wearing: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...]) -> Checked:
@@ -129,7 +129,7 @@ def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
         return None
     case, joint = wearing.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, state.at) is None and not wearing.run.is_stable_finely(wearing.balance_of(state), state.at):
+    if free_slide(joint, state.at) is None and not wearing.run.is_stable_finely(wearing.joint_of(state), state.at):
         return Failure(Outcome.UNSTABLE)
     return find_instability(case, joint, state.at, wearing.run, True)
 

@@ -31,12 +31,12 @@ from solver.wear.wearing_joint import WearingJoint, WearState
 
 def jump(wearing: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
     """A stable state of depths (n_contact,), m, beyond the end of a branch: with a hold, or of another branch."""
-    wearing.run.budget.limit = wearing.run.budget.iterations + SEARCH_ITERATIONS
+    wearing.run.budget.most_iterations = wearing.run.budget.iterations + SEARCH_ITERATIONS
     reached = _with_hold(wearing, state, worn) or _on_another_branch(wearing, state, worn)
     if isinstance(reached, Failure) and reached.outcome is Outcome.ADRIFT:
         # the last pairs that stick come loose together
         reached = _with_hold(wearing, state, worn, drifts=True) or reached
-    wearing.run.budget.limit = float("inf")
+    wearing.run.budget.most_iterations = float("inf")
     if isinstance(reached, Failure):
         return reached
     return wearing.with_rates(replace(reached, cycle=cycle, previous=None, error=0.0))
@@ -49,9 +49,8 @@ def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, dri
     if hold is None:
         return None
     joint = replace(case, hold=hold).joint(state.omega, wearing.excitation_amplitude)
-    balance = Balance(joint, state.point.history, worn)
-    point = wearing.run.state(balance, state.at.predicted_h)
-    if point is None or not wearing.run.is_stable(balance, point.evaluation):
+    point = wearing.run.state(Balance(joint, state.point.history, worn), state.at.predicted_h)
+    if point is None or not wearing.run.is_stable(joint, point.evaluation):
         return None
     if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         return None

@@ -31,9 +31,9 @@ def measure(compute: Callable[[], Any]) -> Measured:
 
     def counted(*given: Any, **named: Any) -> Any:
         nonlocal iterations
-        end = own(*given, **named)
-        iterations += end.iterations
-        return end
+        found = own(*given, **named)
+        iterations += found[1]
+        return found
 
     began = computing_time()
     newton.solve_newton = counted

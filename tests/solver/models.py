@@ -163,9 +163,9 @@ def branch_states(
     return [found[index] for index in range(len(omegas))]
 
 
-def first_point(case: Case, omega: float, amplitude: float, wear_depth: FloatArray) -> State:
+def first_point(case: Case, omega: float, amplitude: float) -> State:
     """State found from nothing, which must exist; its parameter is the share 1 of the excitation."""
-    point = solve_first_state(case, omega, amplitude, wear_depth, Run(case.settings.tolerance))
+    point = solve_first_state(case, omega, amplitude, Run(case.settings.tolerance))
     assert isinstance(point, State)
     return point
 

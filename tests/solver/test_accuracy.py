@@ -119,7 +119,7 @@ def test_the_tail_of_the_friction_force_belongs_to_the_peak():
     omega, settings = 0.62 * float(np.sqrt(1.6e6)), SolverSettings(harmonics=9, samples=512)
     model = scene("sdof_slider", normal_stiffness=0.0)
     case = build_case(model, 0.5, omega, settings)
-    at = first_point(case, omega, 10.0, np.zeros(1)).evaluation
+    at = first_point(case, omega, 10.0).evaluation
     joint = case.joint(omega, 10.0)
     exact_peak = den_hartog_amplitude(0.1, 1.6e5, 10.0, 5.0, omega)
     series = np.abs(at.displacement_h[0, 1] @ synthesis(joint.basis.orders, np.linspace(0.0, 2.0 * np.pi, 1025))).max()
@@ -132,7 +132,7 @@ def test_a_state_is_found_again_where_its_mass_is_no_longer_marched():
     beam, omega, force = Cantilever(spring=200.0), 0.85, 6.0
     rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (79, 27))
     case = build_case(beam.model(), FRICTION, omega, SolverSettings(), rich)
-    point = first_point(case, omega, force, np.zeros(1))
+    point = first_point(case, omega, force)
     level = ResolvedState(case, case.joint(omega, force), point)
     other = level.solve_at(poor, Run(case.settings.tolerance))
     assert case.penalty.inertial[0] != other.case.penalty.inertial[0]

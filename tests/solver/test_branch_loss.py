@@ -115,7 +115,7 @@ def test_a_hold_moves_no_state_and_takes_up_what_drives_it():
     held = replace(case, hold=hold).joint(joint.omega, joint.excitation_amplitude).structure
     motion = joint.to_relative(at.displacement_h)
     elastic = at.residual - joint.to_relative(at.force_h)
-    np.testing.assert_allclose(held.apply(motion) - held.force_h(), elastic, atol=1e-6)
+    np.testing.assert_allclose(held.apply(motion) - held.force_h, elastic, atol=1e-6)
     before = joint.structure.static_stiffness @ hold.direction
     after = held.static_stiffness @ hold.direction
     np.testing.assert_allclose(after - before, hold.stiffness * hold.direction, atol=1e-3)

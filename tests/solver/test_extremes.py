@@ -243,7 +243,7 @@ def test_loads_gaps_and_motion_scale_together(seed, scale):
     drawn = random_scene(seed)
     model, omega = drawn.model, 2.0 * np.pi * drawn.frequency_hz
     case = build_case(model, drawn.friction, omega, SETTINGS)
-    point = solve_first_state(case, omega, drawn.amplitude, np.zeros(model.contact.n_contact), Run(SETTINGS.tolerance))
+    point = solve_first_state(case, omega, drawn.amplitude, Run(SETTINGS.tolerance))
     assume(isinstance(point, State))
     at = point.evaluation
     linear = replace(model.linear[0], load_static=scale * model.linear[0].load_static)

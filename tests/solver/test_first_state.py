@@ -34,7 +34,7 @@ PRESS = 200.0  # N on each pair: with it the glued dovetail pulls nowhere
 def static_forces(model, friction):
     """Contact forces (n_contact, 3), N, of the static state, in which all laws of contact hold."""
     joint = build_case(model, friction, OMEGA, SETTINGS).joint(OMEGA, 0.0)
-    point = solve_static_state(joint, np.zeros(model.contact.n_contact), Run(1e-9))
+    point = solve_static_state(joint, Run(1e-9))
     assert isinstance(point, State), f"no static state at a friction coefficient of {friction}"
     errors = law_errors(joint, point)
     assert max(errors.values()) < 1e-7, errors
@@ -115,9 +115,9 @@ def test_interference_presses_as_the_closed_form_says():
 def test_a_joint_without_a_static_state_says_why(direction, edge, expected):
     model = stacked(100.0, direction, edge=edge)
     joint = build_case(model, 0.1, OMEGA, SETTINGS).joint(OMEGA, 0.0)
-    exists = equilibrium_possible(joint.structure.static_stiffness, joint.structure.static_force, 0.1)
+    exists = equilibrium_possible(joint.structure.static_stiffness, joint.structure.force_h[:, 0], 0.1)
     assert exists is (expected is None)
-    found = solve_static_state(joint, np.zeros(joint.contact.n_contact), Run(1e-9))
+    found = solve_static_state(joint, Run(1e-9))
     assert (found.outcome if isinstance(found, Failure) else None) is expected
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.loading_history import frequency_sweep
+from solver.loading_history import start_states
 from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -27,7 +27,7 @@ SETTINGS = SolverSettings()
 @pytest.fixture
 def presented(monkeypatch):
     """Unstable states are handed out, to be looked at here."""
-    monkeypatch.setattr(frequency_sweep, "find_instability", lambda *_: None)
+    monkeypatch.setattr(start_states, "find_instability", lambda *_: None)
 
 
 def start_of(model, friction, excitation, frequency):

@@ -9,7 +9,7 @@ import scipy.linalg
 
 from solver import Outcome, SolverSettings, backbone, build_model, frequency_response, modal_response
 from solver.modes.points import follow_mode
-from solver.structure.condensation import relative_indices, whole_motion
+from solver.structure.condensation import whole_motion
 from solver.structure.fourier import to_complex
 from tests.friction_beam import SPRING, friction_beam, matrices, plain_mode
 from tests.solver.models import cyclic_model, dovetail, scene
@@ -105,7 +105,7 @@ def energies(problem, state):
     """Energy fed in by the negative damping, and dissipated by damping and contact, J in a period."""
     model, omega, at = problem.model, state.omega, state.evaluation
     joint = problem.joint_of(state)
-    relative, _ = relative_indices(model.contact)
+    relative = model.contact.relative
     moved = to_complex(joint.to_relative(at.displacement_h))
     force = to_complex(joint.to_relative(at.force_h))
     fed, taken = 0.0, 0.0

@@ -45,9 +45,9 @@ class Problem:
 
 def test_convergence_is_quadratic_on_a_smooth_function():
     problem = Problem(lambda x: np.exp(x) - 2.0, lambda x: np.diag(np.exp(x)))
-    result = problem.solve([1.5], 1e-14)
-    assert result.converged
-    assert result.iterations <= 6
+    found, iterations = problem.solve([1.5], 1e-14)
+    assert found is not None
+    assert iterations <= 6
     errors = [abs(float(point[0]) - np.log(2.0)) for point in problem.calls]
     assert errors[3] < errors[2] ** 2
 
@@ -57,20 +57,18 @@ def test_a_cycle_of_plain_newton_is_broken():
     problem = Problem(
         lambda x: 5 * np.clip(x, -1, 1) + (x - np.clip(x, -1, 1)), lambda x: np.diag(np.where(np.abs(x) < 1, 5.0, 1.0))
     )
-    result = problem.solve(np.linspace(2.0, 3.0, 3))
+    found, _ = problem.solve(np.linspace(2.0, 3.0, 3))
     for point, expected in zip(problem.calls[1:4], (-4.0, 4.0, -4.0), strict=True):
         assert point == pytest.approx(expected * np.ones(3))
-    assert result.converged
-    assert result.evaluation.point == pytest.approx(np.zeros(3), abs=1e-10)
+    assert found.point == pytest.approx(np.zeros(3), abs=1e-10)
 
 
 def test_a_residual_that_is_not_finite_sends_the_iteration_back():
     # the full step leads to where the logarithm is undefined
     problem = Problem(lambda x: np.log(x) if x[0] > 0 else np.full(1, np.nan), lambda x: np.diag(1 / x))
-    result = problem.solve([10.0], 1e-12)
+    found, _ = problem.solve([10.0], 1e-12)
     assert problem.calls[1][0] < 0.0
-    assert result.converged
-    assert result.evaluation.point[0] == pytest.approx(1.0, rel=1e-10, abs=0.0)
+    assert found.point[0] == pytest.approx(1.0, rel=1e-10, abs=0.0)
 
 
 def test_compiling_takes_no_computing_time():
@@ -145,9 +143,9 @@ def test_pairs_that_stay_stuck_are_left_out_and_found_again():
         assert free or np.array_equal(step, right)
 
 
-def gmres(matrix, right, rtol, most):
+def gmres(matrix, right, accuracy, most):
     """Solution, whether it has converged, and number of products."""
-    found, converged, _, hessenberg = solve_gmres(lambda vector: matrix @ vector, right, rtol, most)
+    found, converged, _, hessenberg = solve_gmres(lambda vector: matrix @ vector, right, accuracy, most)
     return found, converged, hessenberg.shape[1]
 
 
@@ -248,11 +246,10 @@ def test_a_direction_without_any_stiffness_is_left_alone():
     """A free mass on a slider without friction: the Jacobian is singular, and the mean position arbitrary."""
     model = build_model([[1.0]], None, [[0.0]], [[-1, 0, -1]], 1e-4, load_harmonic=[1.0], normal_load=10.0)
     joint = build_case(model, 0.0, 1.0, SMALL).joint(1.0, 3.0)
-    end = Run(1e-10).solve(Balance(joint, np.zeros((1, 2)), np.zeros(1)), np.zeros((1, 7)))
-    assert end.converged
+    end = Run(1e-10).state(Balance(joint, np.zeros((1, 2))), np.zeros((1, 7)))
     assert end.evaluation.displacement_h[0, 1, :3] == pytest.approx([0.0, -3.0, 0.0], abs=0.1)
 
 
 def test_an_iteration_that_leaves_all_numbers_gives_no_state_and_no_warning():
     balance, predicted = random_balance(random_model(3, ("3d", "normal_only")), SolverSettings(3, 24), 4, wear=False)
-    assert not Run(1e-8).solve(balance, 1e305 * predicted).converged
+    assert Run(1e-8).state(balance, 1e305 * predicted) is None

@@ -10,6 +10,7 @@ from solver.accuracy import refinement
 from solver.accuracy.certificate import certify
 from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import Estimate, ResolvedState
+from solver.arguments import worn_model
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.run import Run
@@ -37,9 +38,9 @@ def on_branch(name, friction, amplitude, omega, n_harmonics):
 @lru_cache
 def random_state():
     """Elastic joint with pairs that stick, slip and open."""
-    case = build_case(random_model(1, ALL_KINDS), 0.4, OMEGA, SolverSettings(5, 128))
     worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(ALL_KINDS))
-    return case.joint(OMEGA, 60.0), first_point(case, OMEGA, 60.0, worn).evaluation
+    case = build_case(worn_model(random_model(1, ALL_KINDS), worn), 0.4, OMEGA, SolverSettings(5, 128))
+    return case.joint(OMEGA, 60.0), first_point(case, OMEGA, 60.0).evaluation
 
 
 def failing(joint, evaluation):
@@ -78,7 +79,7 @@ def test_an_unconverged_force_and_friction_that_drives_are_caught(name):
     turned = evaluation.force_h.copy()
     turned[:, 1:] *= -1.0
     moved = joint.to_relative(evaluation.displacement_h)
-    left = joint.structure.force_h() - joint.to_relative(turned) - joint.structure.apply(moved)
+    left = joint.structure.force_h - joint.to_relative(turned) - joint.structure.apply(moved)
     for i, stiffness in enumerate(joint.structure.dynamic_stiffness, 1):
         step = np.linalg.solve(stiffness, left[:, 2 * i - 1] - 1j * left[:, 2 * i])
         moved[:, 2 * i - 1] += step.real
@@ -126,7 +127,7 @@ SLIPPING = 400.0  # N: excitation at which the pairs of the random models slip
 def started(model, friction, omega, amplitude, settings, resolution=None):
     """A state found from nothing."""
     case = build_case(model, friction, omega, settings, resolution)
-    point = first_point(case, omega, amplitude, np.zeros(model.contact.n_contact))
+    point = first_point(case, omega, amplitude)
     return ResolvedState(case, case.joint(omega, amplitude), point)
 
 

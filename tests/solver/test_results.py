@@ -9,6 +9,7 @@ import pytest
 
 from solver import march_wear as march_model
 from solver.accuracy.certificate import certify
+from solver.arguments import worn_model
 from solver.outcome import Outcome
 from solver.results.history import first_cut_off, judge
 from solver.results.state_report import LOOP_PHASES, periodic_state, report_state
@@ -34,9 +35,9 @@ KINDS = {
 
 @lru_cache
 def periodic(kinds):
-    case = build_case(random_model(1, KINDS[kinds]), FRICTION, OMEGA, SETTINGS)
-    worn = np.random.default_rng(1).uniform(0.0, 2e-6, case.model.contact.n_contact)
-    point = first_point(case, OMEGA, AMPLITUDE, worn)
+    worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(KINDS[kinds]))
+    case = build_case(worn_model(random_model(1, KINDS[kinds]), worn), FRICTION, OMEGA, SETTINGS)
+    point = first_point(case, OMEGA, AMPLITUDE)
     joint = case.joint(OMEGA, AMPLITUDE)
     return joint, point, periodic_state(joint, point)
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from solver import build_model
+from solver.arguments import worn_model
 from solver.continuation.first_state import solve_static_state
 from solver.continuation.natural import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.harmonic_balance.dlft import Balance
@@ -158,8 +159,10 @@ LIMIT = 2.0 / (WEAR / 1e-4 * 4.0 * SLIDE * STIFFNESS)
 def test_the_share_is_that_by_which_the_normal_forces_change():
     # without friction the pairs stay closed and slide freely: the static state is linear in the depth
     depth = 2e-7 * np.random.default_rng(1).uniform(size=16)
-    joint = build_case(dovetail(), 0.0, 1335.0, COARSE_BLADE).joint(1335.0, 0.0)
-    states = [solve_static_state(joint, worn, Run(1e-10)).evaluation for worn in (np.zeros(16), depth)]
+    joint, worn = (
+        build_case(worn_model(dovetail(), each), 0.0, 1335.0, COARSE_BLADE).joint(1335.0, 0.0) for each in (None, depth)
+    )
+    states = [solve_static_state(each, Run(1e-10)).evaluation for each in (joint, worn)]
     before, after = (state.force_h[:, 0, 0] for state in states)
     change = np.linalg.norm(after - before) / np.linalg.norm(before)
     assert change > 0.01
@@ -197,7 +200,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
         rates = []
         for sign in (1.0, -1.0):
             depth = at.wear_depth + sign * step * np.eye(slips.size)[pair]
-            solved = Run(1e-13).solve(Balance(joint, at.history, depth), at.predicted_h)
+            solved = Run(1e-13).state(Balance(joint, at.history, depth), at.predicted_h)
             rates.append(gain * solved.evaluation.slip_work)
         wanted = (rates[0] - rates[1]) / (2.0 * step)
         # as exact as a Newton direction

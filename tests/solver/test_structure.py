@@ -13,7 +13,7 @@ from solver.compliant_contact import TANGENTIAL_RATIO
 from solver.model import needed_nodal_diameters
 from solver.settings import Resolution, SolverSettings
 from solver.structure import condensation
-from solver.structure.condensation import build_structure, condense, frequency_slope, relative_indices
+from solver.structure.condensation import build_structure, condense, frequency_slope
 from solver.structure.fourier import build_basis, from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.joint import build_case
@@ -66,7 +66,7 @@ def test_analysis_undoes_synthesis_for_any_orders(orders, extra, seed):
 def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(model, orders):
     """Each order sees the nodal diameter of its own, not of its place."""
     structure = build_structure(model, OMEGA, AMPLITUDE, orders)
-    relative, _ = relative_indices(model.contact)
+    relative = model.contact.relative
     force_h = np.random.default_rng(2).normal(size=(relative.size, 2 * len(orders) + 1)) * 10.0
     forces, moved, responses = [force_h[:, 0], *to_complex(force_h).T], [], []
     for n, force in zip((0, *orders), forces, strict=True):
@@ -80,7 +80,7 @@ def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(mod
         )
         responses.append(linear.response @ moved[-1])
     displacement_h = from_complex(moved[0].real, np.array(moved[1:]).T)[relative]
-    residual = structure.apply(displacement_h) + force_h - structure.force_h()
+    residual = structure.apply(displacement_h) + force_h - structure.force_h
     assert np.abs(residual).max() < 1e-10 * np.abs(force_h).max()
     found = structure.response_h(displacement_h)
     np.testing.assert_allclose(to_complex(found).T, responses[1:], rtol=1e-9)
@@ -93,14 +93,14 @@ def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(mod
 @pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(5, 2), (6, 3), (7, 0)])
 def test_the_slope_with_the_frequency_is_that_of_differences(n_sectors, nodal_diameter):
     model, orders = cyclic_model(9, KINDS, n_sectors, nodal_diameter, 5), (1, 3, 5)
-    relative, _ = relative_indices(model.contact)
+    relative = model.contact.relative
     u = np.random.default_rng(11).normal(size=(relative.size, 2 * len(orders) + 1))
     slope = frequency_slope(model, OMEGA, AMPLITUDE, orders, u)
     length, values = 1e-5 * OMEGA, []
     for omega in (OMEGA - length, OMEGA + length):
         there = build_structure(model, omega, AMPLITUDE, orders)
         product = there.drive @ to_complex(u)[:, 0] + there.drive_offset
-        values.append((there.apply(u) - there.force_h(), product, to_complex(there.response_h(u))[:, 0]))
+        values.append((there.apply(u) - there.force_h, product, to_complex(there.response_h(u))[:, 0]))
     for found, one, other in zip((slope.force, slope.product, slope.response), *values, strict=True):
         expected = (other - one) / (2.0 * length)
         assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
@@ -129,7 +129,7 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
         assert ours.shape == theirs.shape
         assert ours.dtype == theirs.dtype
         np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-14 * np.abs(theirs).max(), err_msg=name)
-    displacement_h = np.random.default_rng(0).normal(size=(each.static_force.size, 9))
+    displacement_h = np.random.default_rng(0).normal(size=(len(each.force_h), 9))
     expected = each.apply(displacement_h)
     np.testing.assert_allclose(shared.apply(displacement_h), expected, rtol=0.0, atol=1e-13 * np.abs(expected).max())
     for structure in (shared, each):
@@ -186,17 +186,17 @@ SOFT = 2e11  # N/m3; with the areas of the models about their stiffness
 def test_contact_forces_move_the_contact_by_the_springs_more(wave, contact_stiffness):
     rigid = cyclic_model(9, KINDS, 6, 2, 5) if wave else random_model(1, KINDS, 4)
     soft = with_contact_stiffness(rigid, contact_stiffness)
-    relative, components = relative_indices(rigid.contact)
-    assert relative_indices(soft.contact)[0].tolist() == relative.tolist()
+    relative, components = rigid.contact.relative, rigid.contact.component_index
+    assert soft.contact.relative.tolist() == relative.tolist()
     orders = (1, 2, 3)
     body, joint = (build_structure(model, OMEGA, 60.0, orders) for model in (rigid, soft))
     # forces of the contact that drive the bodies to some motion v, and the motion u of the contact
     moved = np.random.default_rng(2).normal(size=(relative.size, 7)) * 1e-6
-    force = body.force_h() - body.apply(moved)
+    force = body.force_h - body.apply(moved)
     ratio = np.where(components % 3 == 0, 1.0, 2.0 * 0.7 / 1.7)
     springs = contact_stiffness * ratio * rigid.contact.area[components // 3]
     contact = moved - force / springs[:, None]
-    assert np.abs(joint.force_h() - joint.apply(contact) - force).max() < 1e-9 * np.abs(force).max()
+    assert np.abs(joint.force_h - joint.apply(contact) - force).max() < 1e-9 * np.abs(force).max()
     expected = body.response_h(moved)
     assert joint.response_h(contact) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     # energy: the springs take none, so that what the excitation puts in leaves through the contact or the dampers

@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 
 from solver import frequency_response
+from solver.accuracy.refinement import VIBRATION_RECHECK
+from solver.accuracy.resolved_state import left_out
 from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
-from solver.loading_history.frequency_sweep import FIRST_ITERATIONS
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.path import LoadingPath
+from solver.loading_history.start_states import FIRST_ITERATIONS, follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.settings import SolverSettings
+from solver.settings import Resolution, SolverSettings, all_orders
+from solver.structure.joint import build_case
 from tests.benchmarks.frame import measure
-from tests.solver.models import branch_states, dovetail, scene
+from tests.solver.models import OMEGA, branch_states, dovetail, first_point, random_model, scene
 
 AUTOMATIC = SolverSettings()
 
@@ -117,6 +120,22 @@ def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep, omegas, fold):
     assert folds == pytest.approx([np.nan, np.nan, fold, fold], rel=1e-4, nan_ok=True)
     with_impacts = [bool(start.state.contact_force_h.any()) for start in in_order]
     assert with_impacts == [sweep == "up"] * 2 + [sweep == "down"] * 2
+
+
+@pytest.mark.parametrize(
+    ("highest", "foreseen", "suits"), [(3, 0.9, True), (3, 1.1, False), (5, 0.9, True), (5, 0.2, False)]
+)
+def test_the_harmonics_of_a_node_are_checked_by_the_force_that_they_leave_out(highest, foreseen, suits):
+    """The error where they were chosen grows with this force: an error above rtol, or far below, asks for others."""
+    case = build_case(random_model(2, ("3d",) * 5), 0.4, OMEGA, AUTOMATIC, Resolution(all_orders(highest), 64))
+    path, found = LoadingPath(case, 30.0, OMEGA), [first_point(case, OMEGA, load) for load in (15.0, 30.0)]
+    checked, state = (replace(each, parameter=part) for each, part in zip(found, (0.5, 1.0), strict=True))
+    before, now = (left_out(case.resolution.orders, each.evaluation) for each in (checked, state))
+    assert path.differs(checked, state) > VIBRATION_RECHECK
+    assert not path.rests(state)
+    assert not path.forgets(state)
+    assert 0.0 < before < now
+    assert path.suits(checked, foreseen * AUTOMATIC.rtol * before / now, state) == suits
 
 
 def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
