@@ -5,7 +5,6 @@ By hand: `rich` takes five control characters out of a text, and leaves those th
 
 from __future__ import annotations
 
-import errno
 import json
 import re
 from collections.abc import Mapping
@@ -16,12 +15,6 @@ from pathlib import Path
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
 _MOST_LINES = 20
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-
-_REMEDIES = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room there"),
-    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), "see that it may be written"),
-    errno.EIO: "see whether the disk, or the way to it, is at fault",
-}
 
 
 @dataclass(eq=False, repr=False)
@@ -62,14 +55,13 @@ class UserError(Exception):
 class StorageError(Exception):
     """A file of a run cannot be written or read: ends the run with exit status 1 and one line.
 
-    What was written before is kept, and the same command goes on from there. remedy: what would help, "" for what helps
-    against that error.
+    What was written before is kept, and the same command goes on from there. remedy: what would help against that
+    error beside what mostly helps.
     """
 
     def __init__(self, path: Path, error: Exception, remedy: str = "") -> None:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        number = error.errno if isinstance(error, OSError) else None
-        remedy = remedy or f"{_REMEDIES.get(number or 0, 'mend that')} or give another result file with -o"
+        remedy = remedy or "see that there is room, and that it may be written, or give another result file with -o"
         super().__init__(
             f"{show_text(str(path))}: {show_text(reason)}: {remedy};"
             " what was computed is kept, and the same command goes on from it"

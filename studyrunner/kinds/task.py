@@ -315,13 +315,12 @@ class TaskPlan:
         return replace(self, sweeps=sweeps, results=results)
 
     @cached_property
-    def waiting(self) -> Mapping[tuple[int, int], tuple[Task, ...]]:
-        """Tasks that wait for a start state, by number of the sweep and place."""
-        found: dict[tuple[int, int], list[Task]] = {}
+    def waiting(self) -> Mapping[tuple[int, int] | None, Sequence[Task]]:
+        """Tasks by the start state that they wait for, number of the sweep and place; None: for none."""
+        found: dict[tuple[int, int] | None, list[Task]] = {}
         for task in self.results:
-            if task.waits_for is not None:
-                found.setdefault(task.waits_for, []).append(task)
-        return {start: tuple(tasks) for start, tasks in found.items()}
+            found.setdefault(task.waits_for, []).append(task)
+        return found
 
     @property
     def cost(self) -> float:

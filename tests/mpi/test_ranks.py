@@ -97,8 +97,8 @@ MISSIONS = (
 @pytest.mark.parametrize(
     ("study", "kills"),
     [
-        # when some of the scenes are built, then when some of the histories are there
-        (SCENES, [("computed", 0, 1), ("result", 0, 0)]),
+        # when some of the scenes are built, then when some of the histories are there, and all start states
+        (SCENES, [("computed", 0, 1), ("result", 6, 0)]),
         (MODES, [("result", 2, 1)]),
         # two points with two scenes each: a rank gets both models of a mission with its task
         (MISSIONS, []),
