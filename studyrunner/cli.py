@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, RankInterrupted, Ranks, launcher_rank, start_ranks
+from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks
 from studyrunner.system.machine import MachineFaultError
 from studyrunner.system.process import (
     INTERRUPTED,
@@ -115,7 +115,7 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
         status = UNEXPECTED
         if is_ending(error):
             begin_ending()
-            if ranks.rank > 0 and _leave_to_rank_0(ranks, RankInterrupted()):
+            if ranks.rank > 0 and _leave_to_rank_0(ranks, KeyboardInterrupt()):
                 ranks.close()
                 return CONVERGED
             said = str(error) if isinstance(error, KeyboardInterrupt) else ""
@@ -140,7 +140,7 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
     return status
 
 
-def _leave_to_rank_0(ranks: Ranks, reason: object) -> bool:
+def _leave_to_rank_0(ranks: Ranks, reason: BaseException) -> bool:
     """Waits for rank 0 to write what there is and to end all ranks, after telling it the reason.
 
     Returns whether rank 0 had already finished.

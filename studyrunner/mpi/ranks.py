@@ -42,10 +42,6 @@ class LauncherError(Exception):
     """The launcher started processes that cannot work together: each would compute the whole study."""
 
 
-class RankInterrupted:
-    """Message of a rank that was ended from outside; all ranks end."""
-
-
 def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
     """Number of this process according to the launcher, 0 without launcher."""
     return _largest(environment, _RANKS)
@@ -77,7 +73,6 @@ class Ranks:
 
     def send(self, message: object, rank: int) -> None:
         """Sends without waiting for the receiver."""
-        raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
 
     def flush(self) -> None:
         """Waits until all messages are received; called before a rank goes on computing.
@@ -199,10 +194,3 @@ def describe_software() -> tuple[str, str]:
     """Name of this machine, and a hash of what this process runs."""
     packages = map(package_digest, ("solver", "studies", "studyrunner"))
     return platform.node(), " ".join((platform.machine(), *packages))
-
-
-def wait_for_message(ranks: Ranks) -> tuple[int, object]:
-    """Sender and content of the next message; for ranks that have nothing else to do."""
-    while (received := ranks.receive()) is None:
-        time.sleep(POLL_SECONDS)
-    return received
