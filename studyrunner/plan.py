@@ -51,7 +51,7 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
 
 def describe_tasks(tasks: Sequence[Task]) -> str:
     """Tasks in words."""
-    sweeps = Counter(task.direction == "ramp" for task in tasks if isinstance(task, Sweep))
+    sweeps = Counter(task.excitation.direction == "ramp" for task in tasks if isinstance(task, Sweep))
     n_results = Counter[type]()
     for task in tasks:
         # of a history those that are integrated

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, cast
 import numpy as np
 
 from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
+from studyrunner.kinds.results import first_harmonic, named
 from studyrunner.kinds.task import (
     Identity,
     JointTask,
@@ -16,13 +17,10 @@ from studyrunner.kinds.task import (
     PointResult,
     TaskPlan,
     digest,
-    first_harmonic,
     grid,
     joint_of,
     n_unknowns_of,
-    named,
     number_points,
-    settings_at,
     up_or_down,
 )
 from studyrunner.scene.scene_set import ContactChange, SceneSet
@@ -71,8 +69,7 @@ class Mode(JointTask):
                 "damping_ratio_error": found.damping_error,
                 "outcome": int(found.outcome),
             }
-            values = named((*self.variables, *OF_A_MODE_POINT), own, found)
-            yield PointResult(values, wanted[place])
+            yield PointResult(named((*self.variables, *OF_A_MODE_POINT), own, found), wanted[place])
 
     def describe(self, place: int) -> str:
         """Where along the amplitude."""
@@ -89,8 +86,7 @@ def build_tasks(
     for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         joint = joint_of(part.study, scene, contact)
         of_part = dict(zip(study.axes_of_parts, part.place, strict=True))
-        for at in grid(study, "mode", "sweep"):
-            settings = settings_at(study, at)
+        for at, settings in grid(study):
             n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
             mode = Mode(
                 number=0,
