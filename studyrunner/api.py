@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,11 +10,12 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
+from studyrunner.checkpoint.store import Store
 from studyrunner.mpi.ranks import Ranks, launcher_size
 from studyrunner.result.opening import open_result
 from studyrunner.result.provenance import check_date
 from studyrunner.result.target import check_result
-from studyrunner.run import RunOptions, compute_study, open_progress
+from studyrunner.run import RunOptions, compute_study
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay
@@ -87,7 +89,6 @@ def run_study(
         raise UserError("run_study", error.key, error.value, error.remedy) from None
     shown = ProgressDisplay(quiet=not progress)
     # the scene as well: with two threads its matrices differ in the last bits, and start states with them
-    with threadpool_limits(1), open_progress(target) as store:
-        given = RunOptions(fresh, retry_failed, checked, "the same call")
-        compute_study(Ranks(), study, target, store, given, shown)
+    with threadpool_limits(1), contextlib.closing(Store(target.progress)) as store:
+        compute_study(Ranks(), study, target, store, RunOptions(fresh, retry_failed, checked), shown)
         return open_result(target.path)

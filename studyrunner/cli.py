@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import shlex
 import sys
@@ -67,35 +68,18 @@ is in the file OUT.nc.progress; with it a study that is changed computes only wh
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks.
+    """Runs the command on this rank and returns its exit status, which says something on rank 0 only.
 
     arguments: None for those of the process, which ends here if the run did not come to its end.
     """
+    ranks = Ranks()
     try:
         take_endings()
         keep_talking()
         # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
         os.environ.update(dict.fromkeys(_THREADS, "1"))
-        return _run(start_ranks(), arguments)
-    except LauncherError as error:
-        if launcher_rank() == 0:
-            print(f"run-study: launcher: {error}", file=sys.stderr)
-        else:
-            # a launcher may pass nothing on once another process has failed
-            time.sleep(_SECONDS_FOR_A_LINE)
-        return BAD_INPUT
-    except BaseException as error:
-        if not is_ending(error):
-            raise
-        begin_ending()
-        if launcher_rank() == 0:
-            print("run-study: interrupted", file=sys.stderr)
-        return INTERRUPTED
-
-
-def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
-    """Exit status of the command on a rank; only rank 0 has one that says something."""
-    try:
+        ranks = start_ranks()
+        status = CONVERGED
         if ranks.rank == 0:
             status = _lead(ranks, sys.argv[1:] if arguments is None else arguments)
             for rank in range(1, ranks.size):
@@ -105,39 +89,53 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
             from studyrunner.task_runs import evaluator
 
             follow_rank_0(ranks, evaluator())
-            status = CONVERGED
         if arguments is None:
             # it has come to its end: what comes while MPI and the interpreter end is of no use to anybody
             begin_ending()
         ranks.close()
+        return status
+    except LauncherError as error:
+        if launcher_rank() == 0:
+            print(f"run-study: launcher: {error}", file=sys.stderr)
+        else:
+            # a launcher may pass nothing on once another process has failed
+            time.sleep(_SECONDS_FOR_A_LINE)
+        return BAD_INPUT
     except BaseException as error:
         # One rank's end must be the end of all: the others would wait for ever.
-        status = UNEXPECTED
-        if is_ending(error):
-            begin_ending()
-            if ranks.rank > 0 and _leave_to_rank_0(ranks, KeyboardInterrupt()):
-                ranks.close()
-                return CONVERGED
-            said = str(error) if isinstance(error, KeyboardInterrupt) else ""
-            print(f"run-study: {said or 'interrupted'}", file=sys.stderr)
-            status = INTERRUPTED
-        elif isinstance(error, StorageError):
-            print(f"run-study: {error}", file=sys.stderr)
-        elif isinstance(error, MachineFaultError):
-            kept = "what was computed is kept, and the same command goes on from it"
-            if ranks.rank > 0:
-                _leave_to_rank_0(ranks, error)
-            print(f"run-study: {error}: a fault of the machine; {kept}", file=sys.stderr)
-        else:
-            print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
-            traceback.print_exc()
-        ranks.abort(status)
+        status = _tell(ranks, error)
+        if status != CONVERGED:
+            ranks.abort(status)
         if arguments is None:
             # The thread that computes is still at it, which an interpreter on its way out does not always survive.
             sys.stdout.flush()
             sys.stderr.flush()
             os._exit(status)
-    return status
+        return status
+
+
+def _tell(ranks: Ranks, error: BaseException) -> int:
+    """Says why a rank has come to its end early, and returns the exit status."""
+    if is_ending(error):
+        begin_ending()
+        if ranks.rank > 0 and _leave_to_rank_0(ranks, KeyboardInterrupt()):
+            ranks.close()
+            return CONVERGED
+        if max(ranks.rank, launcher_rank()) == 0 or ranks.size > 1:
+            said = str(error) if isinstance(error, KeyboardInterrupt) else ""
+            print(f"run-study: {said or 'interrupted'}", file=sys.stderr)
+        return INTERRUPTED
+    if isinstance(error, StorageError):
+        print(f"run-study: {error}", file=sys.stderr)
+    elif isinstance(error, MachineFaultError):
+        if ranks.rank > 0:
+            _leave_to_rank_0(ranks, error)
+        kept = "what was computed is kept, and the same command goes on from it"
+        print(f"run-study: {error}: a fault of the machine; {kept}", file=sys.stderr)
+    else:
+        print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
+        traceback.print_exception(error)
+    return UNEXPECTED
 
 
 def _leave_to_rank_0(ranks: Ranks, reason: BaseException) -> bool:
@@ -202,14 +200,15 @@ def _describe(study: Study, options: argparse.Namespace) -> int:
 
 def _compute(ranks: Ranks, study: Study, options: argparse.Namespace) -> int:
     from solver.outcome import COMPLETE
+    from studyrunner.checkpoint.store import Store
     from studyrunner.result.target import check_result
-    from studyrunner.run import RunOptions, compute_study, open_progress
+    from studyrunner.run import RunOptions, compute_study
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", path, study, overwrite=options.overwrite)
     display, given = ProgressDisplay(), RunOptions(options.fresh, options.retry_failed, options.date)
-    with open_progress(target) as store:
+    with contextlib.closing(Store(target.progress)) as store:
         outcomes = compute_study(ranks, study, target, store, given, display)
         # no other run replaces the result meanwhile
         answer = _answer(target.path)

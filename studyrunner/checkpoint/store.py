@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
-from studyrunner.system.files import sync_folder
+from studyrunner.system.files import remove_leftovers, sync_folder
 from studyrunner.system.process import uninterrupted
 from studyrunner.user_error import StorageError, UserError, Verbatim
 
@@ -111,6 +111,7 @@ class Store:
                 self._keys[kind].add(key)
             counts = self._database.execute("SELECT key, blob FROM entries WHERE kind=?", [_CRASHES])
             self.crashes = {key: int(number) for key, number in counts}
+            remove_leftovers(path)
         self.ended_hard = _OPEN in self._keys[_FILE]
         self._write(_FILE, _OPEN, f"process {os.getpid()} on {socket.gethostname()}".encode())
         self.flush()
@@ -198,7 +199,9 @@ class Store:
         self._next_write = now + max(SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
 
     def close(self) -> None:
-        """Writes what waits, as far as there is room, and closes the file. A file without a study is removed."""
+        """Writes what waits, as far as there is room, and closes the file. A file without a study is removed, and what
+        the ranks have mapped.
+        """
         # an error was said before, or there is nothing that waits for an answer
         with contextlib.suppress(StorageError):
             for key in self._under_way:
@@ -207,11 +210,12 @@ class Store:
                     self._write(_CRASHES, key, b"%d" % self.crashes[key])
             self.forget(_FILE, _OPEN)
             self.flush()
-        with contextlib.suppress(sqlite3.Error):
+        with contextlib.suppress(OSError):
+            remove_leftovers(self.path)
+        with contextlib.suppress(sqlite3.Error, OSError):
             self._database.close()
-        if not any(self._keys.values()):
-            # the run has ended before it began: the scene or the disk is at fault
-            with contextlib.suppress(OSError):
+            if not any(self._keys.values()):
+                # the run has ended before it began: the scene or the disk is at fault
                 self.path.unlink()
 
 
