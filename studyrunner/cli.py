@@ -40,7 +40,6 @@ _SECONDS_FOR_RANK_0 = 60.0
 
 _SECONDS_FOR_A_LINE = 2.0
 
-
 _DESCRIPTION = """\
 Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
 
@@ -139,10 +138,7 @@ def _tell(ranks: Ranks, error: BaseException) -> int:
 
 
 def _leave_to_rank_0(ranks: Ranks, reason: BaseException) -> bool:
-    """Waits for rank 0 to write what there is and to end all ranks, after telling it the reason.
-
-    Returns whether rank 0 had already finished.
-    """
+    """Tells rank 0 why it has to end all ranks, and waits for that. Returns whether rank 0 had already finished."""
     ranks.send(reason, 0)
     latest = time.monotonic() + _SECONDS_FOR_RANK_0
     while time.monotonic() < latest:
@@ -238,12 +234,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
-    """Options from the command line, by their names.
-
-    study: text. output, write_scene: paths or None. overrides: texts. date: checked, or None. The others are flags.
-
-    Raises UserError; SystemExit after --help, --new and the like.
-    """
+    """Options from the command line, by their names. Raises UserError; SystemExit after --help, --new and the like."""
     look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
     parser = _Parser("run-study", description=_DESCRIPTION, epilog=_EPILOG, **look)
     add, flag, path = parser.add_argument, dict[str, Any](action="store_true"), dict[str, Any](type=Path)

@@ -35,18 +35,12 @@ natural frequencies of a bundled sector are within 10."""
 
 
 def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> TaskPlan:
-    """Tasks of a study. Their order and numbers depend on the study alone.
-
-    scenes: of the study (`find_scenes`). facts: of each scene. Raises UserError where a sample draws a value that is
-    none, or blocks of a mission differ in their pairs.
+    """Tasks of a study. Their order and numbers depend on the study alone. facts: of each scene. Raises UserError where
+    a sample draws a value that is none, or blocks of a mission differ in their pairs.
     """
-    n_displacements = [each.n_displacements for each in facts]
-    contacts = contact_changes(study, scenes, facts)
-    if study.kind is MISSIONS:
-        return missions.build_tasks(study, scenes, n_displacements, contacts)
-    if study.kind is MODES:
-        return modes.build_tasks(study, scenes, n_displacements, contacts)
-    return wear_plan.build_tasks(study, scenes, n_displacements, contacts)
+    builders = {MISSIONS.name: missions.build_tasks, MODES.name: modes.build_tasks}
+    build = builders.get(study.kind.name, wear_plan.build_tasks)
+    return build(study, scenes, [each.n_displacements for each in facts], contact_changes(study, scenes, facts))
 
 
 def describe_tasks(tasks: Sequence[Task]) -> str:
@@ -142,9 +136,8 @@ def _of_effort(
 
 
 def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str, ...]:
-    """A question for each key with values far off, as a unit that was mixed up: the value farthest off speaks for all.
-
-    Never a refusal. facts: of the scene, where it is built.
+    """A question, never a refusal, for each key with values far off, as a unit that was mixed up: the farthest speaks
+    for all. facts: of the scene, where it is built.
     """
     parts = [part for variant in study.variants or (study,) for part in (variant, *variant.block_studies)]
     table, until = study.wear.as_law.table, (study.slow_time.until or {}).get("wear_depth", 0.0)
@@ -178,7 +171,6 @@ def _question(
     key: str, values: Sequence[float], expected: tuple[str, float, float, Mapping[str, float]], why: str
 ) -> str:
     """A question for the value that is farthest off, and in which units it would be likely; "" where none is off.
-
     expected: unit of the key, the range that is not asked about, and factors of this unit, by name of another unit.
     """
     unit, low, high, units = expected

@@ -20,7 +20,7 @@ from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import merge_facts
 from studyrunner.scene_building import Scenes, build_scenes
 from studyrunner.study.study import Study
-from studyrunner.system.files import remove_leftovers
+from studyrunner.system.machine import remove_leftovers
 from studyrunner.system.process import begin_ending, is_ending
 from studyrunner.system.progress import ProgressDisplay, count
 from studyrunner.task_runs import StudyRun, evaluator

@@ -13,10 +13,9 @@ from solver.outcome import Outcome, describe_error
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Keep, PointResult, Result, StartResult, Task
-from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Run, TaskHandler
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task, hold_models
-from studyrunner.system.machine import MachineFaultError, is_machine_fault
+from studyrunner.system.machine import MachineFaultError, MappedFile, is_machine_fault, open_mapped
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
 
@@ -29,10 +28,7 @@ an uncertainty factor of two the mean further time is this fraction."""
 
 
 def evaluator() -> Run:
-    """The function that does tasks on a rank, and builds scenes.
-
-    A task that breaks off gives failed results; the other tasks go on. A fault of the machine raises MachineFaultError.
-    """
+    """The function that does tasks on a rank, and builds scenes. A fault of the machine raises MachineFaultError."""
     models: ModelCache[tuple[ReducedModel, ...]] = OrderedDict()
 
     def evaluate(task: Task | SceneTask, keep: Callable[[object], None]) -> Iterator[Result | SceneBuilt]:
@@ -84,9 +80,8 @@ def _compute(task: Task, models: Mapping[int, ReducedModel], keep: Keep) -> Iter
 class StudyRun(TaskHandler):
     """Rank 0 while the tasks of a study are done: their state, and the tasks that results make possible.
 
-    A wear history becomes possible with its start state, while the sweep goes on. Results of a task do not depend on
-    the order. They go to `completion`. models: for the ranks that do not have them. display: what the user sees.
-    tasks: those that are left, whether they are possible or not. n_points: that are finished.
+    A wear history becomes possible with its start state, while the sweep goes on. Results go to `completion`. models:
+    for the ranks that do not have them. tasks: those that are left. n_points: that are finished.
     """
 
     def __init__(self, completion: CompletionIndex, models: SceneModels, display: ProgressDisplay) -> None:

@@ -53,10 +53,8 @@ class UserError(Exception):
 
 
 class StorageError(Exception):
-    """A file of a run cannot be written or read: ends the run with exit status 1 and one line.
-
-    What was written before is kept, and the same command goes on from there. remedy: what would help against that
-    error beside what mostly helps.
+    """A file of a run cannot be written or read: ends the run with exit status 1 and one line. What was written before
+    is kept. remedy: what would help, where it is not what mostly helps.
     """
 
     def __init__(self, path: Path, error: Exception, remedy: str = "") -> None:
@@ -75,7 +73,6 @@ class Verbatim(str):
 class WrongValueError(ValueError):
     """A value that a check of one key refuses; the reader of the study adds the file and the key.
 
-    value: the offending part of what stands there. remedy: what would be right.
     key: dotted name below that key, where a rule between keys refuses it.
     """
 

@@ -316,7 +316,6 @@ REFUSED = [
     (march_wear, HISTORY, {"until": 1e-6}, "until: give WearTarget(...)"),
     (read_study, STUDY, {"overrides": {"slow_time.cycle": 3}}, "sdof_slider: slow_time.cycle = 3: unknown key"),
     (read_study, STUDY, {"overrides": {"study.name.x": 3}}, "overrides: study.name.x = 3:"),
-    (read_study, STUDY, {"overrides": {1: 2}}, "sdof_slider: 1 = 2: unknown table"),
     (run_study, {}, {"study": "sdof_slider", "output": Path("none/out.nc")}, 'run_study: output = "none/out.nc"'),
     (run_study, {}, {"study": read_study("sdof_slider"), "overrides": SMALL}, "run_study: overrides"),
     (run_study, {}, {"study": "nothing"}, "nothing: the study: "),

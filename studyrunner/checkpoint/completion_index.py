@@ -1,7 +1,4 @@
-"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the file of a run.
-
-The record of a result is one element of an array of numpy with all values of the result.
-"""
+"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the file of a run."""
 
 from __future__ import annotations
 
@@ -27,11 +24,11 @@ tasks are tried one after the other, so that another task is seldom to blame."""
 class CompletionIndex:
     """Results and start states of a plan, in a file that may contain those of earlier runs and of other studies.
 
-    plan: its tasks have keys. kind: data type of the record of a point, which holds all values of a result.
+    facts: of all scenes, see `merge_facts`. scenes: hash of the model of each. plan: its tasks have keys.
+    kind: data type of the record of a point, an element of an array of numpy with all values of its result.
     """
 
     def __init__(self, study: Study, plan: TaskPlan, facts: SceneFacts, scenes: Sequence[str], store: Store) -> None:
-        """facts: of all scenes, see `merge_facts`. scenes: hash of the model of each."""
         self.store = store
         self.kind = np.dtype(record_fields(study, facts))
         empty = np.zeros(1, dtype=self.kind)
@@ -52,10 +49,7 @@ class CompletionIndex:
         return not self._missing(task)
 
     def read_results(self, names: Sequence[str]) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
-        """Records (n,) of the results with these hashes, and whether each exists; else NaN, or 0 in whole numbers.
-
-        Raises StorageError where the disk fails.
-        """
+        """Records (n,) of the results with these hashes, whether each exists; else NaN, or 0. Raises StorageError."""
         contents = np.frombuffer(bytearray(self._empty * len(names)), np.uint8).reshape(len(names), -1)
         there, first = np.zeros(len(names), np.bool_), dict[str, int]()
         for place, name in enumerate(names):
@@ -150,9 +144,8 @@ class CompletionIndex:
             self.store.note_life(task.key)
 
     def give_up_crashed(self) -> None:
-        """Marks tasks as failed with which too many runs have ended: no other run tries them.
-
-        A sweep ends before the first of its start states that is not there.
+        """Marks tasks as failed with which too many runs have ended, of a sweep those that wait for it: no other run
+        tries them.
         """
         message = f"{MOST_CRASHES} runs in a row have crashed or were killed while they were at it"
         given_up = {key for key, number in self.store.crashes.items() if number >= MOST_CRASHES}

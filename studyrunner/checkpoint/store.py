@@ -1,8 +1,8 @@
 """What a study has computed so far, in one SQLite file beside the result, from which a later run goes on.
 
-The file has one table with the columns kind, key and blob. Rank 0 alone uses the file. What arrives within a moment
-goes into one transaction. A rollback journal and an exclusive lock share no memory with other processes, as WAL does:
-this works on file systems of a network. With `synchronous=FULL` a finished transaction survives a power cut.
+Rank 0 alone uses the file. What arrives within a moment goes into one transaction. A rollback journal and an exclusive
+lock share no memory with other processes, as WAL does: this works on file systems of a network. With `synchronous=FULL`
+a finished transaction survives a power cut.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
-from studyrunner.system.files import remove_leftovers, sync_folder
+from studyrunner.system.machine import remove_leftovers, sync_folder
 from studyrunner.system.process import uninterrupted
 from studyrunner.user_error import StorageError, UserError, Verbatim
 
@@ -122,9 +122,8 @@ class Store:
         self.flush()
 
     def note_begin(self, key: str) -> None:
-        """Counts a crash of a task that a rank is about to do, until `note_life` or `close` takes it back.
-
-        After a run that has ended hard this is on the disk at once.
+        """Counts a crash of a task that a rank is about to do, until `note_life` or `close` takes it back; on the disk
+        at once where the run before has ended hard.
         """
         self._under_way.add(key)
         self._write(_CRASHES, key, b"%d" % (self.crashes.get(key, 0) + 1))
@@ -138,10 +137,7 @@ class Store:
         self.forget(_CRASHES, key)
 
     def put(self, kind: str, key: str, packed: Packed) -> None:
-        """Adds an entry, in place of an earlier one; nothing where an entry that only saves time is too large.
-
-        Raises StorageError.
-        """
+        """Adds an entry, or replaces it; none that only saves time and is too large. Raises StorageError."""
         if packed.n_bytes <= LARGEST:
             self._write(kind, key, to_blob(packed))
         elif kind == RESULTS:
@@ -220,10 +216,7 @@ class Store:
 
 
 def read_study(path: Path, key: str = _STUDY) -> str | None:
-    """The study that a file belongs to, without its lock; None where the file does not say so.
-
-    key: of what else the file says of itself.
-    """
+    """The study that a file belongs to, or another entry about itself, without its lock; None where there is none."""
     address = f"file:{quote(os.fsencode(path))}?mode=ro&immutable=1"
     with contextlib.suppress(sqlite3.Error, ValueError, TypeError):
         with contextlib.closing(sqlite3.connect(address, uri=True)) as database:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
@@ -39,11 +38,7 @@ _NO_JOINT = TaskJoint(0, None)
 
 @dataclass(frozen=True)
 class PlannedBlock:
-    """A block of a mission.
-
-    frequency: Hz, or a passage. excitation_amplitude: N. cycles: in one mission, also of a passage. begin: as in the
-    `Block` of the solver.
-    """
+    """A block of a mission, as the `Block` of the solver, but cycles are in one mission, also of a passage."""
 
     name: str
     joint: TaskJoint
@@ -56,12 +51,6 @@ class PlannedBlock:
         """The block as the solver takes it. model: of the joint."""
         cycles, friction = None if isinstance(self.frequency, Passage) else self.cycles, self.joint.friction_coefficient
         return Block(model, self.frequency, self.excitation_amplitude, friction, cycles, self.begin, self.name)
-
-    @property
-    def octaves(self) -> float:
-        """Of a passage; 0 for steady vibration."""
-        of = self.frequency
-        return abs(math.log2(of.stop / of.start)) if isinstance(of, Passage) else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,16 +109,13 @@ class Mission(Task):
 def build_tasks(
     study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
 ) -> TaskPlan:
-    """Tasks of a study of missions. Points with equal blocks share a task.
-
-    contacts: what is drawn for the pairs of each part, by block.
-    """
+    """Tasks of a study of missions, one for equal points. contacts: drawn for the pairs of each part, by block."""
     points: dict[Mission, list[Index]] = {}
     for part, numbers, of_blocks in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         for at, settings in grid(part.study):
             blocks = tuple(_blocks(part.study, at, numbers, of_blocks))
             n_unknowns = n_unknowns_of(max(n_displacements[number] for number in numbers), settings.harmonics)
-            ways = [(block.begin, block.octaves) for block in blocks]
+            ways = [(block.begin, block.frequency) for block in blocks]
             task = Mission(
                 number=0,
                 settings=settings,

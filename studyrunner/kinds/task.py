@@ -1,7 +1,6 @@
 """What a rank computes at a time, what it gives back, and all tasks of a study.
 
-A task gives one result or several, one after the other, each at a place of its own. There are four kinds: `Sweep` and
-`History` (`wear`), `Mode` (`modes`), `Mission` (`missions`).
+There are four kinds of tasks: `Sweep` and `History` (`wear`), `Mode` (`modes`), `Mission` (`missions`).
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from studyrunner.system.machine import package_digest
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from studyrunner.mpi.mapped_file import MappedFile
+    from studyrunner.system.machine import MappedFile
 
 Index = tuple[int, ...]
 """Index of a point along the dimensions of the study."""
@@ -128,7 +127,7 @@ class Identity:
 
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
-    """A task.
+    """A task, which gives one result or several, one after the other, each at a place of its own.
 
     number: among the sweeps, or the other tasks, of the study. cost: estimated time, s.
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.

@@ -104,7 +104,7 @@ class _FromRest(JointTask):
 class Sweep(_FromRest):
     """Start states along the frequency, or that of a ramp at a single frequency; a result at each frequency.
 
-    frequencies: Hz, ascending; where the frequency follows a resonance its only value is the middle of the range.
+    frequencies: Hz, ascending; of a followed resonance the middle of its range.
     """
 
     gives_starts = True
@@ -213,9 +213,7 @@ class History(_FromRest):
         return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
 
     def from_start(self, result: StartResult) -> History:
-        """The history from a start state. The time is in proportion to its unknowns, whatever moves: a history seldom
-        factorises anew.
-        """
+        """The history from a start state. Its time grows with the unknowns: a history seldom factorises anew."""
         n_unknowns = result.n_unknowns or self.n_unknowns
         cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else COST_AT_REST))
         return replace(self, start=result.start, cost=cost, n_unknowns=n_unknowns, moves=result.moves)

@@ -1,7 +1,5 @@
-"""Decides which rank gets which job, by expected run times that finished jobs correct. This module sends no messages
-and is given its clock: the server on real ranks and a simulation with thousands of ranks make the same decisions.
-
-Expected times decide the order of the jobs and the time left that a user sees. They decide no number of a result.
+"""Decides which rank gets which job, by expected run times that finished jobs correct. They decide no number of a
+result. Without messages and with a given clock: a simulation with thousands of ranks makes the same decisions.
 
 By hand: the pools of mpi4py and schwimmbad know no expected run times and leave rank 0 idle (speed-up 0.92 of 2 ranks,
 here 1.97).
@@ -25,7 +23,7 @@ Job = Any
 """
 
 CostKeys = Sequence[tuple[Hashable, ...]]
-"""Groups of similar jobs that a job belongs to: sequences of keys, each from a general group to a special one."""
+"""Groups of similar jobs: sequences of keys, each from a general group to a special one."""
 
 WATCH_SECONDS = 1.0
 """Shortest time between two looks at the running jobs, s. Without these looks 256 ranks are 0.81 busy for 0.97, and
@@ -44,10 +42,11 @@ class CostModel:
     The correction is a product of factors, one for each sequence of keys. The factor of a key is the sum of the
     measured times over the sum of the expected times, which contain the corrections of all other sequences. The factor
     of the key before counts as one more measurement, so that a few unusual times do not decide.
+
+    sums: measured and expected times, s, and their number, by key.
     """
 
     def __init__(self, sums: Mapping[Hashable, tuple[float, float, int]] | None = None) -> None:
-        """sums: measured and expected times, s, and their number, by key."""
         self.sums = dict(sums or {})
         # asked for since the last measurement: most of thousands of waiting jobs share their keys
         self._factors: dict[tuple[Hashable, ...], float] = {}
@@ -155,10 +154,8 @@ class Dispatcher:
         return sorted(busy, key=lambda entry: -entry[2])
 
     def watch(self) -> None:
-        """Called many times a second: now and then orders the waiting jobs anew.
-
-        A running history that takes a hundred times as long as most counts as measured long before its end, in time for
-        the order of similar jobs.
+        """Called many times a second: now and then orders the waiting jobs anew. A running job that takes long counts
+        as measured before its end, in time for the order of similar jobs.
         """
         now = self._clock()
         if now < self._next_watch or not self._others:

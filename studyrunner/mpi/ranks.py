@@ -32,10 +32,7 @@ _SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _SECONDS_TO_PRINT = 1.0
 _SHARED = "/dev/shm/mpich_shm_"
 _MANY_SENT = 64
-_REMEDY = (
-    "start run-study with the mpiexec of the environment it is installed in or, on a cluster, install mpi4py against"
-    " the site's MPI"
-)
+_REMEDY = "start run-study with the mpiexec of its environment or, on a cluster, install mpi4py against the site's MPI"
 
 
 class LauncherError(Exception):
@@ -75,10 +72,7 @@ class Ranks:
         """Sends without waiting for the receiver."""
 
     def flush(self) -> None:
-        """Waits until all messages are received; called before a rank goes on computing.
-
-        The receiver has to look for messages: a large message moves only while its sender is in the MPI library.
-        """
+        """Waits until all messages are received: a large one moves only while its sender is in the MPI library."""
 
     def receive(self) -> tuple[int, object] | None:
         """Sender and content of the next message, or None where there is none yet."""
@@ -166,9 +160,8 @@ def _unlink_shared_memory() -> None:
 
 
 def start_ranks() -> Ranks:
-    """The ranks that the launcher started, or this process alone where there is no launcher.
-
-    Raises LauncherError where MPI knows of fewer processes, or one of them runs other software.
+    """The ranks that the launcher started, or this process alone without launcher. Raises LauncherError where MPI
+    knows of fewer processes, or one of them runs other software.
     """
     if not any(name in os.environ for name in _SIGNS):
         return Ranks()

@@ -1,10 +1,7 @@
-"""Sends jobs to ranks and receives results. This module does not know what a job computes.
+"""Sends jobs to ranks and receives results. Rank 0 computes as well: its main thread serves, a second thread computes.
 
-A job has one result or several; each result is handed on at once. A long job reports its progress from time to time,
-so that another run can continue from there. Rank 0 computes as well: the main thread sends jobs and receives results,
-a second thread computes. `dispatch` decides which rank gets which job.
-
-By hand: in the pools of mpi4py and schwimmbad a job has one result and no progress.
+A job has one result or several, each handed on at once, and reports its progress from time to time, so that another run
+can continue from there. By hand: in the pools of mpi4py and schwimmbad a job has one result and no progress.
 """
 
 from __future__ import annotations
@@ -15,18 +12,16 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from studyrunner.mpi.dispatch import CostModel, Dispatcher, Job
-from studyrunner.mpi.mapped_file import UnseenFileError
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks
+from studyrunner.system.machine import UnseenFileError
 from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 
 SECONDS_TO_PROGRESS = 3.0
-"""Shortest time between two reports of progress of a job, s; longer with many ranks. Together with the second that a
-report waits for others (`checkpoint.store`) a kill loses no step that was finished more than 5 s before, where steps
-are short and the disk is fast enough."""
+"""Shortest time between two reports of progress of a job, s; longer with many ranks. With the time that a report waits
+for others (`checkpoint.store`) a kill loses no step that was finished more than 5 s before, where steps are short."""
 
 _MANY_RANKS = 100  # with more, each reports less often, as rank 0 writes all reports to the disk
 _LOOKS_A_TICK = 100
@@ -36,16 +31,14 @@ Run = Callable[[Job, Callable[[object], None]], Iterable[Any]]
 """Does a job: gives the results one by one and may hand the progress to the given function."""
 
 
-@dataclass(frozen=True)
-class _Assignment:
+class _Assignment(NamedTuple):
     """A job on its way to a rank."""
 
     number: int
     job: Job
 
 
-@dataclass(frozen=True)
-class _Reply:
+class _Reply(NamedTuple):
     """What a rank sends of a job: a result with the time that it took, s; without a time progress, or
     UnseenFileError where the rank does not see a file that the job brings.
     """
@@ -56,10 +49,7 @@ class _Reply:
 
 
 class TaskHandler:
-    """What rank 0 does with jobs, results and messages. All of it is called in the main thread.
-
-    costs: learns the run times of the jobs.
-    """
+    """What rank 0 does with jobs and results, in the main thread. costs: learns the run times of the jobs."""
 
     def __init__(self) -> None:
         self.costs = CostModel()
@@ -73,10 +63,7 @@ class TaskHandler:
         raise NotImplementedError
 
     def prepare(self, rank: int, job: Job, *, unseen: bool = False) -> Job:  # noqa: ARG002
-        """The job as a rank gets it; called once for each job that is sent, in the order of sending.
-
-        unseen: whether the job is sent again, to a rank that does not see the files that the job brings.
-        """
+        """The job as it is sent to a rank. unseen: once more, as the rank does not see the files that it brings."""
         return job
 
     def keep(self, job: Job, progress: object) -> None:
@@ -87,10 +74,8 @@ class TaskHandler:
 
 
 def serve_tasks(ranks: Ranks, handler: TaskHandler, run: Run) -> None:
-    """Rank 0: has all jobs done and does some of them.
-
-    An exception on another rank ends the process of that rank. An exception of a job on rank 0 is raised here, and one
-    that another rank has sent: a fault of the machine, or KeyboardInterrupt.
+    """Rank 0: has all jobs done and does some of them. Raises the exception of a job of its own, or of another rank
+    that has sent one: a fault of the machine, or KeyboardInterrupt.
     """
     server = _Server(ranks, handler, run)
     try:

@@ -242,7 +242,7 @@ def _override(table: Tables, overrides: str | Sequence[str] | Mapping[str, objec
     """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
-            _set_key(table, str(key), _plain(value), "overrides", str(key))
+            _set_key(table, key, _plain(value), "overrides", key)
         return
     for text in [overrides] if isinstance(overrides, str) else overrides:
         key, equals, value_text = (part.strip() for part in text.partition("="))

@@ -1,10 +1,8 @@
 """The process of a command: signals that end it, and streams that nobody reads.
 
 The first signal raises KeyboardInterrupt in the main thread. A callback of an import or of a library may lose this
-exception; then the next call of `raise_ending` raises it again, until `begin_ending` was called.
-
-By hand: `signal` of Python raises at any instruction, and nothing in it defers a signal or keeps a lost one. Streams
-of Python raise an error where nobody reads, at the end of the process as well.
+exception; then the next call of `raise_ending` raises it again, until `begin_ending` was called. By hand: nothing in
+`signal` of Python defers a signal or keeps a lost one, and its streams raise an error where nobody reads.
 """
 
 from __future__ import annotations
@@ -23,8 +21,8 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 """Ctrl-C, the end of the time of a job or of a terminal, and signals that batch systems send before the end."""
 
 SECONDS_OF_GRACE = 10.0
-"""Time after the first signal in which further signals do nothing, s; later ones end the process at once. A launcher
-sends its signal more than once, and a user may press Ctrl-C again. A result of 200 MB is written in 3 s."""
+"""Time after the first signal in which further signals do nothing, s, as a launcher sends its signal more than once;
+later ones end the process at once. A result of 200 MB is written in 3 s."""
 
 INTERRUPTED = 130
 """Exit status after an end from outside."""
@@ -64,10 +62,7 @@ def raise_ending() -> None:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """A block of the main thread that is done as a whole: a signal during it raises KeyboardInterrupt after it.
-
-    An exception would leave it half done: a message whose memory is freed before it is sent, a lock that is kept.
-    """
+    """A block of the main thread that is done as a whole: a signal during it raises KeyboardInterrupt after it."""
     global _n_uninterrupted
     _n_uninterrupted += 1
     try:
@@ -112,9 +107,8 @@ class _Patient(io.FileIO):
 
 
 def keep_talking() -> None:
-    """From here on stdout and stderr take what they are given: a closed pipe or a full log does not end a run.
-
-    What stands in for them, as in a test or a notebook, is left alone.
+    """From here on stdout and stderr, if no others stand in for them, take what they are given: a closed pipe or a full
+    log does not end a run.
     """
     # Closed streams leave their numbers to files that are opened later, and libraries write to these numbers.
     while (nowhere := os.open(os.devnull, os.O_RDWR)) <= _LAST_STREAM:

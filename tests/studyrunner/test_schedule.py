@@ -15,10 +15,10 @@ from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
-from studyrunner.mpi.mapped_file import open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.study.study_file import read_study
+from studyrunner.system.machine import open_mapped, write_mapped
 from studyrunner.system.progress import ProgressDisplay, Standing
 from studyrunner.task_runs import StudyRun
 from tests.benchmarks.scheduling import MemoryIndex
