@@ -15,7 +15,7 @@ from studyrunner.mpi.ranks import Ranks, launcher_size
 from studyrunner.result.opening import open_result
 from studyrunner.result.provenance import check_date
 from studyrunner.result.target import check_result
-from studyrunner.run import RunOptions, compute_study
+from studyrunner.run import compute_study
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay
@@ -90,5 +90,5 @@ def run_study(
     shown = ProgressDisplay(quiet=not progress)
     # the scene as well: with two threads its matrices differ in the last bits, and start states with them
     with threadpool_limits(1), contextlib.closing(Store(target.progress)) as store:
-        compute_study(Ranks(), study, target, store, RunOptions(fresh, retry_failed, checked), shown)
+        compute_study(Ranks(), study, target, store, shown, fresh=fresh, retry_failed=retry_failed, date=checked)
         return open_result(target.path)

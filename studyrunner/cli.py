@@ -198,14 +198,15 @@ def _compute(ranks: Ranks, study: Study, options: argparse.Namespace) -> int:
     from solver.outcome import COMPLETE
     from studyrunner.checkpoint.store import Store
     from studyrunner.result.target import check_result
-    from studyrunner.run import RunOptions, compute_study
+    from studyrunner.run import compute_study
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", path, study, overwrite=options.overwrite)
-    display, given = ProgressDisplay(), RunOptions(options.fresh, options.retry_failed, options.date)
+    display = ProgressDisplay()
+    asked = {name: getattr(options, name) for name in ("fresh", "retry_failed", "date")}
     with contextlib.closing(Store(target.progress)) as store:
-        outcomes = compute_study(ranks, study, target, store, given, display)
+        outcomes = compute_study(ranks, study, target, store, display, **asked)
         # no other run replaces the result meanwhile
         answer = _answer(target.path)
     n_points, n_complete = outcomes.total(), sum(outcomes[number] for number in COMPLETE)
@@ -260,29 +261,25 @@ def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     if found.deck is not None and found.new is None:
         remedy = "give --new NAME beside it: the name of the new study"
         raise UserError("command line", "--from", str(found.deck), remedy)
-    if found.scene_help is not None or found.new is not None:
-        print(_scene_help(found.scene_help) if found.new is None else _new_study(found.new, found.deck), flush=True)
+    # below: imported where it is used, as it takes a second to load
+    if found.new is not None:
+        from studyrunner.study.keys import write_new_study
+
+        written = write_new_study(found.new, found.deck)
+        print(f"{written}: run-study {shlex.quote(str(written))} computes it", flush=True)
+        parser.exit()
+    if found.scene_help is not None:
+        from studies.scenes import BUNDLED, scene_help
+
+        if found.scene_help not in BUNDLED:
+            raise UserError("command line", "--scene-help", found.scene_help, f"give one of {', '.join(BUNDLED)}")
+        print(scene_help(found.scene_help), flush=True)
         parser.exit()
     if found.date is not None:
-        from studyrunner.result.provenance import check_date  # where it is used: it takes a second to load
+        from studyrunner.result.provenance import check_date
 
         found.date = check_date(found.date, "command line", "--date")
     return found
-
-
-def _scene_help(scene: str) -> str:
-    from studies.scenes import BUNDLED, scene_help
-
-    if scene not in BUNDLED:
-        raise UserError("command line", "--scene-help", scene, f"give one of {', '.join(BUNDLED)}")
-    return scene_help(scene)
-
-
-def _new_study(name: str, deck: Path | None) -> str:
-    from studyrunner.study.keys import write_new_study
-
-    path = write_new_study(name, deck)
-    return f"{path}: run-study {shlex.quote(str(path))} computes it"
 
 
 if __name__ == "__main__":

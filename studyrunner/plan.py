@@ -178,11 +178,10 @@ def _question(
     if not off:
         return ""
     worst = max(off, key=lambda value: max(value / high, low / value))
-    scaled = {name: worst * factor for name, factor in units.items()}
     likely = [
-        f"in {name} (then it is {value:.5g} {unit}".rstrip() + ")"
-        for name, value in scaled.items()
-        if low <= value <= high
+        f"in {name} (then it is {worst * factor:.5g} {unit}".rstrip() + ")"
+        for name, factor in units.items()
+        if low <= worst * factor <= high
     ]
     return f"{' '.join((key, f'{worst:.3g}', unit)).rstrip()} is {why}: is it {' or '.join(likely) or 'meant'}?"
 
@@ -192,8 +191,7 @@ def _frequencies(study: Study, parts: Sequence[Study]) -> list[float]:
     if not study.kind.counted or study.axes.frequency_ratio:
         return []
     own = [value for part in parts if not (study.mission and part.mission) for value in part.axes.frequency]
-    passages = [block.passage for block in study.mission if block.passage is not None]
-    return own + [end for passage in passages for end in (passage.start, passage.stop)]
+    return own + [end for block in study.mission if block.passage for end in (block.passage.start, block.passage.stop)]
 
 
 def _numbers(parts: Sequence[Study], name: str) -> list[float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
@@ -27,39 +26,37 @@ from studyrunner.task_runs import StudyRun, evaluator
 from studyrunner.user_error import show_text
 
 
-@dataclass(frozen=True)
-class RunOptions:
-    """What a run does with earlier results, and the date in the file, as `check_date` gives it; None for none.
-
-    fresh: whether the run begins anew. retry_failed: whether failed points are computed again.
-    """
-
-    fresh: bool = False
-    retry_failed: bool = False
-    date: str | None = None
-
-
 def compute_study(
-    ranks: Ranks, study: Study, target: Target, store: Store, options: RunOptions, display: ProgressDisplay
+    ranks: Ranks,
+    study: Study,
+    target: Target,
+    store: Store,
+    display: ProgressDisplay,
+    *,
+    fresh: bool = False,
+    retry_failed: bool = False,
+    date: str | None = None,
 ) -> Counter[int]:
     """Rank 0: computes a study together with the other ranks, writes its result, and counts the points of each outcome.
 
     target: as `check_result` gives it; a finished result is replaced by one without missing points only. store: the
-    open file of its progress: while it is open no other run writes the result. display: what the user sees. Raises
-    UserError where a scene is wrong; StorageError where something cannot be written; KeyboardInterrupt where the run is
-    ended from outside, with what is left in words, after finished points have been written.
+    open file of its progress: while it is open no other run writes the result. fresh: whether the run begins anew.
+    retry_failed: whether failed points are computed again. date: as `check_date` gives it.
+
+    Raises UserError where a scene is wrong; StorageError where something cannot be written; KeyboardInterrupt where the
+    run is ended from outside, with what is left in words, after finished points have been written.
     """
     remove_leftovers(target.path)
     scenes = build_scenes(ranks, study, store, display.step)
     facts = merge_facts(scenes.facts)
     attributes = {**describe_run(study, facts), **({} if scenes.stored is None else scenes.stored.origin)}
-    attributes |= describe_date(options.date)
+    attributes |= describe_date(date)
     plan = build_tasks(study, scenes.scenes, scenes.facts)
     completion = CompletionIndex(study, plan, facts, [each.digest for each in scenes.facts], store)
     store.note_study(identity_of(study.study.name, study.scene.model))
-    if options.fresh:
+    if fresh:
         completion.forget_all()
-    if options.retry_failed:
+    if retry_failed:
         completion.forget_failed()
     completion.give_up_crashed()
     store.flush()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from datetime import date, time
 from pathlib import Path
 
-_LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
+_LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_REMEDY = 80, 240, 600
 _MOST_LINES = 20
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -43,7 +43,7 @@ class UserError(Exception):
         return "\n".join(lines[:_MOST_LINES] + more)
 
     def _line(self) -> str:
-        key = _cut(show_text(self.key), _LONGEST_KEY)
+        key = _cut(show_text(self.key), _LONGEST_VERBATIM)
         # a sentence stands for itself, a value stands behind its key
         is_sentence = isinstance(self.value, Verbatim) and (" " in self.value or self.value == "missing")
         is_sentence = is_sentence and str(self.value)[0].isalpha()
