@@ -85,42 +85,42 @@ def serve_tasks(ranks: Ranks, handler: TaskHandler, run: Run) -> None:
             with uninterrupted():
                 server.look()
     except BaseException:
-        server.local.given_up = True
+        server.own.given_up = True
         raise
-    server.local.stop()
+    server.own.stop()
 
 
-def follow_rank_0(ranks: Ranks, run: Run) -> None:
-    """Any other rank: does the jobs that rank 0 sends, until rank 0 sends None."""
+def follow_rank_0(ranks: Ranks, run: Run, check: Callable[[], None] = raise_ending) -> None:
+    """Any other rank: does the jobs that rank 0 sends, until rank 0 sends None.
 
-    def send(reply: object) -> None:
-        ranks.send(reply, 0)
-        ranks.flush()
-
+    check: raises KeyboardInterrupt where the run ends.
+    """
     while True:
         while (received := ranks.receive()) is None:
             time.sleep(POLL_SECONDS)
-        _, message = received
-        if message is None:
+        _, assignment = received
+        if assignment is None:
             return
-        if not isinstance(message, _Assignment):
-            raise TypeError(f"rank 0 sent {message!r} instead of a job")
-        _work(message, run, send, ranks.size, raise_ending)
+        if not isinstance(assignment, _Assignment):
+            raise TypeError(f"rank 0 sent {assignment!r} instead of a job")
+        _work(assignment, ranks, run, check)
 
 
-def _work(
-    assignment: _Assignment, run: Run, send: Callable[[object], None], n_ranks: int, check: Callable[[], None]
-) -> None:
-    """Sends the results of a job, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
-    number, job, n_given, began = assignment.number, assignment.job, 0, time.perf_counter()
-    pause = SECONDS_TO_PROGRESS * max(1.0, n_ranks / _MANY_RANKS)
+def _work(assignment: _Assignment, ranks: Ranks, run: Run, check: Callable[[], None]) -> None:
+    """Sends the results of a job, each as soon as it is there."""
+    job, n_given, began = assignment.job, 0, time.perf_counter()
+    pause = SECONDS_TO_PROGRESS * max(1.0, ranks.size / _MANY_RANKS)
     sent, first = dict[type, float](), began  # data and words have times of their own
+
+    def send(content: object, seconds: float | None = None) -> None:
+        ranks.send(_Reply(assignment.number, content, seconds), 0)
+        ranks.flush()
 
     def keep(progress: object) -> None:
         check()
         # a job that has given all its results has no progress
         if n_given < job.n_results and time.perf_counter() > sent.get(type(progress), first) + pause:
-            send(_Reply(number, progress))
+            send(progress)
             sent[type(progress)] = time.perf_counter()
 
     try:
@@ -128,55 +128,56 @@ def _work(
             n_given += 1
             if n_given > job.n_results:
                 break
-            send(_Reply(number, result, time.perf_counter() - began))
+            send(result, time.perf_counter() - began)
             began = time.perf_counter()
     except UnseenFileError as error:
-        send(_Reply(number, error))
+        send(error)
         return
     if n_given != job.n_results:
         raise ValueError(f"not {job.n_results} results from {job}")
 
 
-class _LocalWorker:
-    """The computing thread of rank 0. assign: takes jobs. given_up: the thread ends at the next step of its job."""
+class _OwnThread(Ranks):
+    """The computing thread of rank 0, which is given jobs, and replies, as another rank.
 
-    def __init__(self, run: Run, n_ranks: int) -> None:
+    replies: also the exception that has ended the thread. given_up: the thread ends at the next step of its job.
+    """
+
+    def __init__(self, run: Run, size: int) -> None:
+        self.size = size
         self._jobs: queue.SimpleQueue[_Assignment | None] = queue.SimpleQueue()
-        self._sent: deque[object] = deque()
-        self.given_up = False
         self.assign = self._jobs.put
+        self.replies: deque[object] = deque()
+        self.given_up = False
         # A daemon: an exception in the main thread ends the process although a job still runs.
-        self._thread = threading.Thread(target=self._compute, args=(run, n_ranks), daemon=True)
+        self._thread = threading.Thread(target=self._follow, args=(run,), daemon=True)
         self._thread.start()
-
-    def receive(self) -> object:
-        """The next message, None where there is none. Raises the exception of a job."""
-        message = self._sent.popleft() if self._sent else None
-        if isinstance(message, BaseException):
-            raise message
-        return message
 
     def stop(self) -> None:
         """Ends the thread after its last job. Raises an exception that the last job raised after its last result."""
         self._jobs.put(None)
         with uninterrupted():
             self._thread.join()
-        self.receive()
+        for error in self.replies:
+            assert isinstance(error, BaseException)
+            raise error
 
-    def _compute(self, run: Run, n_ranks: int) -> None:
+    def _follow(self, run: Run) -> None:
         try:
-            while (assignment := self._jobs.get()) is not None:
-                _work(assignment, run, self._send, n_ranks, self._check)
+            follow_rank_0(self, run, self._check)
         except BaseException as error:  # handed to the main thread, which raises it
-            self._sent.append(error)
+            self.replies.append(error)
 
     def _check(self) -> None:
         if self.given_up:
             raise KeyboardInterrupt
 
-    def _send(self, message: object) -> None:
+    def send(self, message: object, rank: int) -> None:  # noqa: ARG002
         self._check()
-        self._sent.append(message)
+        self.replies.append(message)
+
+    def receive(self) -> tuple[int, object]:
+        return 0, self._jobs.get()
 
 
 class _Server:
@@ -186,16 +187,15 @@ class _Server:
         self._ranks, self._handler = ranks, handler
         self._waiting = iter(handler.begin())
         self.dispatcher = Dispatcher(ranks.size, handler.costs, time.monotonic)
-        self.local = _LocalWorker(run, ranks.size)
+        self.own = _OwnThread(run, ranks.size)
 
     def look(self) -> None:
         """Receives what there is; waits a moment where there is nothing."""
         for _ in range(_LOOKS_A_TICK):
-            received, message = self._ranks.receive(), self.local.receive()
-            for sender, content in (received or (0, None), (0, message)):
-                if content is not None:
-                    self._accept(sender, content)
-            if quiet := received is None and message is None:
+            received = [self._ranks.receive(), (0, self.own.replies.popleft()) if self.own.replies else None]
+            for each in filter(None, received):
+                self._accept(*each)
+            if quiet := not any(received):
                 break
         self.dispatcher.watch()
         self._handler.tick(self.dispatcher.running)
@@ -212,7 +212,7 @@ class _Server:
 
     def _send(self, rank: int, assignment: _Assignment) -> None:
         if rank == 0:
-            self.local.assign(assignment)
+            self.own.assign(assignment)
         else:
             self._ranks.send(assignment, rank)
 
