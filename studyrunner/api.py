@@ -35,10 +35,8 @@ def run_study(
     date: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
-    """Run a study in this process, as the command `run-study` does, and open its result.
-
-    The result is that of the command, to the last bit, and a run that was ended early goes on, from here or by the
-    command. This process computes alone, with one thread; for several give `mpiexec -n 8 run-study study.toml`.
+    """Run a study in this process, as the command `run-study` does, and open its result, which is the same to the last
+    bit. A run that was ended early goes on, from here or by the command.
 
     Parameters
     ----------
@@ -67,8 +65,8 @@ def run_study(
     Raises
     ------
     UserError
-        Where study, scene or output are wrong, another run is at work there, or a launcher has started several
-        processes, each of which would compute all of it. Nothing is computed then.
+        Where something is wrong, another run is at work, or a launcher has started several processes. Nothing is
+        computed then.
     StorageError
         Where something cannot be written on the way. What was computed is kept.
     KeyboardInterrupt

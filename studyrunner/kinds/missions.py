@@ -68,11 +68,6 @@ class Mission(Task):
     missions: tuple[float, ...]
     until: WearTarget | None
 
-    @property
-    def scenes(self) -> tuple[int, ...]:
-        """Those of the blocks."""
-        return tuple(sorted({block.joint.scene for block in self.blocks}))
-
     def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hash of the history: of all blocks with their scenes."""
         blocks = [(identity.joint(block.joint), replace(block, joint=_NO_JOINT)) for block in self.blocks]
@@ -118,6 +113,7 @@ def build_tasks(
             ways = [(block.begin, block.frequency) for block in blocks]
             task = Mission(
                 number=0,
+                scenes=tuple(sorted(set(numbers))),
                 settings=settings,
                 cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1])),
                 n_unknowns=n_unknowns,

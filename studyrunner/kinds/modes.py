@@ -12,9 +12,10 @@ from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
 from studyrunner.kinds.results import first_harmonic, named
 from studyrunner.kinds.task import (
     Identity,
-    JointTask,
     Keep,
     PointResult,
+    Task,
+    TaskJoint,
     TaskPlan,
     digest,
     grid,
@@ -32,12 +33,13 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mode(JointTask):
+class Mode(Task):
     """A nonlinear mode; a result at each modal amplitude.
 
     mode: its number, from 1. direction: "up" or "down" along the amplitude. amplitudes: m sqrt(kg), ascending.
     """
 
+    joint: TaskJoint
     mode: int
     direction: str
     amplitudes: tuple[float, ...]
@@ -90,6 +92,7 @@ def build_tasks(
             n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
             mode = Mode(
                 number=0,
+                scenes=(scene,),
                 settings=settings,
                 cost=seconds_of(n_unknowns, iterations_of_mode(len(amplitudes))),
                 n_unknowns=n_unknowns,

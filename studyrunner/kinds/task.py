@@ -133,7 +133,7 @@ class Task(ABC):
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
     known: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
     names: of the results in the file of a run, by place (`hashes`). key: of the task there.
-    models: of `scenes`, for a rank that does not have them.
+    scenes: numbers of the scenes whose models the task needs. models: of these, for a rank that does not have them.
     variables: names of the variables in a result. indices: for each place the points of the study that have its result;
         none for start states.
     """
@@ -142,6 +142,7 @@ class Task(ABC):
     """Whether other tasks wait for the results."""
 
     number: int
+    scenes: tuple[int, ...]
     settings: SolverSettings
     cost: float
     n_unknowns: int
@@ -152,11 +153,6 @@ class Task(ABC):
     models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
     variables: tuple[str, ...] = ()
     indices: tuple[tuple[Index, ...], ...] = ()
-
-    @property
-    @abstractmethod
-    def scenes(self) -> tuple[int, ...]:
-        """Numbers of the scenes whose models the task needs."""
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -211,18 +207,6 @@ class Task(ABC):
     @abstractmethod
     def describe(self, place: int) -> str:
         """The task in words while it computes the result at a place."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointTask(Task):
-    """A task of one joint."""
-
-    joint: TaskJoint
-
-    @property
-    def scenes(self) -> tuple[int, ...]:
-        """That of the joint."""
-        return (self.joint.scene,)
 
 
 def digest(*values: object) -> str:

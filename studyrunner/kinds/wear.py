@@ -18,7 +18,7 @@ from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.results import build_result
-from studyrunner.kinds.task import Identity, JointTask, Keep, PointResult, StartResult, digest, up_or_down
+from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, digest, up_or_down
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MachineFaultError, is_machine_fault
@@ -89,9 +89,10 @@ class Integrated:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _FromRest(JointTask):
+class _FromRest(Task):
     """A task with start states: it gives them, or begins from one."""
 
+    joint: TaskJoint
     excitation: Excitation
 
     def name_of_start(self, identity: Identity, frequency: float) -> str:

@@ -75,7 +75,7 @@ def build_tasks(
         ascending, direction = sorted(starts), excitation.direction
         n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
         case: dict[str, Any] = {"joint": joint, "excitation": excitation, "settings": settings}
-        case["n_unknowns"] = n_unknowns
+        case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
         for frequencies in [[one] for one in ascending] if direction == "ramp" else [ascending]:
             cost = seconds_of(n_unknowns, iterations_of_sweep(direction, len(frequencies)))
             sweep = Sweep(number=len(sweeps), frequencies=tuple(frequencies), cost=cost, **case)
