@@ -30,14 +30,10 @@ from studyrunner.user_error import StorageError, UserError
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
 
-CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3
-"""Exit statuses, beside INTERRUPTED."""
-
+CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3  # exit statuses, beside INTERRUPTED
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
-_SECONDS_FOR_RANK_0 = 60.0
-"""Time that rank 0 has for writing the result, s, before another interrupted rank ends the run."""
-
+_SECONDS_FOR_RANK_0 = 60.0  # for writing the result, before another interrupted rank ends the run
 _SECONDS_FOR_A_LINE = 2.0
 
 _DESCRIPTION = """\

@@ -29,9 +29,7 @@ machines. Energy coefficients are Archard's over the friction coefficient, which
 _UNITS_OF_WEAR = {"1/MPa or mm2/N": 1e-6, "mm3/(N m) or mm3/J": 1e-9}
 _UNITS_OF_SPEED = {"rad/s": 30.0 / math.pi, "revolutions per second": 60.0}
 
-_FAR = 30.0
-"""Frequencies of an excitation are asked about from this ratio on, below the first resonance and above: the first six
-natural frequencies of a bundled sector are within 10."""
+_FAR = 30.0  # ratio to the first resonance from which a frequency is asked about: six of a sector are within 10
 
 
 def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> TaskPlan:

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel
 
 _LATE = 0.3
-"""Expected further time of a task that takes longer than estimated, over the time that it is late. For an estimate with
-an uncertainty factor of two the mean further time is this fraction."""
+"""Expected further time of a late task over its time: the mean, for estimates to a factor of two."""
 
 
 def evaluator() -> Run:

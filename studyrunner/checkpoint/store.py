@@ -31,12 +31,8 @@ RESULTS, PROGRESS, COMPUTED = "result", "progress", "computed"
 """Kinds of entries: results of tasks, start states among them; progress of tasks; what is computed once for a study, by
 the hash of its inputs."""
 
-LARGEST = 9 * 10**8
-"""Largest size of an entry, bytes. SQLite has no larger ones."""
-
-SECONDS_A_TRANSACTION = 0.25
-"""Longest time, s, that an entry waits for others that go into the same transaction, on a disk that is fast."""
-
+_LARGEST = 9 * 10**8  # bytes of an entry: SQLite has no larger ones
+_SECONDS_A_TRANSACTION = 0.25  # that an entry waits for others at most, on a disk that is fast
 _SHARE_OF_WRITING = 0.1  # of the time of rank 0, on a disk that is slow
 _BYTES_A_TRANSACTION = 8e6
 _HEAD_BYTES = 8
@@ -138,7 +134,7 @@ class Store:
 
     def put(self, kind: str, key: str, packed: Packed) -> None:
         """Adds an entry, or replaces it; none that only saves time and is too large. Raises StorageError."""
-        if packed.n_bytes <= LARGEST:
+        if packed.n_bytes <= _LARGEST:
             self._write(kind, key, to_blob(packed))
         elif kind == RESULTS:
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
@@ -192,7 +188,7 @@ class Store:
             self._database.commit()
             self._n_bytes = 0
         now = time.monotonic()
-        self._next_write = now + max(SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
+        self._next_write = now + max(_SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
 
     def close(self) -> None:
         """Writes what waits, as far as there is room, and closes the file. A file without a study is removed, and what

@@ -27,12 +27,10 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.wear.problem import WearRequest
 
-COST_AT_REST = 0.01
-"""Estimated time of a history in which nothing wears, over the time of a history with steps."""
-
 OWN_STEPS = ("adaptive", "final")
 """Schemes that choose their steps: for another wear coefficient the same ones at other counts."""
 
+_COST_AT_REST = 0.01  # estimated time of a history in which nothing wears, over that of a history with steps
 _NEIGHBOURS = 4  # frequencies whose histories take about as long
 _ROUND_OFF = 1e-10
 
@@ -216,7 +214,7 @@ class History(_FromRest):
     def from_start(self, result: StartResult) -> History:
         """The history from a start state. Its time grows with the unknowns: a history seldom factorises anew."""
         n_unknowns = result.n_unknowns or self.n_unknowns
-        cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else COST_AT_REST))
+        cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else _COST_AT_REST))
         return replace(self, start=result.start, cost=cost, n_unknowns=n_unknowns, moves=result.moves)
 
     def hashes(self, identity: Identity) -> tuple[str, ...]:

@@ -22,8 +22,7 @@ from studyrunner.system.process import uninterrupted
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-POLL_SECONDS = 1e-3
-"""Time between two looks for a message, s. A blocking receive would keep a core busy."""
+POLL_SECONDS = 1e-3  # between two looks for a message: a blocking receive would keep a core busy
 
 _SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 _RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK", "SLURM_PROCID")
@@ -172,15 +171,16 @@ def start_ranks() -> Ranks:
         if announced <= 1:
             return Ranks()
         raise LauncherError(f"{announced} processes were started that cannot talk ({error}): {_REMEDY}") from error
-    host, own = ranks.software[0]
-    other = next(((rank, name) for rank, (name, software) in enumerate(ranks.software) if software != own), None)
-    if announced <= ranks.size and other is None:
+    hosts = {software: host for host, software in ranks.software}
+    if announced > ranks.size:
+        wrong = f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}"
+    elif len(hosts) > 1:
+        versions = "different versions of this program, of Python or of numpy"
+        wrong = f"ranks on {' and '.join(hosts.values())} run {versions}: install the same software for all ranks"
+    else:
         return ranks
     ranks.close()
-    if other is None:
-        raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
-    said = f"rank {other[0]} on {other[1]} runs other versions of this program, of Python or of numpy than"
-    raise LauncherError(f"{said} rank 0 on {host}: install the same software for all ranks")
+    raise LauncherError(wrong)
 
 
 def describe_software() -> tuple[str, str]:

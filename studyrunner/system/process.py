@@ -24,20 +24,19 @@ SECONDS_OF_GRACE = 10.0
 """Time after the first signal in which further signals do nothing, s, as a launcher sends its signal more than once;
 later ones end the process at once. A result of 200 MB is written in 3 s."""
 
-INTERRUPTED = 130
-"""Exit status after an end from outside."""
+INTERRUPTED = 130  # exit status after an end from outside
 
 _LAST_STREAM = 2
 
 _n_uninterrupted = 0
 _came: float | None = None  # when the first signal came
-_begun = False
+_handled = False
 
 
 def take_endings() -> None:
     """From now on each of these signals raises KeyboardInterrupt in the main thread, once; ignored ones stay so."""
-    global _came, _begun
-    _came, _begun = None, False
+    global _came, _handled
+    _came, _handled = None, False
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
@@ -45,8 +44,8 @@ def take_endings() -> None:
 
 def begin_ending() -> None:
     """The process comes to its end now: a signal, which may come from the launcher and from a rank, is too late."""
-    global _begun
-    _begun = True
+    global _handled
+    _handled = True
 
 
 def is_ending(error: BaseException) -> bool:
@@ -74,7 +73,7 @@ def uninterrupted() -> Iterator[None]:
 
 
 def _ending_waits() -> bool:
-    return _came is not None and not _begun
+    return _came is not None and not _handled
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
@@ -85,7 +84,7 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
             os._exit(INTERRUPTED)
         return
     _came = now
-    if not _n_uninterrupted and not _begun:
+    if not _n_uninterrupted and not _handled:
         raise KeyboardInterrupt
 
 
@@ -114,19 +113,15 @@ def keep_talking() -> None:
     while (nowhere := os.open(os.devnull, os.O_RDWR)) <= _LAST_STREAM:
         pass
     os.close(nowhere)
-    if sys.stdout is sys.__stdout__:
-        sys.stdout = _open_patiently(1, sys.stdout)
-    if sys.stderr is sys.__stderr__:
-        sys.stderr = _open_patiently(_LAST_STREAM, sys.stderr)
+    for number, name in enumerate(("stdout", "stderr"), 1):
+        if (stream := getattr(sys, name)) is getattr(sys, f"__{name}__"):
+            raw: Any = _Patient(number, "w", closefd=False)
+            encoding = None if stream is None else stream.encoding
+            # line by line: those of several processes do not get mixed; what the encoding lacks is shown by its number
+            setattr(sys, name, io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True))
 
 
 def last_error(stream: TextIO) -> OSError | None:
     """Why something that was written to a stream did not arrive; None where it did, or where nobody can know."""
     buffer = getattr(stream, "buffer", None)
     return buffer.error if isinstance(buffer, _Patient) else None
-
-
-def _open_patiently(number: int, stream: TextIO | None) -> TextIO:
-    raw: Any = _Patient(number, "w", closefd=False)
-    # line by line: those of several processes do not get mixed; a name that the encoding lacks is shown by its numbers
-    return io.TextIOWrapper(raw, None if stream is None else stream.encoding, "backslashreplace", line_buffering=True)

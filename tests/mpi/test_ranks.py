@@ -180,7 +180,7 @@ def test_processes_of_the_launcher_of_another_library(names, said, tmp_path):
 def test_ranks_with_different_software(tmp_path):
     program = tmp_path / "other.py"
     program.write_text(OTHER_VERSION.format(root=str(ROOT), faked=FAKED), encoding="utf-8")
-    assert_refused(run_to_end(2, [str(program), *STUDY], tmp_path), "rank 1", "elsewhere")
+    assert_refused(run_to_end(2, [str(program), *STUDY], tmp_path), "elsewhere", "different versions")
     assert [path.name for path in tmp_path.iterdir()] == ["other.py"]
 
 
