@@ -71,7 +71,7 @@ class CompletionIndex:
         """What is left of a task, with its progress; none where nothing is. needed: places."""
         left = {place for place in self._missing(task) if place in needed}
         if left:
-            yield replace(task, known=frozenset(task.order) - left, resume=self.store.read(PROGRESS, task.key))
+            yield replace(task, skipped=frozenset(task.order) - left, resume=self.store.read(PROGRESS, task.key))
 
     def sweeps_left(self) -> list[Task]:
         """Sweeps with start states that are needed and not known."""

@@ -131,7 +131,7 @@ class Task(ABC):
 
     number: among the sweeps, or the other tasks, of the study. cost: estimated time, s.
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
-    known: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
+    skipped: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
     names: of the results in the file of a run, by place (`hashes`). key: of the task there.
     scenes: numbers of the scenes whose models the task needs. models: of these, for a rank that does not have them.
     variables: names of the variables in a result. indices: for each place the points of the study that have its result;
@@ -146,7 +146,7 @@ class Task(ABC):
     settings: SolverSettings
     cost: float
     n_unknowns: int
-    known: frozenset[int] = frozenset()
+    skipped: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
     names: tuple[str, ...] = field(default=(), compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
@@ -162,7 +162,7 @@ class Task(ABC):
     @property
     def places(self) -> tuple[int, ...]:
         """Places of the results that are needed, in the order in which they are given."""
-        return tuple(place for place in self.order if place not in self.known)
+        return tuple(place for place in self.order if place not in self.skipped)
 
     @property
     def n_results(self) -> int:

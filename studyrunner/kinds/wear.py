@@ -127,7 +127,7 @@ class Sweep(_FromRest):
             yield result
         if len(given) < self.n_results and self.resume is not None:
             # the earlier run had passed states that are damaged, or that it did not need
-            yield from replace(self, known=self.known | given, resume=None)._compute(models, keep)
+            yield from replace(self, skipped=self.skipped | given, resume=None)._compute(models, keep)
 
     def _compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[StartResult]:
         # numba is loaded where a task runs, so that --plan and --help do without it
@@ -139,7 +139,7 @@ class Sweep(_FromRest):
             model,
             self.joint.friction_coefficient,
             excitation.amplitude,
-            # no state depends on those that are known
+            # no state depends on those that are skipped
             excitation.follow or np.array([self.frequencies[place] for place in wanted]),
             cast("Literal['up', 'down', 'ramp']", excitation.direction),
             self.settings,

@@ -61,7 +61,7 @@ def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterat
 
 def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iterator[Result]:
     left = list(task.places)
-    for number, started in enumerate(fake_sweep(replace(task, known=frozenset()))):
+    for number, started in enumerate(fake_sweep(replace(task, skipped=frozenset()))):
         if not left:
             return
         if number < gone_on_from(task):

@@ -182,7 +182,7 @@ def test_only_states_from_which_something_begins_are_asked_for(finished):
         (task,) = [each for each in completion.plan.waiting[0, 1] if each.wear_coefficient == 1e-11]
         completion.store.forget(RESULTS, task.names[0])
         (left,) = completion.sweeps_left()
-        assert left == replace(sweep, known=frozenset({0, 2}))
+        assert left == replace(sweep, skipped=frozenset({0, 2}))
         assert left.n_results == 1
         assert compute(completion) == (1, 1)
 
@@ -200,7 +200,7 @@ def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder):
         completion.forget_failed()
         assert completion.n_points_finished == 10
         (left,) = completion.sweeps_left()
-        assert (left.number, left.known, left.resume) == (1, frozenset({0, 2}), None)
+        assert (left.number, left.skipped, left.resume) == (1, frozenset({0, 2}), None)
         assert compute(completion) == (1, 2)
 
 
