@@ -35,7 +35,6 @@ _LARGEST = 9 * 10**8  # bytes of an entry: SQLite has no larger ones
 _SECONDS_A_TRANSACTION = 0.25  # that an entry waits for others at most, on a disk that is fast
 _SHARE_OF_WRITING = 0.1  # of the time of rank 0, on a disk that is slow
 _BYTES_A_TRANSACTION = 8e6
-_HEAD_BYTES = 8
 _LEVEL = 1  # of zlib: the rank that compresses hands out the tasks as well
 _SECONDS_TO_DIE = 5.0  # after which all ranks of a run that was killed have noticed
 _FILE, _STUDY, _OPEN = "file", "study", "open"  # kind and keys of the entries about the file: its study, and its run
@@ -52,24 +51,23 @@ class _OtherFileError(Exception):
 
 
 def to_blob(packed: Packed) -> bytes:
-    """The text, type and shape of the arrays of a value as JSON, then their bytes, compressed by zlib.
+    """The text, type and shape of the arrays of a value as JSON in a line, then their bytes, compressed by zlib.
 
     By hand: `numpy.lib.format` takes five times as long for the small arrays of a result. Raises TypeError for arrays
     of objects: a bug.
     """
     if any(array.dtype.hasobject for array in packed.arrays):
         raise TypeError("arrays of objects are not kept")
-    head = json.dumps([packed.text, [[array.dtype.str, array.shape] for array in packed.arrays]]).encode()
-    raw = (len(head).to_bytes(_HEAD_BYTES, "little"), head, *(array.tobytes() for array in packed.arrays))
+    head = json.dumps([packed.text, [[array.dtype.str, array.shape] for array in packed.arrays]])
+    raw = (head.encode(), b"\n", *(array.tobytes() for array in packed.arrays))
     return zlib.compress(b"".join(raw), _LEVEL)
 
 
 def from_blob(blob: bytes) -> Packed:
     """The value of `to_blob`. Raises ValueError, TypeError or zlib.error where the bytes are no such value."""
     raw = zlib.decompress(blob)
-    place = _HEAD_BYTES + int.from_bytes(raw[:_HEAD_BYTES], "little")
-    text, layout = json.loads(raw[_HEAD_BYTES:place])
-    arrays = []
+    arrays, place = [], raw.index(b"\n") + 1
+    text, layout = json.loads(raw[:place])
     for kind, shape in layout:
         array: NDArray[np.generic] = np.ndarray(tuple(shape), np.dtype(kind), raw, place)
         arrays.append(array.copy())

@@ -136,29 +136,24 @@ def mission_values(task: Mission, history: MissionHistory) -> dict[str, Any]:
     reached = np.flatnonzero(np.isfinite(worn))
     last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
     is_state = np.isfinite(history.worn_volume).any() and np.isfinite(history.response_begin).any()
-    depth, depth_error = history.wear_depth[rows], history.wear_depth_error[rows]
+    of_depth = ("worn_volume", "worn_volume_error", "wear_depth", "wear_depth_error")
     whole, target = history.last_mission >= task.missions[-1], ""
     if history.outcome.complete:
         target = describe_target(task.until, history.missions_to_target, "mission", whole=whole)
     own: Mapping[str, object] = {
-        **deepest(depth, depth_error),
+        **{name: getattr(history, name)[rows] for name in (*of_depth, "response_error", "response_peak_begin")},
+        **deepest(history.wear_depth[rows], history.wear_depth_error[rows]),
         **first_harmonic(history.response_end[rows]),
-        "worn_volume": worn,
         "wear_rate": np.where(np.isfinite(worn), rate, np.nan),
-        "wear_depth": depth,
         "wear_depth_last": last,
         "block_worn_volume": history.block_volume[rows],
         "block_worn_volume_error": history.block_volume_error[rows],
         "block_share": share,
         "response_amplitude_begin": np.abs(history.response_begin[rows]),
         "response_peak": history.response_peak_end[rows],
-        "response_peak_begin": history.response_peak_begin[rows],
-        "response_error": history.response_error[rows],
         "excitation_frequency": history.excitation_frequency[:, 1],
         "excitation_frequency_begin": history.excitation_frequency[:, 0],
         "block_cycles": np.array([block.cycles for block in task.blocks]),
-        "worn_volume_error": history.worn_volume_error[rows],
-        "wear_depth_error": depth_error,
         "outcome": int(history.outcome),
         # a mission is computed for the vibration at 0
         "error_estimate": last_error(
