@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
-from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.results import build_result
 from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, digest, up_or_down
@@ -25,6 +24,7 @@ from studyrunner.system.machine import MachineFaultError, is_machine_fault
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
+    from solver.results.history import StartState
     from solver.wear.problem import WearRequest
 
 OWN_STEPS = ("adaptive", "final")
@@ -153,6 +153,8 @@ class Sweep(_FromRest):
 
     def failed(self, place: int, outcome: int, message: str) -> StartResult:  # noqa: ARG002
         """A start without a state."""
+        from solver.results.history import StartState
+
         nan = math.nan
         broken = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
         return StartResult(place, pack(broken), moves=False, n_unknowns=0)
