@@ -34,7 +34,6 @@ from dataclasses import replace
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, STICK
-from solver.contact.law import Marched
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure
 from solver.model import BoolArray, FloatArray
@@ -53,7 +52,7 @@ LARGEST_MOVED_LOAD = 10.0
 worn volume is a sufficient warning (27 % with 0.6)."""
 
 
-def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: Scheme) -> WearState | None:
+def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme: Scheme) -> WearState | None:
     """The state after a step of `length` cycles by one balance; None where it is not found."""
     depth, rate = state.depth, state.rate
     worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
@@ -62,9 +61,9 @@ def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: S
         w, grown = length / state.previous.length, depth - state.previous.depth
         worn_before = depth + w**2 / (1.0 + 2.0 * w) * grown
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
-    gain = setup.gain(implicit_cycles)
-    balance = Balance(setup.joint_of(state), state.point.history, worn_before, gain, setup.wearing)
-    end = setup.solve(*first_guess(setup, state, balance, length), state)
+    gain = wearing.gain(implicit_cycles)
+    balance = Balance(wearing.joint_of(state), state.point.history, worn_before, gain, wearing.wearing_work)
+    end = wearing.solve(*first_guess(wearing, state, balance, length), state)
     if end is None:
         return None
     error = 0.5 * length * (end.rate - rate)
@@ -73,10 +72,10 @@ def attempt_step(setup: WearingJoint, state: WearState, length: float, scheme: S
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
         error = own / (own + other) * (end.depth - explicit_depth)
     last = LastStep(length, depth, state.at.predicted_h, state.omega, state.resolution)
-    return replace(end, cycle=state.cycle + length, previous=last, error=float(np.abs(error) @ setup.area))
+    return replace(end, cycle=state.cycle + length, previous=last, error=float(np.abs(error) @ wearing.area))
 
 
-def first_guess(setup: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[Balance, FloatArray]:
+def first_guess(wearing: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[Balance, FloatArray]:
     """The balance of a step with its first frequency and its history, and the first predicted force (n_rel, 2H+1), N:
     extrapolated from the last step, or those of the state where this residual is lower.
     """
@@ -85,22 +84,18 @@ def first_guess(setup: WearingJoint, state: WearState, balance: Balance, length:
         return balance, now
     further, there = length / last.length, balance
     ahead = now + further * (now - last.predicted_h)
-    if setup.follow is not None:
+    if wearing.follow is not None:
         omega = state.omega + further * (state.omega - last.omega)
-        there = replace(balance, joint=setup.case_and_joint(state)[0].joint(omega, setup.excitation_amplitude))
-    found = there.evaluate(ahead)
-    if found.scaled_residual() > balance.evaluate(now).scaled_residual():
+        case, _ = wearing.case_and_joint(state)
+        there = replace(balance, joint=case.joint(omega, wearing.excitation_amplitude))
+    end = there.evaluate(ahead)
+    if end.scaled_residual() > balance.evaluate(now).scaled_residual():
         return balance, now
-    return replace(there, history=history_along(there.joint, state, found)), ahead
-
-
-def history_along(joint: Joint, state: WearState, ahead: Marched) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for the balance at the end of a step; ahead: this end, extrapolated."""
-    before = state.at
     # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line
-    sticks = (before.status_t == STICK).all(axis=1) & (ahead.status_t == STICK).all(axis=1) & (ahead.periods == 1)
+    sticks = (state.at.status_t == STICK).all(axis=1) & (end.status_t == STICK).all(axis=1) & (end.periods == 1)
     parts = np.linspace(0.0, 1.0, PARTS_OF_STEP + 1)[1:-1]
-    return joint.law.history_along(state.point.history, ~sticks, before.predicted_t, ahead.predicted_t, parts)
+    forces = state.at.predicted_t, end.predicted_t
+    return replace(there, history=there.joint.law.history_along(state.point.history, ~sticks, *forces, parts)), ahead
 
 
 def allowed_error(share: float, before: float, after: float, count: float, length: float) -> float:
@@ -111,35 +106,36 @@ def allowed_error(share: float, before: float, after: float, count: float, lengt
     return max(share * max(after - before, after * length / (count + length)), 1e-300)
 
 
-def rate_slope(setup: WearingJoint, state: WearState, pairs: BoolArray) -> FloatArray:
+def rate_slope(wearing: WearingJoint, state: WearState, pairs: BoolArray) -> FloatArray:
     """Derivative dg/dW (n_contact, n_contact), 1 per cycle, with one column a pair; those not in `pairs` are 0."""
     slope = np.zeros((pairs.size, pairs.size))
-    slope[:, pairs] = _rate_changes(setup, state, np.eye(pairs.size)[pairs], fixed_factors=False).T
+    slope[:, pairs] = _rate_changes(wearing, state, np.eye(pairs.size)[pairs], fixed_factors=False).T
     return slope
 
 
-def _rate_changes(setup: WearingJoint, state: WearState, depths: FloatArray, *, fixed_factors: bool) -> FloatArray:
+def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *, fixed_factors: bool) -> FloatArray:
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m, as exact as a
     Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
-    at, joint, balance, gain = state.at, setup.joint_of(state), setup.balance_of(state), setup.gain(1.0)
+    at, balance, gain = state.at, wearing.balance_of(state), wearing.gain(1.0)
+    joint = balance.joint
     force_tangent, work_tangent = joint.law.tangent(at)
-    by_work, by_force, by_depth = (gain * part for part in setup.wearing.slopes(*worn_by(at)))
+    by_work, by_force, by_depth = (gain * part for part in wearing.wearing_work.slopes(*worn_by(at)))
     growth = by_work[:, None] * work_tangent + by_force[:, None] * force_tangent[:, 0]
-    found = depths * (0.0 if fixed_factors else by_depth)
+    changes = depths * (0.0 if fixed_factors else by_depth)
     closing = np.where(joint.component_index % 3 == 0, depths[:, joint.component_index // 3], 0.0)
     # nothing acts back on a constant normal force
     acting = closing.any(axis=1)
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = setup.run.steps(balance, at, rights)
+        steps = wearing.run.steps(balance, at, rights)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
-        found[acting] += (growth * moved).sum(axis=2)
-    return found
+        changes[acting] += (growth * moved).sum(axis=2)
+    return changes
 
 
-def explicit_step_limit(setup: WearingJoint, state: WearState) -> float:
+def explicit_step_limit(wearing: WearingJoint, state: WearState) -> float:
     """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
 
     A step multiplies a disturbance of W by 1 + h dg/dW: 2 over the largest positive eigenvalue of -dg/dW, by Arnoldi's
@@ -148,7 +144,7 @@ def explicit_step_limit(setup: WearingJoint, state: WearState) -> float:
     wears = state.rate > 0.0
 
     def product(depths: FloatArray) -> FloatArray:
-        return np.asarray(-_rate_changes(setup, state, depths[None], fixed_factors=True)[0])
+        return np.asarray(-_rate_changes(wearing, state, depths[None], fixed_factors=True)[0])
 
     # depths of pairs whose rates follow no depth do not matter
     start = product(np.where(wears, np.random.default_rng(0).normal(size=wears.size), 0.0))
@@ -182,14 +178,14 @@ def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, 
     return moved / preload if preload > 0.0 else 0.0
 
 
-def too_long(setup: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> Failure | None:
+def too_long(wearing: WearingJoint, state: WearState, wear_depth: FloatArray, length: float) -> Failure | None:
     """Why a step or a jump of some cycles to depths (n_contact,), m, is rejected, and how long it may be; else None."""
     for free_tangents in (False, True):
-        fraction = moved_fraction(setup.joint_of(state), state.at, wear_depth, free_tangents=free_tangents)
+        fraction = moved_fraction(wearing.joint_of(state), state.at, wear_depth, free_tangents=free_tangents)
         if fraction <= LARGEST_MOVED_LOAD:
             return None
     # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
     advised = length * LARGEST_MOVED_LOAD / 100.0 / fraction
     on, times, most = in_digits(length, 3), in_digits(fraction, 2), in_digits(advised, 2)
-    said = f"wearing on for {on} cycles at once from cycle {in_digits(state.cycle)} on moves {times} times the normal"
-    return Failure(Outcome.STEP_TOO_LONG, f"{said} forces of the joint: at most {most} cycles at once would do")
+    moves = f"wearing on for {on} cycles at once from cycle {in_digits(state.cycle)} on moves {times} times the normal"
+    return Failure(Outcome.STEP_TOO_LONG, f"{moves} forces of the joint: at most {most} cycles at once would do")

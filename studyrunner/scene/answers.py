@@ -210,9 +210,8 @@ def check_study_model(study: Study, picture: Path, progress: Callable[[str], Non
         remedy = f"give a study file of a finite-element model, which {study.scene.model} here is not"
         raise UserError("command line", "--check", study.source, remedy)
     # what reads and reduces it is loaded where there is one
-    from studies.fe_models.from_files.check import describe_model
+    from studies.fe_models.from_files.check import describe_model, draw_pairs
     from studies.fe_models.from_files.model import checked, describe_origin, load_model, reduce_model
-    from studies.fe_models.from_files.picture import draw_pairs
 
     parameters = checked(study.scene.parameters)
     with scene_errors(study.source, None), np.errstate(all="ignore"):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
-from studies.fe_models.model_files import file_digest
+from studies.fe_models.files import file_digest
 from studies.scene import as_scene, make_compliant, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
 
-from studies.fe_models.model_files import ModelFiles
-from studies.fe_models.text import check_there
+from studies.fe_models.files import ModelFiles, check_there
 from studies.scene import ContactStiffness, as_scene
 from studies.scene_error import SceneError
 from studies.scenes import scene_parameters

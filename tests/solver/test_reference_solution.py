@@ -6,7 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.accuracy.history_error import (
+from solver.harmonic_balance.state import Failure
+from solver.outcome import Outcome
+from solver.packing import Packed
+from solver.settings import SolverSettings
+from solver.wear import problem
+from solver.wear.errors import (
     HISTORY_SAFETY,
     PAIR_OVER_VOLUME,
     Compared,
@@ -14,13 +19,9 @@ from solver.accuracy.history_error import (
     error_of_given_steps,
     history_error,
 )
-from solver.harmonic_balance.state import Failure
-from solver.outcome import Outcome
-from solver.packing import Packed
-from solver.settings import SolverSettings
-from solver.wear import problem
 from solver.wear.history import integrate_together
-from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest
+from solver.wear.problem import WearProblem
+from solver.wear.wearing_joint import Adaptive, Given, WearRequest
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import exact_depths_of_motion
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.fe_models.files import UNITS
 from studies.fe_models.from_files.check import describe_model
 from studies.fe_models.from_files.imported import order_by_nodes
 from studies.fe_models.from_files.model import find_files, load_model, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.matrices.read import read_matrices
-from studies.fe_models.model_files import UNITS
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.finite_element.solid_mesh import Rotation
 from studies.finite_element.structure import FeModel, ReductionOptions
