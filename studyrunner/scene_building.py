@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from solver.packing import Packed, pack_model, unpack_model
+from studies.scene import Progress
 from studyrunner.checkpoint.store import COMPUTED, Store
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.dispatch import CostKeys
@@ -126,11 +127,11 @@ class Scenes:
     models: SceneModels
 
 
-def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], None]) -> Scenes:
+def build_scenes(ranks: Ranks, study: Study, store: Store, say: Progress) -> Scenes:
     """Rank 0: builds the scenes of a study, several of them together with the other ranks.
 
-    store: the file of the run, with what an earlier run has computed. say: takes a line on the next step, where a step
-    may take long. Raises UserError where a scene is wrong, or lacks what the study asks for.
+    store: the file of the run, with what an earlier run has computed. Raises UserError where a scene is wrong, or lacks
+    what the study asks for.
     """
     scenes = find_scenes(study)
     building = _Building(scenes, store, say)
@@ -155,7 +156,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
 class _Building(TaskHandler):
     """Rank 0 while the scenes are built. found: those that are, by number."""
 
-    def __init__(self, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> None:
+    def __init__(self, scenes: SceneSet, store: Store, say: Progress) -> None:
         super().__init__()
         self._keys = [model_key(study) for study in scenes.studies]
         self._studies = scenes.studies
@@ -188,7 +189,7 @@ class _Building(TaskHandler):
         return unpack_model(packed)
 
 
-def build_scene_task(task: SceneTask, progress: Callable[[str], None]) -> Iterator[SceneBuilt]:
+def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt]:
     """Builds one scene, or takes its model from an earlier run, which is equal to the last bit (`solver.packing`)."""
     known = None
     # what is damaged, or of another version, is built again

@@ -2,8 +2,8 @@
 
 The difference of a history to its reference solution, pair by pair, is taken for the error. The reference solution
 starts from another sweep, with a third of the nodes (`solver.loading_history`), and is coarser: twice the tolerance of
-the steps, the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch ends, errors
-grow, and this difference with them; a sum of local errors does not.
+the steps, a quarter of their parts, the next lower harmonics and samples. Where pairs stick again, a resonance passes
+or a branch ends, errors grow, and this difference with them; a sum of local errors does not.
 
 A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
 with the same steps errs as they do: dovetail, 16 pairs, 212.5 Hz, where a pair only just slips: 1.89 mm3 with implicit
@@ -36,7 +36,14 @@ from solver.structure.joint import Case
 from solver.wear.check import full_check, is_final, report_only, unstable_at_end, wears_without_end
 from solver.wear.jump import jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
-from solver.wear.step import allowed_error, attempt_step, explicit_step_limit, too_long
+from solver.wear.step import (
+    PARTS_OF_REFERENCE,
+    PARTS_OF_STEP,
+    allowed_error,
+    attempt_step,
+    explicit_step_limit,
+    too_long,
+)
 from solver.wear.wearing_joint import Adaptive, Given, WearingJoint, WearRequest, WearState
 
 HISTORY_ITERATIONS = 3000
@@ -69,6 +76,7 @@ class WearProblem(WearingJoint):
     guide: of a reference solution; None for a history. A reference solution takes a step that is `too_long`: its
         difference is the warning, and in a last long step nearly all of the force of a joint at rest is moved.
     stable_end: whether the stability of the last state is tested.
+    parts: of a step, in each of which the pairs slide.
     limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`.
     """
 
@@ -86,6 +94,7 @@ class WearProblem(WearingJoint):
     ) -> None:
         super().__init__(case, start, request)
         self.steps, self.guide, self.stable_end = request.steps, guide, stable_end
+        self.parts = PARTS_OF_STEP if guide is None else PARTS_OF_REFERENCE
         if guide is not None:
             self.run = self.run.with_tolerance(case.settings.rough_tolerance)
             coarse = tuple((count, coarser(resolution, case.model)) for count, resolution in guide.resolutions)
@@ -186,7 +195,7 @@ class WearProblem(WearingJoint):
         followed resonance may be unstable at constant frequency.
         """
         scheme = scheme or self.steps.scheme
-        end = attempt_step(self, state, length, scheme)
+        end = attempt_step(self, state, length, scheme, self.parts)
         if end is None or scheme == "adaptive" or self.follow is not None:
             return end
         return end if self.run.is_stable_finely(self.balance_of(end), end.at) else None
@@ -227,7 +236,7 @@ class WearProblem(WearingJoint):
             length = 2.0**doubling * shortest
             if state.cycle + length > self.limit:
                 break
-            end = attempt_step(self, state, length, "adaptive")
+            end = attempt_step(self, state, length, "adaptive", self.parts)
             if end is not None and vibration_change(state.at, end.at) < SMOOTH_CHANGE:
                 return end
         self.run = before

@@ -47,13 +47,24 @@ PARTS_OF_STEP = 32
 """Parts of a step in each of which the pairs slide at their friction limit. Dovetail, 16 pairs, 212.6 Hz, 1e5 cycles:
 1.795, 1.813, 1.819, 1.819 mm3 with 1, 8, 32, 128 parts (`rtol` 2e-4: 1.823). A tenth of the time of a history."""
 
+PARTS_OF_REFERENCE = 8
+"""The same of a reference solution. With 32 it has nearly the error of its history where pairs slide for long in one
+direction: 16 pairs, 0.769 N, mu 0.336, 4.65e5 cycles: 0.8 % estimated, 2.4 % true, with 16 parts 2.3, with 8 3.6 %. Of
+44 random histories of 16 pairs three had less than half of their true error, none with 8; in the others it grows by a
+tenth in the median."""
+
 LARGEST_MOVED_LOAD = 10.0
 """Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of the
 worn volume is a sufficient warning (27 % with 0.6)."""
 
 
-def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme: Scheme) -> WearState | None:
-    """The state after a step of `length` cycles by one balance; None where it is not found."""
+def attempt_step(
+    wearing: WearingJoint, state: WearState, length: float, scheme: Scheme, parts: int
+) -> WearState | None:
+    """The state after a step of `length` cycles by one balance; None where it is not found.
+
+    parts: of the step, in each of which the pairs slide.
+    """
     depth, rate = state.depth, state.rate
     worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
     w, grown = 0.0, np.zeros_like(depth)
@@ -63,7 +74,7 @@ def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme:
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
     gain = wearing.gain(implicit_cycles)
     balance = Balance(wearing.joint_of(state), state.point.history, worn_before, gain, wearing.wearing_work)
-    end = wearing.solve(*first_guess(wearing, state, balance, length), state)
+    end = wearing.solve(*first_guess(wearing, state, balance, length, parts), state)
     if end is None:
         return None
     error = 0.5 * length * (end.rate - rate)
@@ -75,7 +86,9 @@ def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme:
     return replace(end, cycle=state.cycle + length, previous=last, error=float(np.abs(error) @ wearing.area))
 
 
-def first_guess(wearing: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[Balance, FloatArray]:
+def first_guess(
+    wearing: WearingJoint, state: WearState, balance: Balance, length: float, parts: int
+) -> tuple[Balance, FloatArray]:
     """The balance of a step with its first frequency and its history, and the first predicted force (n_rel, 2H+1), N:
     extrapolated from the last step, or those of the state where this residual is lower.
     """
@@ -93,9 +106,8 @@ def first_guess(wearing: WearingJoint, state: WearState, balance: Balance, lengt
         return balance, now
     # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line
     sticks = (state.at.status_t == STICK).all(axis=1) & (end.status_t == STICK).all(axis=1) & (end.periods == 1)
-    parts = np.linspace(0.0, 1.0, PARTS_OF_STEP + 1)[1:-1]
-    forces = state.at.predicted_t, end.predicted_t
-    return replace(there, history=there.joint.law.history_along(state.point.history, ~sticks, *forces, parts)), ahead
+    way = state.at.predicted_t, end.predicted_t, np.linspace(0.0, 1.0, parts + 1)[1:-1]
+    return replace(there, history=there.joint.law.history_along(state.point.history, ~sticks, *way)), ahead
 
 
 def allowed_error(share: float, before: float, after: float, count: float, length: float) -> float:

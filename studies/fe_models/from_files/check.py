@@ -15,8 +15,8 @@ from solver.model import BoolArray, FloatArray, IntArray, LinearModel, ReducedMo
 from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.pairing import ContactPairs
-from studies.finite_element.reduced_joint import FeScene, Progress, glued_frequencies, prepare_model, silent
-from studies.scene import make_compliant
+from studies.finite_element.reduced_joint import FeScene
+from studies.scene import Progress, make_compliant, silent
 
 N_FREQUENCIES = 4
 """Natural frequencies that are shown."""
@@ -36,8 +36,8 @@ def describe_model(
 ) -> list[tuple[str, str]]:
     """Label and text of each line. scene: the reduced model. Raises SceneError."""
     deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.mesh.coordinates
-    prepared = prepare_model(loaded.model, joint)
-    free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
+    prepared = scene.prepared
+    free: BoolArray = np.asarray(~prepared.structure.held.all(axis=1))
     if joint.cut is not None:
         free[joint.cut.right] = False
     mass, placed = prepared.weight.sum(), ~np.isnan(coordinates[:, 0])
@@ -57,13 +57,13 @@ def describe_model(
     rows += [("glued", f"{tie.name} stay glued") for tie in joint.ties]
     progress("natural frequencies of the glued model")
     k = parameters.nodal_diameter
-    turning = glued_frequencies(prepared, k, N_FREQUENCIES)
+    turning = prepared.frequencies(k, N_FREQUENCIES)
     where = f"nodal diameter {k}: " if joint.cut is not None else ""
     glued = f"{where}{_frequencies(turning)} Hz without prestress"
     if loaded.model.forms is not None:
         glued = f"{where}{_frequencies(turning)} Hz, with what the matrices hold"
-    elif prepared.at_rest is not None:
-        still = prepared.at_rest.frequencies(k, N_FREQUENCIES) / (2.0 * np.pi)
+    elif "elastic" in prepared.forms:
+        still = prepared.frequencies(k, N_FREQUENCIES, "elastic")
         glued = f"{where}{_frequencies(still)} Hz at rest, {_frequencies(turning)} Hz with prestress"
     rows.append(("glued", glued))
     first = dict(sorted((k, found[0]) for k, found in scene.glued_frequencies.items()))
@@ -71,7 +71,7 @@ def describe_model(
         listed = ", ".join(map(str, first))
         rows.append(("glued", f"first at nodal diameters {listed}: {_frequencies(np.array([*first.values()]))} Hz"))
     progress("reduction with twice the modes")
-    rows.append(("reduction", _reduction_error(loaded, scene.model, parameters)))
+    rows.append(("reduction", _reduction_error(loaded, scene, parameters)))
     rows.append(("rigid", f"{_count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
     held = _count_free_motions(scene.model)
     if held:
@@ -115,14 +115,14 @@ def _sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
 
 
-def _reduction_error(loaded: LoadedModel, model: ReducedModel, parameters: Parameters) -> str:
+def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters) -> str:
     """How far frequencies change with twice the modes, where the pairs slide freely and the joint moves most."""
-    k = parameters.nodal_diameter
+    k, model = parameters.nodal_diameter, scene.model
     n_modes = len(model.linear[k].stiffness) - np.count_nonzero(model.contact.dofs >= 0)
     if n_modes < parameters.stuck_modes:
         return f"none: there are no more than {n_modes} modes with the pairs glued"
     more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
-    finer = reduce_model(loaded, more, 1).model
+    finer = reduce_model(loaded, more, 1, prepared=scene.prepared).model
     own, other = (_sliding_frequencies(each.linear[k], each)[: 2 * N_FREQUENCIES] for each in (model, finer))
     n = min(len(own), len(other))
     elastic = other[:n] > 1e-3 * other[:n].max()

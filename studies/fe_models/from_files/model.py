@@ -22,11 +22,12 @@ from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
-from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
+from studies.finite_element.reduced_joint import FeScene, build_fe_scene
+from studies.finite_element.reduction import PreparedModel
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
-from studies.scene import SurfaceMesh, build_compliant
+from studies.scene import Progress, SurfaceMesh, build_compliant, silent
 from studies.scene_error import SceneError
 
 
@@ -67,20 +68,25 @@ def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
 def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: Progress = silent) -> ReducedModel:
     """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see. Raises SceneError."""
     own = checked(parameters)
-
-    def reduced() -> ReducedModel:
-        return reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model
-
-    if own.contact_stiffness is None:
-        return reduced()
     what = [describe_origin(files, own), own.model_dump_json(exclude={"contact_stiffness"}), n_harmonics]
-    return build_compliant(json.dumps(what), own.contact_stiffness, reduced)
+    return build_compliant(
+        files.mesh.name,
+        json.dumps(what),
+        own.contact_stiffness,
+        lambda: reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model,
+    )
 
 
-def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, progress: Progress = silent) -> FeScene:
-    """Reduced model of a loaded one. Raises SceneError."""
+def reduce_model(
+    loaded: LoadedModel,
+    parameters: Parameters,
+    n_harmonics: int,
+    progress: Progress = silent,
+    prepared: PreparedModel | None = None,
+) -> FeScene:
+    """Reduced model of a loaded one, which may be prepared already. Raises SceneError."""
     options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-    return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress)
+    return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress, prepared)
 
 
 def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:
