@@ -1,7 +1,7 @@
 """The scenes of a run: each built once, by rank 0 or, where there are several, by all ranks side by side.
 
 They are stored in the file of the run. A task brings the model to a rank that does not have it: as a file that the
-ranks map (`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
+ranks map (`write_mapped`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 
 from __future__ import annotations
