@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,11 +10,12 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
+from studyrunner.checkpoint.store import Store
 from studyrunner.mpi.ranks import Ranks, launcher_size
 from studyrunner.result.opening import open_result
 from studyrunner.result.provenance import check_date
 from studyrunner.result.target import check_result
-from studyrunner.run import RunOptions, compute_study, open_progress
+from studyrunner.run import compute_study
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay
@@ -33,10 +35,8 @@ def run_study(
     date: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
-    """Run a study in this process, as the command `run-study` does, and open its result.
-
-    The result is that of the command, to the last bit, and a run that was ended early goes on, from here or by the
-    command. This process computes alone, with one thread; for several give `mpiexec -n 8 run-study study.toml`.
+    """Run a study in this process, as the command `run-study` does, and open its result, which is the same to the last
+    bit. A run that was ended early goes on, from here or by the command.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def run_study(
     Raises
     ------
     UserError
-        Where study, scene or output are wrong, another run is at work there, or a launcher has started several
-        processes, each of which would compute all of it. Nothing is computed then.
+        Where something is wrong, another run is at work, or a launcher has started several processes. Nothing is
+        computed then.
     StorageError
         Where something cannot be written on the way. What was computed is kept.
     KeyboardInterrupt
@@ -87,7 +87,6 @@ def run_study(
         raise UserError("run_study", error.key, error.value, error.remedy) from None
     shown = ProgressDisplay(quiet=not progress)
     # the scene as well: with two threads its matrices differ in the last bits, and start states with them
-    with threadpool_limits(1), open_progress(target) as store:
-        given = RunOptions(fresh, retry_failed, checked, "the same call")
-        compute_study(Ranks(), study, target, store, given, shown)
+    with threadpool_limits(1), contextlib.closing(Store(target.progress)) as store:
+        compute_study(Ranks(), study, target, store, shown, fresh=fresh, retry_failed=retry_failed, date=checked)
         return open_result(target.path)

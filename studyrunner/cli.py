@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import shlex
 import sys
@@ -13,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, RankInterrupted, Ranks, launcher_rank, start_ranks
+from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks
 from studyrunner.system.machine import MachineFaultError
 from studyrunner.system.process import (
     INTERRUPTED,
@@ -29,16 +30,11 @@ from studyrunner.user_error import StorageError, UserError
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
 
-CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3
-"""Exit statuses, beside INTERRUPTED."""
-
+CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3  # exit statuses, beside INTERRUPTED
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
-_SECONDS_FOR_RANK_0 = 60.0
-"""Time that rank 0 has for writing the result, s, before another interrupted rank ends the run."""
-
+_SECONDS_FOR_RANK_0 = 60.0  # for writing the result, before another interrupted rank ends the run
 _SECONDS_FOR_A_LINE = 2.0
-
 
 _DESCRIPTION = """\
 Computes a study of fretting wear in a vibrating joint and writes its results to one NetCDF file.
@@ -67,35 +63,18 @@ is in the file OUT.nc.progress; with it a study that is changed computes only wh
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command on this rank and returns its exit status; an unexpected failure ends all ranks.
+    """Runs the command on this rank and returns its exit status, which says something on rank 0 only.
 
     arguments: None for those of the process, which ends here if the run did not come to its end.
     """
+    ranks = Ranks()
     try:
         take_endings()
         keep_talking()
         # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
         os.environ.update(dict.fromkeys(_THREADS, "1"))
-        return _run(start_ranks(), arguments)
-    except LauncherError as error:
-        if launcher_rank() == 0:
-            print(f"run-study: launcher: {error}", file=sys.stderr)
-        else:
-            # a launcher may pass nothing on once another process has failed
-            time.sleep(_SECONDS_FOR_A_LINE)
-        return BAD_INPUT
-    except BaseException as error:
-        if not is_ending(error):
-            raise
-        begin_ending()
-        if launcher_rank() == 0:
-            print("run-study: interrupted", file=sys.stderr)
-        return INTERRUPTED
-
-
-def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
-    """Exit status of the command on a rank; only rank 0 has one that says something."""
-    try:
+        ranks = start_ranks()
+        status = CONVERGED
         if ranks.rank == 0:
             status = _lead(ranks, sys.argv[1:] if arguments is None else arguments)
             for rank in range(1, ranks.size):
@@ -105,46 +84,57 @@ def _run(ranks: Ranks, arguments: Sequence[str] | None) -> int:
             from studyrunner.task_runs import evaluator
 
             follow_rank_0(ranks, evaluator())
-            status = CONVERGED
         if arguments is None:
             # it has come to its end: what comes while MPI and the interpreter end is of no use to anybody
             begin_ending()
         ranks.close()
+        return status
+    except LauncherError as error:
+        if launcher_rank() == 0:
+            print(f"run-study: launcher: {error}", file=sys.stderr)
+        else:
+            # a launcher may pass nothing on once another process has failed
+            time.sleep(_SECONDS_FOR_A_LINE)
+        return BAD_INPUT
     except BaseException as error:
         # One rank's end must be the end of all: the others would wait for ever.
-        status = UNEXPECTED
-        if is_ending(error):
-            begin_ending()
-            if ranks.rank > 0 and _leave_to_rank_0(ranks, RankInterrupted()):
-                ranks.close()
-                return CONVERGED
-            said = str(error) if isinstance(error, KeyboardInterrupt) else ""
-            print(f"run-study: {said or 'interrupted'}", file=sys.stderr)
-            status = INTERRUPTED
-        elif isinstance(error, StorageError):
-            print(f"run-study: {error}", file=sys.stderr)
-        elif isinstance(error, MachineFaultError):
-            kept = "what was computed is kept, and the same command goes on from it"
-            if ranks.rank > 0:
-                _leave_to_rank_0(ranks, error)
-            print(f"run-study: {error}: a fault of the machine; {kept}", file=sys.stderr)
-        else:
-            print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
-            traceback.print_exc()
-        ranks.abort(status)
+        status = _tell(ranks, error)
+        if status != CONVERGED:
+            ranks.abort(status)
         if arguments is None:
             # The thread that computes is still at it, which an interpreter on its way out does not always survive.
             sys.stdout.flush()
             sys.stderr.flush()
             os._exit(status)
-    return status
+        return status
 
 
-def _leave_to_rank_0(ranks: Ranks, reason: object) -> bool:
-    """Waits for rank 0 to write what there is and to end all ranks, after telling it the reason.
+def _tell(ranks: Ranks, error: BaseException) -> int:
+    """Says why a rank has come to its end early, and returns the exit status."""
+    if is_ending(error):
+        begin_ending()
+        if ranks.rank > 0 and _leave_to_rank_0(ranks, KeyboardInterrupt()):
+            ranks.close()
+            return CONVERGED
+        if max(ranks.rank, launcher_rank()) == 0 or ranks.size > 1:
+            said = str(error) if isinstance(error, KeyboardInterrupt) else ""
+            print(f"run-study: {said or 'interrupted'}", file=sys.stderr)
+        return INTERRUPTED
+    if isinstance(error, StorageError):
+        print(f"run-study: {error}", file=sys.stderr)
+    elif isinstance(error, MachineFaultError):
+        if ranks.rank > 0:
+            _leave_to_rank_0(ranks, error)
+        kept = "what was computed is kept, and the same command goes on from it"
+        print(f"run-study: {error}: a fault of the machine; {kept}", file=sys.stderr)
+    else:
+        print(f"run-study: unexpected failure on rank {ranks.rank} of {ranks.size}", file=sys.stderr)
+        traceback.print_exception(error)
+    return UNEXPECTED
 
-    Returns whether rank 0 had already finished.
-    """
+
+def _leave_to_rank_0(ranks: Ranks, reason: BaseException) -> bool:
+    """Tells rank 0 why it has to end all ranks, and waits for that. Returns whether rank 0 had already finished."""
     ranks.send(reason, 0)
     latest = time.monotonic() + _SECONDS_FOR_RANK_0
     while time.monotonic() < latest:
@@ -202,15 +192,17 @@ def _describe(study: Study, options: argparse.Namespace) -> int:
 
 def _compute(ranks: Ranks, study: Study, options: argparse.Namespace) -> int:
     from solver.outcome import COMPLETE
+    from studyrunner.checkpoint.store import Store
     from studyrunner.result.target import check_result
-    from studyrunner.run import RunOptions, compute_study, open_progress
+    from studyrunner.run import compute_study
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", path, study, overwrite=options.overwrite)
-    display, given = ProgressDisplay(), RunOptions(options.fresh, options.retry_failed, options.date)
-    with open_progress(target) as store:
-        outcomes = compute_study(ranks, study, target, store, given, display)
+    display = ProgressDisplay()
+    asked = {name: getattr(options, name) for name in ("fresh", "retry_failed", "date")}
+    with contextlib.closing(Store(target.progress)) as store:
+        outcomes = compute_study(ranks, study, target, store, display, **asked)
         # no other run replaces the result meanwhile
         answer = _answer(target.path)
     n_points, n_complete = outcomes.total(), sum(outcomes[number] for number in COMPLETE)
@@ -239,12 +231,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
-    """Options from the command line, by their names.
-
-    study: text. output, write_scene: paths or None. overrides: texts. date: checked, or None. The others are flags.
-
-    Raises UserError; SystemExit after --help, --new and the like.
-    """
+    """Options from the command line, by their names. Raises UserError; SystemExit after --help, --new and the like."""
     look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
     parser = _Parser("run-study", description=_DESCRIPTION, epilog=_EPILOG, **look)
     add, flag, path = parser.add_argument, dict[str, Any](action="store_true"), dict[str, Any](type=Path)
@@ -270,29 +257,25 @@ def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     if found.deck is not None and found.new is None:
         remedy = "give --new NAME beside it: the name of the new study"
         raise UserError("command line", "--from", str(found.deck), remedy)
-    if found.scene_help is not None or found.new is not None:
-        print(_scene_help(found.scene_help) if found.new is None else _new_study(found.new, found.deck), flush=True)
+    # below: imported where it is used, as it takes a second to load
+    if found.new is not None:
+        from studyrunner.study.keys import write_new_study
+
+        written = write_new_study(found.new, found.deck)
+        print(f"{written}: run-study {shlex.quote(str(written))} computes it", flush=True)
+        parser.exit()
+    if found.scene_help is not None:
+        from studies.scenes import BUNDLED, scene_help
+
+        if found.scene_help not in BUNDLED:
+            raise UserError("command line", "--scene-help", found.scene_help, f"give one of {', '.join(BUNDLED)}")
+        print(scene_help(found.scene_help), flush=True)
         parser.exit()
     if found.date is not None:
-        from studyrunner.result.provenance import check_date  # where it is used: it takes a second to load
+        from studyrunner.result.provenance import check_date
 
         found.date = check_date(found.date, "command line", "--date")
     return found
-
-
-def _scene_help(scene: str) -> str:
-    from studies.scenes import BUNDLED, scene_help
-
-    if scene not in BUNDLED:
-        raise UserError("command line", "--scene-help", scene, f"give one of {', '.join(BUNDLED)}")
-    return scene_help(scene)
-
-
-def _new_study(name: str, deck: Path | None) -> str:
-    from studyrunner.study.keys import write_new_study
-
-    path = write_new_study(name, deck)
-    return f"{path}: run-study {shlex.quote(str(path))} computes it"
 
 
 if __name__ == "__main__":

@@ -29,29 +29,21 @@ machines. Energy coefficients are Archard's over the friction coefficient, which
 _UNITS_OF_WEAR = {"1/MPa or mm2/N": 1e-6, "mm3/(N m) or mm3/J": 1e-9}
 _UNITS_OF_SPEED = {"rad/s": 30.0 / math.pi, "revolutions per second": 60.0}
 
-_FAR = 30.0
-"""Frequencies of an excitation are asked about from this ratio on, below the first resonance and above: the first six
-natural frequencies of a bundled sector are within 10."""
+_FAR = 30.0  # ratio to the first resonance from which a frequency is asked about: six of a sector are within 10
 
 
 def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> TaskPlan:
-    """Tasks of a study. Their order and numbers depend on the study alone.
-
-    scenes: of the study (`find_scenes`). facts: of each scene. Raises UserError where a sample draws a value that is
-    none, or blocks of a mission differ in their pairs.
+    """Tasks of a study. Their order and numbers depend on the study alone. facts: of each scene. Raises UserError where
+    a sample draws a value that is none, or blocks of a mission differ in their pairs.
     """
-    n_displacements = [each.n_displacements for each in facts]
-    contacts = contact_changes(study, scenes, facts)
-    if study.kind is MISSIONS:
-        return missions.build_tasks(study, scenes, n_displacements, contacts)
-    if study.kind is MODES:
-        return modes.build_tasks(study, scenes, n_displacements, contacts)
-    return wear_plan.build_tasks(study, scenes, n_displacements, contacts)
+    builders = {MISSIONS.name: missions.build_tasks, MODES.name: modes.build_tasks}
+    build = builders.get(study.kind.name, wear_plan.build_tasks)
+    return build(study, scenes, [each.n_displacements for each in facts], contact_changes(study, scenes, facts))
 
 
 def describe_tasks(tasks: Sequence[Task]) -> str:
     """Tasks in words."""
-    sweeps = Counter(task.direction == "ramp" for task in tasks if isinstance(task, Sweep))
+    sweeps = Counter(task.excitation.direction == "ramp" for task in tasks if isinstance(task, Sweep))
     n_results = Counter[type]()
     for task in tasks:
         # of a history those that are integrated
@@ -143,9 +135,8 @@ def _of_effort(
 
 
 def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str, ...]:
-    """A question for each key with values far off, as a unit that was mixed up: the value farthest off speaks for all.
-
-    Never a refusal. facts: of the scene, where it is built.
+    """A question, never a refusal, for each key with values far off, as a unit that was mixed up: the farthest speaks
+    for all. facts: of the scene, where it is built.
     """
     parts = [part for variant in study.variants or (study,) for part in (variant, *variant.block_studies)]
     table, until = study.wear.as_law.table, (study.slow_time.until or {}).get("wear_depth", 0.0)
@@ -179,7 +170,6 @@ def _question(
     key: str, values: Sequence[float], expected: tuple[str, float, float, Mapping[str, float]], why: str
 ) -> str:
     """A question for the value that is farthest off, and in which units it would be likely; "" where none is off.
-
     expected: unit of the key, the range that is not asked about, and factors of this unit, by name of another unit.
     """
     unit, low, high, units = expected
@@ -187,11 +177,10 @@ def _question(
     if not off:
         return ""
     worst = max(off, key=lambda value: max(value / high, low / value))
-    scaled = {name: worst * factor for name, factor in units.items()}
     likely = [
-        f"in {name} (then it is {value:.5g} {unit}".rstrip() + ")"
-        for name, value in scaled.items()
-        if low <= value <= high
+        f"in {name} (then it is {worst * factor:.5g} {unit}".rstrip() + ")"
+        for name, factor in units.items()
+        if low <= worst * factor <= high
     ]
     return f"{' '.join((key, f'{worst:.3g}', unit)).rstrip()} is {why}: is it {' or '.join(likely) or 'meant'}?"
 
@@ -201,8 +190,7 @@ def _frequencies(study: Study, parts: Sequence[Study]) -> list[float]:
     if not study.kind.counted or study.axes.frequency_ratio:
         return []
     own = [value for part in parts if not (study.mission and part.mission) for value in part.axes.frequency]
-    passages = [block.passage for block in study.mission if block.passage is not None]
-    return own + [end for passage in passages for end in (passage.start, passage.stop)]
+    return own + [end for block in study.mission if block.passage for end in (block.passage.start, block.passage.stop)]
 
 
 def _numbers(parts: Sequence[Study], name: str) -> list[float]:

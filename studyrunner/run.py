@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
@@ -21,60 +19,47 @@ from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import merge_facts
 from studyrunner.scene_building import Scenes, build_scenes
 from studyrunner.study.study import Study
-from studyrunner.system.files import remove_leftovers
+from studyrunner.system.machine import remove_leftovers
 from studyrunner.system.process import begin_ending, is_ending
 from studyrunner.system.progress import ProgressDisplay, count
 from studyrunner.task_runs import StudyRun, evaluator
 from studyrunner.user_error import show_text
 
 
-@dataclass(frozen=True)
-class RunOptions:
-    """What a run does with earlier results, and the date in the file, as `check_date` gives it; None for none.
-
-    fresh: whether the run begins anew. retry_failed: whether failed points are computed again. again: what goes on
-    after an end from outside, in words.
-    """
-
-    fresh: bool = False
-    retry_failed: bool = False
-    date: str | None = None
-    again: str = "the same command"
-
-
-@contextlib.contextmanager
-def open_progress(target: Target) -> Iterator[Store]:
-    """The file of the progress beside a result, open for a run; no other run writes the result meanwhile.
-
-    Raises UserError where another run uses the file, and StorageError.
-    """
-    path = target.progress
-    with contextlib.closing(Store(path)) as store:
-        remove_leftovers(path)
-        remove_leftovers(target.path)
-        try:
-            yield store
-        finally:
-            with contextlib.suppress(OSError):
-                # what the ranks have mapped
-                remove_leftovers(path)
-
-
 def compute_study(
-    ranks: Ranks, study: Study, target: Target, store: Store, options: RunOptions, display: ProgressDisplay
+    ranks: Ranks,
+    study: Study,
+    target: Target,
+    store: Store,
+    display: ProgressDisplay,
+    *,
+    fresh: bool = False,
+    retry_failed: bool = False,
+    date: str | None = None,
 ) -> Counter[int]:
     """Rank 0: computes a study together with the other ranks, writes its result, and counts the points of each outcome.
 
-    target: as `check_result` gives it; a finished result is replaced by one without missing points only. store: of
-    `open_progress`. display: what the user sees. Raises UserError where a scene is wrong; StorageError where something
-    cannot be written; KeyboardInterrupt where the run is ended from outside, with what is left in words, after finished
-    points have been written.
+    target: as `check_result` gives it; a finished result is replaced by one without missing points only. store: the
+    open file of its progress: while it is open no other run writes the result. fresh: whether the run begins anew.
+    retry_failed: whether failed points are computed again. date: as `check_date` gives it.
+
+    Raises UserError where a scene is wrong; StorageError where something cannot be written; KeyboardInterrupt where the
+    run is ended from outside, with what is left in words, after finished points have been written.
     """
+    remove_leftovers(target.path)
     scenes = build_scenes(ranks, study, store, display.step)
     facts = merge_facts(scenes.facts)
     attributes = {**describe_run(study, facts), **({} if scenes.stored is None else scenes.stored.origin)}
-    attributes |= describe_date(options.date)
-    completion = _open_completion(study, scenes, store, facts, options)
+    attributes |= describe_date(date)
+    plan = build_tasks(study, scenes.scenes, scenes.facts)
+    completion = CompletionIndex(study, plan, facts, [each.digest for each in scenes.facts], store)
+    store.note_study(identity_of(study.study.name, study.scene.model))
+    if fresh:
+        completion.forget_all()
+    if retry_failed:
+        completion.forget_failed()
+    completion.give_up_crashed()
+    store.flush()
 
     def write() -> Counter[int]:
         # netCDF4 takes a moment to load: after the other ranks have got their last task
@@ -89,10 +74,9 @@ def compute_study(
     with display:
         for line in _notes(ranks, study, scenes, store, facts):
             display.say(line)
-        n_points = completion.plan.n_points
-        if n_found := completion.n_points_finished:
-            display.say(f"from an earlier run: {n_found} of {count(n_points, 'point')}")
         run = StudyRun(completion, scenes.models, display)
+        if run.n_points:
+            display.say(f"from an earlier run: {run.n_points} of {count(plan.n_points, 'point')}")
         try:
             if run.tasks:
                 display.say(f"computing {describe_tasks(run.tasks)}")
@@ -104,9 +88,9 @@ def compute_study(
                 raise
         outcomes = write()
         if n_left := outcomes[Outcome.NOT_COMPUTED]:
-            name, done = target.path.name, f"{n_points - n_left} of {count(n_points, 'point')}"
+            name, done = target.path.name, f"{plan.n_points - n_left} of {count(plan.n_points, 'point')}"
             unchanged = f"{done} are kept, {name} is the finished result that it was" if target.finished else ""
-            raise KeyboardInterrupt(f"interrupted: {unchanged or f'{name} holds {done}'}, {options.again} goes on")
+            raise KeyboardInterrupt(f"interrupted: {unchanged or f'{name} holds {done}'}, the same command goes on")
         return outcomes
 
 
@@ -117,19 +101,3 @@ def _notes(ranks: Ranks, study: Study, scenes: Scenes, store: Store, facts: Scen
     yield from (f"{show_text(study.source)}: {text}" for text in compare_with_archived(study, facts.digest))
     yield from (*store.notes, *scenes.notes, *doubts_of_study(study, facts))
     yield from (f"{label}: {text}" for label, text in remarks_of_study(study))
-
-
-def _open_completion(
-    study: Study, scenes: Scenes, store: Store, facts: SceneFacts, options: RunOptions
-) -> CompletionIndex:
-    """The tasks of a study, and what of them is finished and wanted. facts: of all scenes."""
-    plan = build_tasks(study, scenes.scenes, scenes.facts)
-    completion = CompletionIndex(study, plan, facts, [each.digest for each in scenes.facts], store)
-    store.note_study(identity_of(study.study.name, study.scene.model))
-    if options.fresh:
-        completion.forget_all()
-    if options.retry_failed:
-        completion.forget_failed()
-    completion.give_up_crashed()
-    store.flush()
-    return completion

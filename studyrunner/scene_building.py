@@ -1,7 +1,7 @@
 """The scenes of a run: each built once, by rank 0 or, where there are several, by all ranks side by side.
 
 They are stored in the file of the run. A task brings the model to a rank that does not have it: as a file that the
-ranks map (`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
+ranks map (`write_mapped`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from studies.scene import Progress
 from studyrunner.checkpoint.store import COMPUTED, Store
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.mpi.mapped_file import MappedFile, write_mapped
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.scene import answers
@@ -27,7 +26,7 @@ from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
 from studyrunner.study.mistakes import keys_as_given
 from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
-from studyrunner.system.files import new_partial
+from studyrunner.system.machine import MappedFile, new_partial, write_mapped
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:

@@ -13,98 +13,87 @@ from solver.outcome import Outcome, describe_error
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Keep, PointResult, Result, StartResult, Task
-from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Run, TaskHandler
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task, hold_models
-from studyrunner.system.machine import MachineFaultError, is_machine_fault
+from studyrunner.system.machine import MachineFaultError, MappedFile, is_machine_fault, open_mapped
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
 
-Models = Mapping[int, "ReducedModel"]
-
 _LATE = 0.3
-"""Expected further time of a task that takes longer than estimated, over the time that it is late. For an estimate with
-an uncertainty factor of two the mean further time is this fraction."""
-
-
-def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
-    """The results of a task, one by one. models: by number of the scene."""
-    return task.compute(models, keep)
+"""Expected further time of a late task over its time: the mean, for estimates to a factor of two."""
 
 
 def evaluator() -> Run:
-    """The function that does tasks on a rank, and builds scenes.
-
-    A task that breaks off gives failed results; the other tasks go on. A fault of the machine raises MachineFaultError.
-    """
+    """The function that does tasks on a rank, and builds scenes. A fault of the machine raises MachineFaultError."""
     models: ModelCache[tuple[ReducedModel, ...]] = OrderedDict()
-
-    def own_models(task: Task) -> Models:
-        # first of all: rank 0 sends the models once, also where the task breaks off
-        if task.models:
-            given = tuple(open_mapped(each) if isinstance(each, MappedFile) else each for each in task.models)
-        elif task.scenes in models:
-            given = models[task.scenes]
-        else:
-            raise RuntimeError(f"no model of scene {task.scenes} for {task}")
-        hold_models(models, task.scenes, given)
-        return dict(zip(task.scenes, given, strict=True))
 
     def evaluate(task: Task | SceneTask, keep: Callable[[object], None]) -> Iterator[Result | SceneBuilt]:
         if isinstance(task, SceneTask):
             yield from build_scene_task(task, keep)
             return
-        own, left, last, is_limited = own_models(task), dict.fromkeys(task.places), task.resume, False
-
-        def keep_last(progress: Packed | str) -> None:
-            nonlocal last
-            last = progress if isinstance(progress, Packed) else last
-            keep(progress)
-
-        try:
-            for result in compute_task(replace(task, models=()), own, keep_last):
-                if isinstance(result, PointResult):
-                    outcome, message = result.values["outcome"], result.values["message"]
-                    if outcome == Outcome.EXCEPTION and is_machine_fault(message):
-                        # the solver takes whatever breaks it off for an end
-                        raise MachineFaultError(message)
-                    # a history that its time limit has ended goes on from there when it gets more
-                    is_limited = is_limited or outcome == Outcome.TIME_LIMIT
-                    result = replace(result, progress=last) if is_limited else result
-                left.pop(result.place, None)
-                yield result
-        except Exception as error:
-            # An exception from a signal is no failure of the task.
-            raise_ending()
-            message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
-            if isinstance(error, MachineFaultError) or is_machine_fault(message):
-                raise MachineFaultError(f"{message}, on {platform.node()}") from error
-            for place in left:
-                yield task.failed(place, Outcome.EXCEPTION, message)
+        # first of all: rank 0 sends the models once, also where the task breaks off
+        if task.models:
+            own = tuple(open_mapped(each) if isinstance(each, MappedFile) else each for each in task.models)
+        else:
+            own = models[task.scenes]
+        hold_models(models, task.scenes, own)
+        yield from _compute(task, dict(zip(task.scenes, own, strict=True)), keep)
 
     return evaluate
 
 
-class TaskProgress(TaskHandler):
-    """State of the tasks of a study, and the tasks that results make possible. Results go to `completion`.
+def _compute(task: Task, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[Result]:
+    """All results of a task, failed ones in place of those that it does not give."""
+    left, last, is_limited = dict.fromkeys(task.places), task.resume, False
 
-    A wear history becomes possible with its start state, while the sweep goes on. Results of a task do not depend on
-    the order. tasks: those that are left, whether they are possible or not. n_points: that are finished.
+    def keep_last(progress: Packed | str) -> None:
+        nonlocal last
+        last = progress if isinstance(progress, Packed) else last
+        keep(progress)
+
+    try:
+        for result in task.compute(models, keep_last):
+            if isinstance(result, PointResult):
+                outcome, message = result.values["outcome"], result.values["message"]
+                if outcome == Outcome.EXCEPTION and is_machine_fault(message):
+                    # the solver takes whatever breaks it off for an end
+                    raise MachineFaultError(message)
+                # a history that its time limit has ended goes on from there when it gets more
+                is_limited = is_limited or outcome == Outcome.TIME_LIMIT
+                result = replace(result, progress=last) if is_limited else result
+            left.pop(result.place, None)
+            yield result
+    except Exception as error:
+        # An exception from a signal is no failure of the task.
+        raise_ending()
+        message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
+        if isinstance(error, MachineFaultError) or is_machine_fault(message):
+            raise MachineFaultError(f"{message}, on {platform.node()}") from error
+        for place in left:
+            yield task.failed(place, Outcome.EXCEPTION, message)
+
+
+class StudyRun(TaskHandler):
+    """Rank 0 while the tasks of a study are done: their state, and the tasks that results make possible.
+
+    A wear history becomes possible with its start state, while the sweep goes on. Results go to `completion`. models:
+    for the ranks that do not have them. tasks: those that are left. n_points: that are finished.
     """
 
-    def __init__(self, completion: CompletionIndex) -> None:
+    def __init__(self, completion: CompletionIndex, models: SceneModels, display: ProgressDisplay) -> None:
         super().__init__()
         self.n_points = completion.n_points_finished
-        self._completion = completion
+        self._completion, self._models, self._display = completion, models, display
         self._sweeps = completion.sweeps_left()
         self.tasks = [*self._sweeps, *(task for task in completion.plan.results if not completion.is_finished(task))]
         self._n_given: Counter[str] = Counter()
         self._words: dict[str, str] = {}  # where a task is
         self._suspects: list[Task] = []  # they wait for the one that is under way
         self._tried = ""
+        self._n_compiled: int | None = n_compiled()
         self._left: dict[str, float] = defaultdict(float)  # estimated seconds, by group
         for task in self.tasks:
             self._left[task.group] += task.cost
@@ -115,6 +104,11 @@ class TaskProgress(TaskHandler):
         for sweep, result in self._completion.known_starts():
             yield from self._without_suspects(self._start(sweep, result))
         yield from self._without_suspects(self._completion.waiting_for(None))
+
+    def prepare(self, rank: int, task: Task, *, unseen: bool = False) -> Task:
+        """The task with the models that the rank does not have."""
+        self._completion.store.note_begin(task.key)
+        return self._models.with_model(rank, task, unseen=unseen)
 
     def take(self, task: Task, result: Result) -> Sequence[Task]:
         """Takes a result; returns tasks that the result makes possible."""
@@ -133,31 +127,38 @@ class TaskProgress(TaskHandler):
 
     def keep(self, task: Task, progress: object) -> None:
         """Takes the progress of a task as `Keep` does."""
-        if isinstance(progress, str):
-            self._words[task.key] = progress
-        else:
+        if isinstance(progress, Packed):
             self._completion.keep(task, progress)
+        else:
+            self._words[task.key] = str(progress)
+
+    def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
+        """Writes and shows what is due."""
+        if self._n_compiled is not None and n_compiled() > self._n_compiled:
+            self._n_compiled = None
+            self._display.say("the solver is compiled for this machine, once after an installation")
+        self._completion.store.tick()
+        self._display.tick(lambda: self.look(running()))
 
     def look(self, running: Sequence[tuple[Task, int, float]]) -> Standing:
         """State of the tasks. running: as `Dispatcher.running`."""
         factors = {group: self.costs.correction(((group,),)) for group in self._left}
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
         done, longest = sum(self.costs.sums.get(group, (0.0, 0.0, 0))[0] for group in factors), 0.0
-        for task, _, elapsed in running:
+        names = []
+        for task, n_left, elapsed in running:
             expected = task.cost / task.n_results * factors[task.group]
             still = max(expected - elapsed, _LATE * elapsed)
             left, done, longest = left + still - expected, done + elapsed, max(longest, still)
+            words = f" ({self._words[task.key]})" if task.key in self._words else ""
+            names.append(task.describe(task.places[task.n_results - n_left]) + words)
         return Standing(
             n_done=self.n_points,
             n_points=self._completion.plan.n_points,
             share=done / max(done + left, 1e-9),
             seconds_left=max(longest, left / max(1, len(running))),
-            running=tuple(self._describe(task, n_left) for task, n_left, _ in running),
+            running=tuple(names),
         )
-
-    def _describe(self, task: Task, n_left: int) -> str:
-        what = task.describe(task.places[task.n_results - n_left])
-        return f"{what} ({self._words[task.key]})" if task.key in self._words else what
 
     def _start(self, sweep: Task, result: StartResult) -> Sequence[Task]:
         """The tasks that begin from a start state, whose cost is known better now."""
@@ -172,32 +173,10 @@ class TaskProgress(TaskHandler):
         """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""
         now = []
         for task in tasks:
-            is_suspect = self._completion.is_suspect(task)
+            is_suspect = task.key in self._completion.store.crashes
             if is_suspect and self._tried not in ("", task.key):
                 self._suspects.append(task)
             else:
                 self._tried = task.key if is_suspect else self._tried
                 now.append(task)
         return now
-
-
-class StudyRun(TaskProgress):
-    """Rank 0 while the tasks of a study are done: results are saved, and the user sees how far they are."""
-
-    def __init__(self, completion: CompletionIndex, models: SceneModels, display: ProgressDisplay) -> None:
-        super().__init__(completion)
-        self._store, self._models, self._display = completion.store, models, display
-        self._n_compiled: int | None = n_compiled()
-
-    def prepare(self, rank: int, task: Task, *, unseen: bool = False) -> Task:
-        """The task with the models that the rank does not have."""
-        self._store.note_begin(task.key)
-        return self._models.with_model(rank, task, unseen=unseen)
-
-    def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
-        """Writes and shows what is due."""
-        if self._n_compiled is not None and n_compiled() > self._n_compiled:
-            self._n_compiled = None
-            self._display.say("the solver is compiled for this machine, once after an installation")
-        self._store.tick()
-        self._display.tick(lambda: self.look(running()))

@@ -5,7 +5,6 @@ By hand: `rich` takes five control characters out of a text, and leaves those th
 
 from __future__ import annotations
 
-import errno
 import json
 import re
 from collections.abc import Mapping
@@ -13,15 +12,9 @@ from dataclasses import dataclass
 from datetime import date, time
 from pathlib import Path
 
-_LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
+_LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_REMEDY = 80, 240, 600
 _MOST_LINES = 20
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-
-_REMEDIES = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room there"),
-    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), "see that it may be written"),
-    errno.EIO: "see whether the disk, or the way to it, is at fault",
-}
 
 
 @dataclass(eq=False, repr=False)
@@ -50,7 +43,7 @@ class UserError(Exception):
         return "\n".join(lines[:_MOST_LINES] + more)
 
     def _line(self) -> str:
-        key = _cut(show_text(self.key), _LONGEST_KEY)
+        key = _cut(show_text(self.key), _LONGEST_VERBATIM)
         # a sentence stands for itself, a value stands behind its key
         is_sentence = isinstance(self.value, Verbatim) and (" " in self.value or self.value == "missing")
         is_sentence = is_sentence and str(self.value)[0].isalpha()
@@ -60,16 +53,13 @@ class UserError(Exception):
 
 
 class StorageError(Exception):
-    """A file of a run cannot be written or read: ends the run with exit status 1 and one line.
-
-    What was written before is kept, and the same command goes on from there. remedy: what would help, "" for what helps
-    against that error.
+    """A file of a run cannot be written or read: ends the run with exit status 1 and one line. What was written before
+    is kept. remedy: what would help, where it is not what mostly helps.
     """
 
     def __init__(self, path: Path, error: Exception, remedy: str = "") -> None:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        number = error.errno if isinstance(error, OSError) else None
-        remedy = remedy or f"{_REMEDIES.get(number or 0, 'mend that')} or give another result file with -o"
+        remedy = remedy or "see that there is room, and that it may be written, or give another result file with -o"
         super().__init__(
             f"{show_text(str(path))}: {show_text(reason)}: {remedy};"
             " what was computed is kept, and the same command goes on from it"
@@ -83,7 +73,6 @@ class Verbatim(str):
 class WrongValueError(ValueError):
     """A value that a check of one key refuses; the reader of the study adds the file and the key.
 
-    value: the offending part of what stands there. remedy: what would be right.
     key: dotted name below that key, where a rule between keys refuses it.
     """
 

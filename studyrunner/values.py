@@ -32,10 +32,8 @@ class Wrong(NamedTuple):
 
 
 class Section(BaseModel):
-    """A table of the study file: frozen, unknown keys are errors, numbers are finite.
-
-    AXES: keys that may also stand under [axes]. EXTRA: class of the values of keys that are names of something, and how
-    one looks.
+    """A table of the study file: frozen, unknown keys are errors, numbers are finite. AXES: keys that may also stand
+    under [axes]. EXTRA: class of the values of keys that are names of something, and how one looks.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

@@ -141,7 +141,7 @@ def test_a_run_that_is_interrupted_goes_on(tmp_path, monkeypatch):
             raise KeyboardInterrupt
 
     solver.disturb = interrupt
-    with pytest.raises(KeyboardInterrupt, match=r"out.nc holds 1 of 2 points, the same call goes on"):
+    with pytest.raises(KeyboardInterrupt, match=r"out.nc holds 1 of 2 points, the same command goes on"):
         run_study("sdof_slider", path, overrides=SMALL, progress=False)
     with open_result(path) as partly:
         assert sorted(partly.outcome.values.ravel()) == [Outcome.CONVERGED, Outcome.NOT_COMPUTED]

@@ -1,7 +1,4 @@
-"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the file of a run.
-
-The record of a result is one element of an array of numpy with all values of the result.
-"""
+"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the file of a run."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
+from studyrunner.checkpoint.store import PROGRESS, RESULTS, Store
 from studyrunner.kinds.task import Identity, PointResult, Result, StartResult, Task, TaskPlan, digest
 from studyrunner.scene.scene import SceneFacts, record_fields
 from studyrunner.study.study import Study
@@ -27,11 +24,11 @@ tasks are tried one after the other, so that another task is seldom to blame."""
 class CompletionIndex:
     """Results and start states of a plan, in a file that may contain those of earlier runs and of other studies.
 
-    plan: its tasks have keys. kind: data type of the record of a point, which holds all values of a result.
+    facts: of all scenes, see `merge_facts`. scenes: hash of the model of each. plan: its tasks have keys.
+    kind: data type of the record of a point, an element of an array of numpy with all values of its result.
     """
 
     def __init__(self, study: Study, plan: TaskPlan, facts: SceneFacts, scenes: Sequence[str], store: Store) -> None:
-        """facts: of all scenes, see `merge_facts`. scenes: hash of the model of each."""
         self.store = store
         self.kind = np.dtype(record_fields(study, facts))
         empty = np.zeros(1, dtype=self.kind)
@@ -44,7 +41,7 @@ class CompletionIndex:
 
     def _missing(self, task: Task) -> list[int]:
         """Places of a task whose result is not there."""
-        there = self.store.keys(STARTS if task.gives_starts else RESULTS)
+        there = self.store.keys(RESULTS)
         return [place for place, name in enumerate(task.names) if name not in there]
 
     def is_finished(self, task: Task) -> bool:
@@ -52,10 +49,7 @@ class CompletionIndex:
         return not self._missing(task)
 
     def read_results(self, names: Sequence[str]) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
-        """Records (n,) of the results with these hashes, and whether each exists; else NaN, or 0 in whole numbers.
-
-        Raises StorageError where the disk fails.
-        """
+        """Records (n,) of the results with these hashes, whether each exists; else NaN, or 0. Raises StorageError."""
         contents = np.frombuffer(bytearray(self._empty * len(names)), np.uint8).reshape(len(names), -1)
         there, first = np.zeros(len(names), np.bool_), dict[str, int]()
         for place, name in enumerate(names):
@@ -73,50 +67,42 @@ class CompletionIndex:
         left = sum(len(task.points(place)) for task in self.plan.results for place in self._missing(task))
         return self.plan.n_points - left
 
-    def _left(self, task: Task, needed: Collection[int] | None = None) -> Task | None:
-        """What is left of a task, with its progress; None for nothing. needed: places; None for all."""
-        left = {place for place in self._missing(task) if needed is None or place in needed} - task.known
-        if not left:
-            return None
-        return replace(task, known=frozenset(task.order) - left, resume=self.store.read(PROGRESS, task.key))
+    def _left(self, task: Task, needed: Collection[int]) -> Iterator[Task]:
+        """What is left of a task, with its progress; none where nothing is. needed: places."""
+        left = {place for place in self._missing(task) if place in needed}
+        if left:
+            yield replace(task, skipped=frozenset(task.order) - left, resume=self.store.read(PROGRESS, task.key))
 
     def sweeps_left(self) -> list[Task]:
         """Sweeps with start states that are needed and not known."""
-        left = (self._left(sweep, self._needed(sweep)) for sweep in self.plan.sweeps)
-        return [sweep for sweep in left if sweep is not None]
+        return [left for sweep in self.plan.sweeps for left in self._left(sweep, self._needed(sweep))]
 
     def waiting_for(self, start: tuple[int, int] | None) -> list[Task]:
         """Unfinished tasks that begin from a start state; None: from none. start: number of the sweep and place."""
-        tasks = self.plan.results if start is None else self.plan.waiting.get(start, ())
-        left = (self._left(task) for task in tasks if start is not None or task.waits_for is None)
-        return [task for task in left if task is not None]
+        return [left for task in self.plan.waiting.get(start, ()) for left in self._left(task, task.order)]
 
     def known_starts(self) -> Iterator[tuple[Task, StartResult]]:
         """Known start states that are needed, with their sweeps."""
         for sweep in self.plan.sweeps:
-            needed = self._needed(sweep)
-            for place, name in enumerate(sweep.names):
-                if place in needed and (start := self.store.read(STARTS, name)) is not None:
+            for place in self._needed(sweep):
+                if (start := self.store.read(RESULTS, sweep.names[place])) is not None:
                     yield sweep, StartResult.unpack(place, start)
 
-    def _needed(self, sweep: Task) -> frozenset[int]:
+    def _needed(self, sweep: Task) -> list[int]:
         """Places of a sweep from which a task is still to begin."""
         waiting = self.plan.waiting
-        return frozenset(
-            place for place in sweep.order if not all(map(self.is_finished, waiting.get((sweep.number, place), ())))
-        )
+        return [
+            place
+            for place in range(len(sweep.names))
+            if not all(map(self.is_finished, waiting.get((sweep.number, place), ())))
+        ]
 
     def add(self, task: Task, result: Result) -> None:
         """Adds a result. What progress there was is forgotten with the last one, but for a history without time."""
-        name = task.names[result.place]
-        progress = None
-        if isinstance(result, StartResult):
-            self.store.put(STARTS, name, result.pack())
-        else:
-            self.store.put(RESULTS, name, Packed("", (self._record(result),)))
-            progress = result.progress
-        if progress is not None:
-            self.keep(task, progress)
+        packed = result.pack() if isinstance(result, StartResult) else Packed("", (self._record(result),))
+        self.store.put(RESULTS, task.names[result.place], packed)
+        if isinstance(result, PointResult) and result.progress is not None:
+            self.keep(task, result.progress)
         elif self.is_finished(task):
             self.store.forget(PROGRESS, task.key)
         self.store.note_life(task.key)
@@ -129,10 +115,8 @@ class CompletionIndex:
             records[name][0:1][(slice(None), *own)] = values
         return records.view(np.uint8)
 
-    def keep(self, task: Task, progress: object) -> None:
+    def keep(self, task: Task, progress: Packed) -> None:
         """Adds the progress of a task."""
-        if not isinstance(progress, Packed):
-            raise TypeError(f"{progress!r} is no progress of {task}")
         self.store.put(PROGRESS, task.key, progress)
         self.store.note_life(task.key)
 
@@ -141,10 +125,10 @@ class CompletionIndex:
         without_state: set[tuple[int, int] | None] = set()
         for sweep in self.plan.sweeps:
             for place, name in enumerate(sweep.names):
-                start = self.store.read(STARTS, name)
+                start = self.store.read(RESULTS, name)
                 if start is not None and StartResult.unpack(place, start).n_unknowns == 0:
                     without_state.add((sweep.number, place))
-                    self.store.forget(STARTS, name)
+                    self.store.forget(RESULTS, name)
                     self.store.forget(PROGRESS, sweep.key)
         for task in self.plan.results:
             for name, record, is_there in zip(task.names, *self.read_results(task.names), strict=True):
@@ -155,18 +139,13 @@ class CompletionIndex:
         """Forgets all points of this study. Results of other studies stay."""
         for task in (*self.plan.sweeps, *self.plan.results):
             for name in task.names:
-                self.store.forget(STARTS if task.gives_starts else RESULTS, name)
+                self.store.forget(RESULTS, name)
             self.store.forget(PROGRESS, task.key)
             self.store.note_life(task.key)
 
-    def is_suspect(self, task: Task) -> bool:
-        """Whether a run has crashed or was killed while this task was under way and had given nothing."""
-        return task.key in self.store.crashes
-
     def give_up_crashed(self) -> None:
-        """Marks tasks as failed with which too many runs have ended: no other run tries them.
-
-        A sweep ends before the first of its start states that is not there.
+        """Marks tasks as failed with which too many runs have ended, of a sweep those that wait for it: no other run
+        tries them.
         """
         message = f"{MOST_CRASHES} runs in a row have crashed or were killed while they were at it"
         given_up = {key for key, number in self.store.crashes.items() if number >= MOST_CRASHES}

@@ -1,14 +1,13 @@
 """What a study has computed so far, in one SQLite file beside the result, from which a later run goes on.
 
-The file has one table with the columns kind, key and blob. Rank 0 alone uses the file. What arrives within a moment
-goes into one transaction. A rollback journal and an exclusive lock share no memory with other processes, as WAL does:
-this works on file systems of a network. With `synchronous=FULL` a finished transaction survives a power cut.
+Rank 0 alone uses the file. What arrives within a moment goes into one transaction. A rollback journal and an exclusive
+lock share no memory with other processes, as WAL does: this works on file systems of a network. With `synchronous=FULL`
+a finished transaction survives a power cut.
 """
 
 from __future__ import annotations
 
 import contextlib
-import errno
 import json
 import os
 import socket
@@ -24,39 +23,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
-from studyrunner.system.files import sync_folder
+from studyrunner.system.machine import remove_leftovers, sync_folder
 from studyrunner.system.process import uninterrupted
 from studyrunner.user_error import StorageError, UserError, Verbatim
 
-STARTS, PROGRESS, RESULTS, COMPUTED = "start", "progress", "result", "computed"
-"""Kinds of entries: start states; progress of tasks; results of points; what is computed once for a
-study, by the hash of its inputs."""
+RESULTS, PROGRESS, COMPUTED = "result", "progress", "computed"
+"""Kinds of entries: results of tasks, start states among them; progress of tasks; what is computed once for a study, by
+the hash of its inputs."""
 
-LARGEST = 9 * 10**8
-"""Largest size of an entry, bytes. SQLite has no larger ones."""
-
-SECONDS_A_TRANSACTION = 0.25
-"""Longest time, s, that an entry waits for others that go into the same transaction, on a disk that is fast."""
-
+_LARGEST = 9 * 10**8  # bytes of an entry: SQLite has no larger ones
+_SECONDS_A_TRANSACTION = 0.25  # that an entry waits for others at most, on a disk that is fast
 _SHARE_OF_WRITING = 0.1  # of the time of rank 0, on a disk that is slow
 _BYTES_A_TRANSACTION = 8e6
-_HEAD_BYTES = 8
 _LEVEL = 1  # of zlib: the rank that compresses hands out the tasks as well
 _SECONDS_TO_DIE = 5.0  # after which all ranks of a run that was killed have noticed
-_PAUSE = 0.1
-_UNDER_WAY, _CRASHES = "under way", "crashes"  # kinds of entries by the key of a task; the second are numbers
-_STUDY, _OPEN = "study", "open"  # keys of the entries about the file itself: words on its study, and on the run
-_FILE = "file"  # kind of these entries
+_FILE, _STUDY, _OPEN = "file", "study", "open"  # kind and keys of the entries about the file: its study, and its run
+_CRASHES = "crashes"  # kind of the entries with the number of crashes of a task, by its key
 _SCHEMA = "CREATE TABLE entries (kind TEXT NOT NULL, key TEXT NOT NULL, blob BLOB NOT NULL, PRIMARY KEY (kind, key))"
-_MARKS = {"application_id": int.from_bytes(b"wear", "big"), "user_version": 5}
+_ONE = "SELECT blob FROM entries WHERE kind=? AND key=?"
+_MARKS = {"application_id": int.from_bytes(b"wear", "big"), "user_version": 6}
 _PRAGMAS = ("trusted_schema=OFF", "temp_store=MEMORY", "locking_mode=EXCLUSIVE", "synchronous=FULL")
 _DAMAGES = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_FORMAT)
-_FAULTS = {
-    sqlite3.SQLITE_FULL: errno.ENOSPC,
-    sqlite3.SQLITE_IOERR: errno.EIO,
-    sqlite3.SQLITE_READONLY: errno.EACCES,
-    sqlite3.SQLITE_CANTOPEN: errno.EACCES,
-}
 
 
 class _OtherFileError(Exception):
@@ -64,24 +51,23 @@ class _OtherFileError(Exception):
 
 
 def to_blob(packed: Packed) -> bytes:
-    """The text, type and shape of the arrays of a value as JSON, then their bytes, compressed by zlib.
+    """The text, type and shape of the arrays of a value as JSON in a line, then their bytes, compressed by zlib.
 
     By hand: `numpy.lib.format` takes five times as long for the small arrays of a result. Raises TypeError for arrays
     of objects: a bug.
     """
     if any(array.dtype.hasobject for array in packed.arrays):
         raise TypeError("arrays of objects are not kept")
-    head = json.dumps([packed.text, [[array.dtype.str, array.shape] for array in packed.arrays]]).encode()
-    raw = (len(head).to_bytes(_HEAD_BYTES, "little"), head, *(array.tobytes() for array in packed.arrays))
+    head = json.dumps([packed.text, [[array.dtype.str, array.shape] for array in packed.arrays]])
+    raw = (head.encode(), b"\n", *(array.tobytes() for array in packed.arrays))
     return zlib.compress(b"".join(raw), _LEVEL)
 
 
 def from_blob(blob: bytes) -> Packed:
     """The value of `to_blob`. Raises ValueError, TypeError or zlib.error where the bytes are no such value."""
     raw = zlib.decompress(blob)
-    place = _HEAD_BYTES + int.from_bytes(raw[:_HEAD_BYTES], "little")
-    text, layout = json.loads(raw[_HEAD_BYTES:place])
-    arrays = []
+    arrays, place = [], raw.index(b"\n") + 1
+    text, layout = json.loads(raw[:place])
     for kind, shape in layout:
         array: NDArray[np.generic] = np.ndarray(tuple(shape), np.dtype(kind), raw, place)
         arrays.append(array.copy())
@@ -101,8 +87,8 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.notes: list[str] = []
-        self._next_write = 0.0
-        self._n_bytes = 0  # in the open transaction
+        self._next_write, self._n_bytes = 0.0, 0  # bytes in the open transaction
+        self._under_way: set[str] = set()
         self._keys: dict[str, set[str]] = defaultdict(set)
         with _storage_errors(path):
             try:
@@ -117,13 +103,10 @@ class Store:
             self._file = path.stat().st_ino
             for kind, key in self._database.execute("SELECT kind, key FROM entries"):
                 self._keys[kind].add(key)
+            counts = self._database.execute("SELECT key, blob FROM entries WHERE kind=?", [_CRASHES])
+            self.crashes = {key: int(number) for key, number in counts}
+            remove_leftovers(path)
         self.ended_hard = _OPEN in self._keys[_FILE]
-        counts = _words(self._database, _CRASHES)
-        self.crashes = {key: int(number) for key, number in counts.items() if number.isdecimal()}
-        for key in tuple(self._keys[_UNDER_WAY]):
-            self.crashes[key] = self.crashes.get(key, 0) + 1
-            self._write(_CRASHES, key, str(self.crashes[key]).encode())
-            self.forget(_UNDER_WAY, key)
         self._write(_FILE, _OPEN, f"process {os.getpid()} on {socket.gethostname()}".encode())
         self.flush()
 
@@ -133,25 +116,25 @@ class Store:
         self.flush()
 
     def note_begin(self, key: str) -> None:
-        """Notes that a rank is about to do a task. After a run that has ended hard this is on the disk at once."""
-        self._write(_UNDER_WAY, key, b"")
+        """Counts a crash of a task that a rank is about to do, until `note_life` or `close` takes it back; on the disk
+        at once where the run before has ended hard.
+        """
+        self._under_way.add(key)
+        self._write(_CRASHES, key, b"%d" % (self.crashes.get(key, 0) + 1))
         if self.ended_hard:
             self.flush()
 
     def note_life(self, key: str) -> None:
         """Notes that a task has given something: it has not ended the run, nor the runs before."""
         self.crashes.pop(key, None)
-        self.forget(_UNDER_WAY, key)
+        self._under_way.discard(key)
         self.forget(_CRASHES, key)
 
     def put(self, kind: str, key: str, packed: Packed) -> None:
-        """Adds an entry, in place of an earlier one; nothing where an entry that only saves time is too large.
-
-        Raises StorageError.
-        """
-        if packed.n_bytes <= LARGEST:
+        """Adds an entry, or replaces it; none that only saves time and is too large. Raises StorageError."""
+        if packed.n_bytes <= _LARGEST:
             self._write(kind, key, to_blob(packed))
-        elif kind not in (PROGRESS, COMPUTED):
+        elif kind == RESULTS:
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
 
     def keys(self, kind: str) -> Collection[str]:
@@ -163,8 +146,7 @@ class Store:
         if key not in self._keys[kind]:
             return None
         with _storage_errors(self.path):
-            query = "SELECT blob FROM entries WHERE kind=? AND key=?"
-            (blob,) = self._database.execute(query, [kind, key]).fetchone() or (b"",)
+            (blob,) = self._database.execute(_ONE, [kind, key]).fetchone() or (b"",)
         with contextlib.suppress(zlib.error, ValueError, TypeError):
             return from_blob(blob)
         self.forget(kind, key)
@@ -204,71 +186,59 @@ class Store:
             self._database.commit()
             self._n_bytes = 0
         now = time.monotonic()
-        self._next_write = now + max(SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
+        self._next_write = now + max(_SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
 
     def close(self) -> None:
-        """Writes what waits, as far as there is room, and closes the file. A file without a study is removed."""
+        """Writes what waits, as far as there is room, and closes the file. A file without a study is removed, and what
+        the ranks have mapped.
+        """
         # an error was said before, or there is nothing that waits for an answer
         with contextlib.suppress(StorageError):
-            for key in tuple(self._keys[_UNDER_WAY]):
-                self.forget(_UNDER_WAY, key)
+            for key in self._under_way:
+                self.forget(_CRASHES, key)
+                if key in self.crashes:
+                    self._write(_CRASHES, key, b"%d" % self.crashes[key])
             self.forget(_FILE, _OPEN)
             self.flush()
-        with contextlib.suppress(sqlite3.Error):
+        with contextlib.suppress(OSError):
+            remove_leftovers(self.path)
+        with contextlib.suppress(sqlite3.Error, OSError):
             self._database.close()
-        if not any(self._keys.values()):
-            # the run has ended before it began: the scene or the disk is at fault
-            with contextlib.suppress(OSError):
+            if not any(self._keys.values()):
+                # the run has ended before it began: the scene or the disk is at fault
                 self.path.unlink()
 
 
-def read_study(path: Path) -> str | None:
-    """The study that a file belongs to, without its lock; None where the file does not say so."""
-    return _words_in(path).get(_STUDY)
-
-
-def _words_in(path: Path) -> dict[str, str]:
-    """What a file that another run may use says of itself; nothing where it is none of this version."""
+def read_study(path: Path, key: str = _STUDY) -> str | None:
+    """The study that a file belongs to, or another entry about itself, without its lock; None where there is none."""
     address = f"file:{quote(os.fsencode(path))}?mode=ro&immutable=1"
-    with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(address, uri=True)) as database:
-        return _words(database, _FILE)
-    return {}
-
-
-def _words(database: sqlite3.Connection, kind: str) -> dict[str, str]:
-    """Entries of a kind that are words, by key; nothing where the file has none."""
     with contextlib.suppress(sqlite3.Error, ValueError, TypeError):
-        rows = database.execute("SELECT key, blob FROM entries WHERE kind=?", [kind])
-        return {key: bytes(blob).decode() for key, blob in rows}
-    return {}
+        with contextlib.closing(sqlite3.connect(address, uri=True)) as database:
+            (blob,) = database.execute(_ONE, [_FILE, key]).fetchone() or (b"",)
+        return bytes(blob).decode() or None
+    return None
 
 
 def _open_locked(path: Path) -> sqlite3.Connection:
     """The file, new or of an earlier run. Its lock stays until the process ends, however it ends, or closes it."""
-    latest = time.monotonic() + _SECONDS_TO_DIE
-    while True:
-        database = sqlite3.connect(path, timeout=0.0, isolation_level="IMMEDIATE")
-        try:
-            for pragma in _PRAGMAS:
-                database.execute(f"PRAGMA {pragma}").fetchall()
-            database.execute("BEGIN EXCLUSIVE")
-            _check(database)
-            database.commit()
-            sync_folder(path.parent)
-            return database
-        except BaseException as error:
-            database.close()
-            if not isinstance(error, sqlite3.Error):
-                raise
-            if _code(error) in _DAMAGES:
-                raise _OtherFileError from error
-            if _code(error) != sqlite3.SQLITE_BUSY:
-                raise
-        if time.monotonic() > latest:
-            run = Verbatim(f"by {_words_in(path).get(_OPEN, 'no run that is known')}")
-            remedy = "wait for its end, or give another result file with -o; where no run is at work the disk has no"
-            raise UserError(str(path), "in use", run, f"{remedy} locks")
-        time.sleep(_PAUSE)
+    database = sqlite3.connect(path, timeout=_SECONDS_TO_DIE, isolation_level="IMMEDIATE")
+    try:
+        for pragma in _PRAGMAS:
+            database.execute(f"PRAGMA {pragma}").fetchall()
+        database.execute("BEGIN EXCLUSIVE")
+        _check(database)
+        database.commit()
+        sync_folder(path.parent)
+        return database
+    except BaseException as error:
+        database.close()
+        if _code(error) in _DAMAGES:
+            raise _OtherFileError from error
+        if _code(error) != sqlite3.SQLITE_BUSY:
+            raise
+    run = Verbatim(f"by {read_study(path, _OPEN) or 'no run that is known'}")
+    remedy = "wait for its end, or give another result file with -o; where no run is at work the disk has no locks"
+    raise UserError(str(path), "in use", run, remedy)
 
 
 def _check(database: sqlite3.Connection) -> None:
@@ -288,17 +258,11 @@ def _storage_errors(path: Path) -> Iterator[None]:
     """Raises StorageError where the disk, or what is on it, is at fault."""
     try:
         yield
-    except sqlite3.Error as error:
-        if _code(error) in _DAMAGES:
-            remedy = "the next run keeps it aside and begins anew"
-            raise StorageError(path, ValueError("is damaged"), remedy) from error
-        number = _FAULTS.get(_code(error))
-        fault = ValueError(error) if number is None else OSError(number, os.strerror(number))
-        raise StorageError(path, fault) from error
-    except OSError as error:
-        raise StorageError(path, error) from error
+    except (sqlite3.Error, OSError) as error:
+        remedy = "the next run keeps it aside and begins anew" if _code(error) in _DAMAGES else ""
+        raise StorageError(path, error, remedy) from error
 
 
-def _code(error: sqlite3.Error) -> int:
-    """Primary result code of SQLite."""
+def _code(error: BaseException) -> int:
+    """Primary result code of SQLite; 0 of any other error."""
     return getattr(error, "sqlite_errorcode", 0) & 0xFF

@@ -1,7 +1,7 @@
-"""Estimated work of a task, for the order of the tasks, the time left and `--plan`.
+"""Estimated work of a task, for the order of the tasks, the time left and `--plan`: within a factor of two for the
+bundled studies on one core. A joint that jumps takes longer; one in which nothing slips takes no step.
 
-The estimates fit the bundled studies on one core within a factor of two. A joint that jumps takes longer. A joint in
-which nothing slips takes no step. Numbers of Newton iterations have in brackets what was measured.
+Numbers of Newton iterations have in brackets what was measured.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+
+from solver.settings import Passage
 
 _AT_FIRST = 560  # to the first state of a sweep (dovetail 270, deck `blade_root` with up to 13 harmonics 1180)
 _OF_RAMP = 180  # to the only state of a ramp (1 and 48 pairs: 221 and 146)
@@ -36,8 +38,7 @@ AUTOMATIC_HARMONICS = 5
 
 _AUTOMATIC_HARMONICS_AT_MOST = 9  # for which the memory is estimated
 
-COMPILE_SECONDS = 9
-"""Time for compiling the functions of the solver, s, once on a machine."""
+COMPILE_SECONDS = 9  # for the functions of the solver, once on a machine
 
 _BASE_MEMORY = 250e6
 _NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run
@@ -63,9 +64,8 @@ def iterations_of_mode(n_amplitudes: int) -> int:
 
 
 def iterations_of_histories(steps: Sequence[tuple[str, float]], cycles: float) -> float:
-    """Newton iterations of histories over so many cycles from one state where the joint wears.
-
-    steps: scheme and step of each. Those with given steps are compared with the adaptive history.
+    """Newton iterations of histories over so many cycles where the joint wears. steps: scheme and step of each; those
+    with given steps are compared with the adaptive history.
     """
     if cycles == 0.0:
         return _A_STEP
@@ -80,15 +80,12 @@ def missions_computed(missions: float) -> int:
     return math.ceil(min(missions, 2.0 + _MISSIONS_A_DOUBLING * math.log2(max(missions, 1.0))))
 
 
-def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float) -> float:
-    """Newton iterations of a mission history.
-
-    blocks: how each begins, and the octaves of a passage, 0 for steady vibration.
-    """
+def iterations_of_missions(blocks: Sequence[tuple[str, float | Passage]], missions: float) -> float:
+    """Newton iterations of a mission history. blocks: how each begins, and its frequency."""
     each = 0.0
-    for begin, octaves in blocks:
-        if octaves > 0.0:
-            each += _OF_PASSAGE + _AN_OCTAVE * octaves
+    for begin, frequency in blocks:
+        if isinstance(frequency, Passage):
+            each += _OF_PASSAGE + _AN_OCTAVE * abs(math.log2(frequency.stop / frequency.start))
         elif begin == "continue":
             each += 2 * _OF_BLOCK
         else:
@@ -110,9 +107,8 @@ def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_wi
 
 
 def largest_memory() -> float:
-    """Largest memory of this process so far, bytes; 0 where the system does not say.
-
-    `getrusage` is not used: its value includes the memory of the process that has started this one.
+    """Largest memory of this process so far, bytes; 0 where the system does not say. That of `getrusage` includes the
+    memory of the process that has started this one.
     """
     try:
         lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()

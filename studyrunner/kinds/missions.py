@@ -1,21 +1,18 @@
-"""Mission histories: tasks, their computation, and what a result file holds of them."""
+"""Mission histories: tasks and their computation."""
 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, cast
-
-import numpy as np
+from typing import TYPE_CHECKING, cast
 
 from solver.contact.wear_law import WearLaw
 from solver.missions.mission import Begin, Block, MissionRequest
 from solver.packing import Packed
-from solver.results.history import last_error
 from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
+from studyrunner.kinds.results import mission_values
 from studyrunner.kinds.task import (
     Identity,
     Index,
@@ -24,23 +21,16 @@ from studyrunner.kinds.task import (
     Task,
     TaskJoint,
     TaskPlan,
-    deepest,
-    describe_target,
     digest,
-    first_harmonic,
     grid,
     joint_of,
     n_unknowns_of,
-    named,
     number_points,
-    settings_at,
 )
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
-from studyrunner.variables import OF_A_MISSION
 
 if TYPE_CHECKING:
-    from solver.missions.mission import MissionHistory
     from solver.model import ReducedModel
 
 _NO_JOINT = TaskJoint(0, None)
@@ -48,11 +38,7 @@ _NO_JOINT = TaskJoint(0, None)
 
 @dataclass(frozen=True)
 class PlannedBlock:
-    """A block of a mission.
-
-    frequency: Hz, or a passage. excitation_amplitude: N. cycles: in one mission, also of a passage. begin: as in the
-    `Block` of the solver.
-    """
+    """A block of a mission, as the `Block` of the solver, but cycles are in one mission, also of a passage."""
 
     name: str
     joint: TaskJoint
@@ -65,12 +51,6 @@ class PlannedBlock:
         """The block as the solver takes it. model: of the joint."""
         cycles, friction = None if isinstance(self.frequency, Passage) else self.cycles, self.joint.friction_coefficient
         return Block(model, self.frequency, self.excitation_amplitude, friction, cycles, self.begin, self.name)
-
-    @property
-    def octaves(self) -> float:
-        """Of a passage; 0 for steady vibration."""
-        of = self.frequency
-        return abs(math.log2(of.stop / of.start)) if isinstance(of, Passage) else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,11 +67,6 @@ class Mission(Task):
     first: str
     missions: tuple[float, ...]
     until: WearTarget | None
-
-    @property
-    def scenes(self) -> tuple[int, ...]:
-        """Those of the blocks."""
-        return tuple(sorted({block.joint.scene for block in self.blocks}))
 
     def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hash of the history: of all blocks with their scenes."""
@@ -119,7 +94,7 @@ class Mission(Task):
         read = tuple(sorted({0, 1} | wanted | {max(number - 1, 0) for number in wanted}))
         first = cast("Direction", self.first)
         asked = MissionRequest(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
-        yield PointResult(_values(self, integrate_missions(asked, note, self.resume)))
+        yield PointResult(mission_values(self, integrate_missions(asked, note, self.resume)))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""
@@ -129,19 +104,16 @@ class Mission(Task):
 def build_tasks(
     study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
 ) -> TaskPlan:
-    """Tasks of a study of missions. Points with equal blocks share a task.
-
-    contacts: what is drawn for the pairs of each part, by block.
-    """
+    """Tasks of a study of missions, one for equal points. contacts: drawn for the pairs of each part, by block."""
     points: dict[Mission, list[Index]] = {}
-    axes = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
     for part, numbers, of_blocks in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
-        for at in grid(part.study, *axes):
-            blocks, settings = tuple(_blocks(part.study, at, numbers, of_blocks)), settings_at(study, at)
+        for at, settings in grid(part.study):
+            blocks = tuple(_blocks(part.study, at, numbers, of_blocks))
             n_unknowns = n_unknowns_of(max(n_displacements[number] for number in numbers), settings.harmonics)
-            ways = [(block.begin, block.octaves) for block in blocks]
+            ways = [(block.begin, block.frequency) for block in blocks]
             task = Mission(
                 number=0,
+                scenes=tuple(sorted(set(numbers))),
                 settings=settings,
                 cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1])),
                 n_unknowns=n_unknowns,
@@ -172,51 +144,3 @@ def _blocks(
             frequency, begin = given.passage, given.passage.sweep
         joint = joint_of(study, scene, contact)
         yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))
-
-
-def _values(task: Mission, history: MissionHistory) -> dict[str, Any]:
-    """Variables of the result, at the numbers of missions that the task asks for."""
-    counts = np.array(task.missions)
-    rows, ends = (np.searchsorted(history.missions, each) for each in (counts, np.clip(counts, 1.0, None)))
-    in_mission = history.block_volume[ends] - history.block_volume[ends - 1]
-    rate, worn = in_mission.sum(axis=1), history.worn_volume[rows]
-    share = np.divide(in_mission, rate[:, None], out=np.full_like(in_mission, np.nan), where=rate[:, None] > 0.0)
-    reached = np.flatnonzero(np.isfinite(worn))
-    last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
-    is_state = np.isfinite(history.worn_volume).any() and np.isfinite(history.response_begin).any()
-    depth, depth_error = history.wear_depth[rows], history.wear_depth_error[rows]
-    whole, target = history.last_mission >= task.missions[-1], ""
-    if history.outcome.complete:
-        target = describe_target(task.until, history.missions_to_target, "mission", whole=whole)
-    own: Mapping[str, object] = {
-        **deepest(depth, depth_error),
-        **first_harmonic(history.response_end[rows]),
-        "worn_volume": worn,
-        "wear_rate": np.where(np.isfinite(worn), rate, np.nan),
-        "wear_depth": depth,
-        "wear_depth_last": last,
-        "block_worn_volume": history.block_volume[rows],
-        "block_worn_volume_error": history.block_volume_error[rows],
-        "block_share": share,
-        "response_amplitude_begin": np.abs(history.response_begin[rows]),
-        "response_peak": history.response_peak_end[rows],
-        "response_peak_begin": history.response_peak_begin[rows],
-        "response_error": history.response_error[rows],
-        "excitation_frequency": history.excitation_frequency[:, 1],
-        "excitation_frequency_begin": history.excitation_frequency[:, 0],
-        "block_cycles": np.array([block.cycles for block in task.blocks]),
-        "worn_volume_error": history.worn_volume_error[rows],
-        "wear_depth_error": depth_error,
-        "outcome": int(history.outcome),
-        # a mission is computed for the vibration at 0
-        "error_estimate": last_error(
-            counts[reached],
-            history.worn_volume_error[rows[reached]],
-            rate[reached],
-            min(history.last_mission, counts[-1]),
-        ),
-        "last_mission": min(history.last_mission, float(counts[-1])) if is_state else math.nan,
-        "largest_wear_depth": float(last.max(initial=0.0)) if reached.size else math.nan,
-        "message": "; ".join(filter(None, (history.message, target))),
-    }
-    return named((*task.variables, *OF_A_MISSION), own, history)

@@ -9,20 +9,19 @@ from typing import TYPE_CHECKING, Literal, cast
 import numpy as np
 
 from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
+from studyrunner.kinds.results import first_harmonic, named
 from studyrunner.kinds.task import (
     Identity,
-    JointTask,
     Keep,
     PointResult,
+    Task,
+    TaskJoint,
     TaskPlan,
     digest,
-    first_harmonic,
     grid,
     joint_of,
     n_unknowns_of,
-    named,
     number_points,
-    settings_at,
     up_or_down,
 )
 from studyrunner.scene.scene_set import ContactChange, SceneSet
@@ -34,12 +33,13 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mode(JointTask):
+class Mode(Task):
     """A nonlinear mode; a result at each modal amplitude.
 
     mode: its number, from 1. direction: "up" or "down" along the amplitude. amplitudes: m sqrt(kg), ascending.
     """
 
+    joint: TaskJoint
     mode: int
     direction: str
     amplitudes: tuple[float, ...]
@@ -71,8 +71,7 @@ class Mode(JointTask):
                 "damping_ratio_error": found.damping_error,
                 "outcome": int(found.outcome),
             }
-            values = named((*self.variables, *OF_A_MODE_POINT), own, found)
-            yield PointResult(values, wanted[place])
+            yield PointResult(named((*self.variables, *OF_A_MODE_POINT), own, found), wanted[place])
 
     def describe(self, place: int) -> str:
         """Where along the amplitude."""
@@ -89,11 +88,11 @@ def build_tasks(
     for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         joint = joint_of(part.study, scene, contact)
         of_part = dict(zip(study.axes_of_parts, part.place, strict=True))
-        for at in grid(study, "mode", "sweep"):
-            settings = settings_at(study, at)
+        for at, settings in grid(study):
             n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
             mode = Mode(
                 number=0,
+                scenes=(scene,),
                 settings=settings,
                 cost=seconds_of(n_unknowns, iterations_of_mode(len(amplitudes))),
                 n_unknowns=n_unknowns,

@@ -1,7 +1,6 @@
 """What a rank computes at a time, what it gives back, and all tasks of a study.
 
-A task gives one result or several, one after the other, each at a place of its own. There are four kinds: `Sweep` and
-`History` (`wear`), `Mode` (`modes`), `Mission` (`missions`).
+There are four kinds of tasks: `Sweep` and `History` (`wear`), `Mode` (`modes`), `Mission` (`missions`).
 """
 
 from __future__ import annotations
@@ -17,21 +16,19 @@ from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.packing import Packed
-from solver.settings import Automatic, SolverSettings, WearTarget
+from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.scene_set import ContactChange
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
-from studyrunner.units import show_count
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from studyrunner.mpi.mapped_file import MappedFile
+    from studyrunner.system.machine import MappedFile
 
 Index = tuple[int, ...]
 """Index of a point along the dimensions of the study."""
@@ -130,13 +127,13 @@ class Identity:
 
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
-    """A task.
+    """A task, which gives one result or several, one after the other, each at a place of its own.
 
     number: among the sweeps, or the other tasks, of the study. cost: estimated time, s.
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
-    known: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
+    skipped: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
     names: of the results in the file of a run, by place (`hashes`). key: of the task there.
-    models: of `scenes`, for a rank that does not have them.
+    scenes: numbers of the scenes whose models the task needs. models: of these, for a rank that does not have them.
     variables: names of the variables in a result. indices: for each place the points of the study that have its result;
         none for start states.
     """
@@ -145,21 +142,17 @@ class Task(ABC):
     """Whether other tasks wait for the results."""
 
     number: int
+    scenes: tuple[int, ...]
     settings: SolverSettings
     cost: float
     n_unknowns: int
-    known: frozenset[int] = frozenset()
+    skipped: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
     names: tuple[str, ...] = field(default=(), compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
     models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
     variables: tuple[str, ...] = ()
     indices: tuple[tuple[Index, ...], ...] = ()
-
-    @property
-    @abstractmethod
-    def scenes(self) -> tuple[int, ...]:
-        """Numbers of the scenes whose models the task needs."""
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -169,7 +162,7 @@ class Task(ABC):
     @property
     def places(self) -> tuple[int, ...]:
         """Places of the results that are needed, in the order in which they are given."""
-        return tuple(place for place in self.order if place not in self.known)
+        return tuple(place for place in self.order if place not in self.skipped)
 
     @property
     def n_results(self) -> int:
@@ -216,18 +209,6 @@ class Task(ABC):
         """The task in words while it computes the result at a place."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class JointTask(Task):
-    """A task of one joint."""
-
-    joint: TaskJoint
-
-    @property
-    def scenes(self) -> tuple[int, ...]:
-        """That of the joint."""
-        return (self.joint.scene,)
-
-
 def digest(*values: object) -> str:
     """Hash of values, frozen dataclasses among them; numbers enter with all bits.
 
@@ -236,59 +217,6 @@ def digest(*values: object) -> str:
     # by hand: `joblib.hash` hashes pickled bytes, which change with the versions of Python and numpy
     text = json.dumps(values, default=lambda each: {**asdict(each), "time_limit": None})
     return hashlib.sha256(text.encode()).hexdigest()[:32]
-
-
-def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:
-    """Places in the order in which they are computed, ascending but with the direction "down"."""
-    return tuple(reversed(range(n_places)) if direction == "down" else range(n_places))
-
-
-def grid(study: Study, *names: str) -> Iterator[dict[str, int]]:
-    """Indices along these axes and those of `SOLVER_AXES`, in all combinations, the last one fastest."""
-    sizes = {name: len(getattr(study.axes, name)) for name in names}
-    sizes |= {name: len(getattr(study.solver, name)) for name in SOLVER_AXES}
-    for places in itertools.product(*map(range, sizes.values())):
-        yield dict(zip(sizes, places, strict=True))
-
-
-def settings_at(study: Study, at: Mapping[str, int]) -> SolverSettings:
-    """Settings of the solver. at: indices along the axes, those of `SOLVER_AXES` among them."""
-    limit = math.inf if study.solver.time_limit is None else study.solver.time_limit
-    return SolverSettings(**{key: getattr(study.solver, key)[at[key]] for key in SOLVER_AXES}, time_limit=limit)
-
-
-def n_unknowns_of(n_displacements: int, harmonics: int | Automatic) -> int:
-    """Unknowns of a state with this number of harmonics, or with that which automatic ones take on average."""
-    return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)
-
-
-def first_harmonic(response: NDArray[np.complex128]) -> dict[str, NDArray[np.float64]]:
-    """Variables of the first harmonic of the response, in the shape of the response."""
-    return {"response_amplitude": np.abs(response), "response_phase": np.angle(response)}
-
-
-def deepest(depth: NDArray[np.float64], error: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Variables of the deepest pair at each count, m, from depths (n_counts, n_contact) and their errors."""
-    pair = np.nan_to_num(depth).argmax(axis=1)[:, None]
-    of_deepest = np.take_along_axis(error, pair, axis=1)[:, 0]
-    return {"wear_depth_max": depth.max(axis=1, initial=0.0), "wear_depth_max_error": of_deepest}
-
-
-def describe_target(until: WearTarget | None, reached: float, counted: str, *, whole: bool) -> str:
-    """That the target of a history was not reached, or that what comes after it is not computed; else empty.
-
-    reached: count at which it was reached, else NaN. counted: what that counts. whole: whether all counts are computed.
-    """
-    if until is None or (whole and not math.isnan(reached)):
-        return ""
-    if math.isnan(reached):
-        return f"{until.quantity} stays below {until.value:g}"
-    return f"at its target at {counted} {show_count(round(reached))}: later {counted}s are not computed"
-
-
-def named(names: Sequence[str], own: Mapping[str, Any], source: object) -> dict[str, Any]:
-    """Variables by name: those of `own`, the others as the attributes of what the solver has returned."""
-    return {name: own[name] if name in own else getattr(source, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -315,13 +243,12 @@ class TaskPlan:
         return replace(self, sweeps=sweeps, results=results)
 
     @cached_property
-    def waiting(self) -> Mapping[tuple[int, int], tuple[Task, ...]]:
-        """Tasks that wait for a start state, by number of the sweep and place."""
-        found: dict[tuple[int, int], list[Task]] = {}
+    def waiting(self) -> Mapping[tuple[int, int] | None, Sequence[Task]]:
+        """Tasks by the start state that they wait for, number of the sweep and place; None: for none."""
+        found: dict[tuple[int, int] | None, list[Task]] = {}
         for task in self.results:
-            if task.waits_for is not None:
-                found.setdefault(task.waits_for, []).append(task)
-        return {start: tuple(tasks) for start, tasks in found.items()}
+            found.setdefault(task.waits_for, []).append(task)
+        return found
 
     @property
     def cost(self) -> float:
@@ -336,3 +263,29 @@ def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study
     )
     shared = study.n_points - sum(len(task.order) for task in results)
     return TaskPlan(results, {EQUAL_POINTS: shared} if shared else {}, study.n_points)
+
+
+# --- from a study to its tasks ---
+
+
+def grid(study: Study) -> Iterator[tuple[dict[str, int], SolverSettings]]:
+    """Points of a part of a study, the last axis fastest: indices along all axes of its kind, and the settings."""
+    names, limit = study.kind.axes, math.inf if study.solver.time_limit is None else study.solver.time_limit
+    solver = []
+    for places in itertools.product(*(range(len(getattr(study.solver, key))) for key in SOLVER_AXES)):
+        at = dict(zip(SOLVER_AXES, places, strict=True))
+        values = {key: getattr(study.solver, key)[place] for key, place in at.items()}
+        solver.append((at, SolverSettings(**values, time_limit=limit)))
+    for places in itertools.product(*(range(len(getattr(study.axes, name))) for name in names)):
+        for at, settings in solver:
+            yield {**dict(zip(names, places, strict=True)), **at}, settings
+
+
+def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:
+    """Places in the order in which they are computed, ascending but with the direction "down"."""
+    return tuple(reversed(range(n_places)) if direction == "down" else range(n_places))
+
+
+def n_unknowns_of(n_displacements: int, harmonics: int | Automatic) -> int:
+    """Unknowns of a state with this number of harmonics, or with that which automatic ones take on average."""
+    return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)

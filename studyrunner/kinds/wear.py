@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Literal, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,10 @@ from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
-from studyrunner.kinds.task import (
-    Identity,
-    JointTask,
-    Keep,
-    PointResult,
-    StartResult,
-    digest,
-    up_or_down,
-)
+from studyrunner.kinds.results import build_result
+from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, digest, up_or_down
 from studyrunner.mpi.dispatch import CostKeys
+from studyrunner.study.study import Study
 from studyrunner.system.machine import MachineFaultError, is_machine_fault
 
 if TYPE_CHECKING:
@@ -33,16 +27,32 @@ if TYPE_CHECKING:
     from solver.results.history import StartState
     from solver.wear.wearing_joint import WearRequest
 
-COST_AT_REST = 0.01
-"""Estimated time of a history in which nothing wears, over the time of a history with steps."""
-
 OWN_STEPS = ("adaptive", "final")
 """Schemes that choose their steps: for another wear coefficient the same ones at other counts."""
 
+_COST_AT_REST = 0.01  # estimated time of a history in which nothing wears, over that of a history with steps
 _NEIGHBOURS = 4  # frequencies whose histories take about as long
 _ROUND_OFF = 1e-10
 
 _digest_once = lru_cache(maxsize=16)(digest)
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """How a joint is excited on its way to a start state, beside the frequency; here another axis would be added.
+
+    amplitude: N. direction: "up", "down" or "ramp". follow: what the frequency follows; None where it is given.
+    """
+
+    amplitude: float
+    direction: str
+    follow: FollowedFrequency | None
+
+    @classmethod
+    def at(cls, study: Study, at: Mapping[str, int]) -> Self:
+        """That of a point of a study. at: its indices along the axes."""
+        amplitude, direction = (getattr(study.axes, name)[at[name]] for name in ("excitation_amplitude", "sweep"))
+        return cls(amplitude, direction, study.follow)
 
 
 @dataclass(frozen=True)
@@ -77,27 +87,23 @@ class Integrated:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _FromRest(JointTask):
-    """A task with start states: it gives them, or begins from one.
+class _FromRest(Task):
+    """A task with start states: it gives them, or begins from one."""
 
-    excitation_amplitude: N. direction: "up", "down" or "ramp". follow: what the frequency follows; None where given.
-    """
-
-    excitation_amplitude: float
-    direction: str
-    follow: FollowedFrequency | None = None
+    joint: TaskJoint
+    excitation: Excitation
 
     def name_of_start(self, identity: Identity, frequency: float) -> str:
         """Hash of a start state, whatever the other frequencies: the steps of a sweep follow from the joint."""
-        loading = (self.excitation_amplitude, self.direction, self.settings, self.follow)
-        return digest("start", _digest_once("line", identity.joint(self.joint), *loading), frequency)
+        line = _digest_once("line", identity.joint(self.joint), self.excitation, self.settings)
+        return digest("start", line, frequency)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep(_FromRest):
     """Start states along the frequency, or that of a ramp at a single frequency; a result at each frequency.
 
-    frequencies: Hz, ascending; where the frequency follows a resonance its only value is the middle of the range.
+    frequencies: Hz, ascending; of a followed resonance the middle of its range.
     """
 
     gives_starts = True
@@ -107,7 +113,7 @@ class Sweep(_FromRest):
     @property
     def order(self) -> tuple[int, ...]:
         """Indices of the frequencies in the order of the sweep."""
-        return up_or_down(len(self.frequencies), self.direction)
+        return up_or_down(len(self.frequencies), self.excitation.direction)
 
     def hashes(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the start states."""
@@ -121,21 +127,21 @@ class Sweep(_FromRest):
             yield result
         if len(given) < self.n_results and self.resume is not None:
             # the earlier run had passed states that are damaged, or that it did not need
-            yield from replace(self, known=self.known | given, resume=None)._compute(models, keep)
+            yield from replace(self, skipped=self.skipped | given, resume=None)._compute(models, keep)
 
     def _compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[StartResult]:
         # numba is loaded where a task runs, so that --plan and --help do without it
         from solver.loading_history.start_states import follow_branch
 
-        model, wanted = self.joint.model(models), sorted(self.places)
+        model, wanted, excitation = self.joint.model(models), sorted(self.places), self.excitation
         n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
         for place, start in follow_branch(
             model,
             self.joint.friction_coefficient,
-            self.excitation_amplitude,
-            # no state depends on those that are known
-            self.follow or np.array([self.frequencies[place] for place in wanted]),
-            cast("Literal['up', 'down', 'ramp']", self.direction),
+            excitation.amplitude,
+            # no state depends on those that are skipped
+            excitation.follow or np.array([self.frequencies[place] for place in wanted]),
+            cast("Literal['up', 'down', 'ramp']", excitation.direction),
             self.settings,
             keep=keep,
             resume=self.resume,
@@ -155,7 +161,8 @@ class Sweep(_FromRest):
 
     def describe(self, place: int) -> str:
         """Where the sweep goes."""
-        how = "ramp" if self.direction == "ramp" else f"sweep {self.direction}"
+        direction = self.excitation.direction
+        how = "ramp" if direction == "ramp" else f"sweep {direction}"
         return f"{how} to {self.frequencies[place]:.6g} Hz"
 
 
@@ -163,13 +170,12 @@ class Sweep(_FromRest):
 class History(_FromRest):
     """Wear histories from a start state that share an adaptive history, each with those that are read from it.
 
-    sweep, position: number of the sweep and place of the start state. frequency: Hz, of the start state.
+    sweep, position, frequency: number of the sweep, place and frequency, Hz, of the start state.
     integrated: histories with one wear coefficient.
     cycles: cycle counts of the output of every history. to_the_end: integration until nothing wears any more; then
         `cycles` numbers the outputs. until: wear at which the history ends before the last count.
     loops: pairs whose fretting loops are among the variables.
-    moves: of the start state, see StartResult; True until it is there.
-    start: start state; None until the sweep has reached it.
+    start, moves: of the start state, see StartResult; None and True until it is there.
     """
 
     law: WearLaw
@@ -204,16 +210,13 @@ class History(_FromRest):
         """By motion, unknowns and start state, and by wear coefficient, steps and schemes."""
         kind = "history" if self.moves else "history at rest"
         near, here = (kind, self.sweep, "near", self.position // _NEIGHBOURS), (kind, self.sweep, self.position)
-        steps = tuple((each.step, each.scheme) for each in self.integrated)
-        wear = (kind, self.wear_coefficient, steps)
+        wear = (kind, self.wear_coefficient, tuple((each.step, each.scheme) for each in self.integrated))
         return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
 
     def from_start(self, result: StartResult) -> History:
-        """The history from a start state. The time is in proportion to its unknowns, whatever moves: a history seldom
-        factorises anew.
-        """
+        """The history from a start state. Its time grows with the unknowns: a history seldom factorises anew."""
         n_unknowns = result.n_unknowns or self.n_unknowns
-        cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else COST_AT_REST))
+        cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else _COST_AT_REST))
         return replace(self, start=result.start, cost=cost, n_unknowns=n_unknowns, moves=result.moves)
 
     def hashes(self, identity: Identity) -> tuple[str, ...]:
@@ -228,16 +231,16 @@ class History(_FromRest):
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """All histories, read from those that are integrated, as far as these went."""
         from solver.wear.history import integrate_together
-        from studyrunner.kinds.wear_result import build_result
 
         if self.start is None:
             raise TypeError(f"task without a start state: {self}")
         needed: dict[Integrated, list[int]] = {}
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
-        model, friction = self.joint.model(models), self.joint.friction_coefficient
-        asked, start = [self._asked(each) for each in needed], unpack(self.start)
-        histories = integrate_together(model, friction, self.settings, start, asked, keep, self.resume)
+        model, asked = self.joint.model(models), [self._asked(each) for each in needed]
+        histories = integrate_together(
+            model, self.joint.friction_coefficient, self.settings, unpack(self.start), asked, keep, self.resume
+        )
         for (each, places), history in zip(needed.items(), histories, strict=True):
             for place in places:
                 yield replace(build_result(self, each, history, self.results[place][1]), place=place)
@@ -259,7 +262,7 @@ class History(_FromRest):
             law=self.law,
             until=self.until,
             loops=self.loops,
-            follow=self.follow,
+            follow=self.excitation.follow,
         )
 
     def describe(self, place: int) -> str:

@@ -11,17 +11,15 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from solver.contact.wear_law import WearLaw
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
-from studyrunner.kinds.task import EQUAL_POINTS, Index, TaskJoint, TaskPlan, grid, joint_of, n_unknowns_of, settings_at
-from studyrunner.kinds.wear import OWN_STEPS, History, Integrated, Sweep
+from studyrunner.kinds.task import EQUAL_POINTS, Index, TaskJoint, TaskPlan, grid, joint_of, n_unknowns_of
+from studyrunner.kinds.wear import OWN_STEPS, Excitation, History, Integrated, Sweep
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
-
-_OF_HISTORY = ("wear_coefficient", "step", "scheme")
 
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
@@ -38,15 +36,6 @@ _REASONS = {
 """Why points share a history."""
 
 
-class _Case(NamedTuple):
-    """What the states of a sweep have in common."""
-
-    joint: TaskJoint
-    excitation_amplitude: float
-    direction: str
-    settings: SolverSettings
-
-
 class _Point(NamedTuple):
     """A point of the study. at: its index along the dimensions of the study."""
 
@@ -56,11 +45,14 @@ class _Point(NamedTuple):
     at: Index
 
 
-_Shared = tuple[Integrated, tuple[tuple[Index, ...], ...]]
-"""A history that is integrated, and the points of each history that is read from it."""
+_Case = tuple[TaskJoint, Excitation, SolverSettings]
+"""What the states of a sweep have in common."""
 
 _Starts = dict[float, dict[WearLaw, list[_Point]]]
 """Points by frequency and wear law, in the order of the study."""
+
+_Shared = tuple[Integrated, tuple[tuple[Index, ...], ...]]
+"""A history that is integrated, and the points of each history that is read from it."""
 
 
 def build_tasks(
@@ -72,24 +64,39 @@ def build_tasks(
     their own never do. The order and the numbers of the tasks depend on the study alone.
     """
     sweeps, histories, causes = list[Sweep](), list[History](), Counter[str]()
-    for case, starts in _cases(study, contacts, scenes).items():
-        ascending = sorted(starts)
-        n_unknowns = n_unknowns_of(n_displacements[case.joint.scene], case.settings.harmonics)
-        for frequencies in [[one] for one in ascending] if case.direction == "ramp" else [ascending]:
-            sweep = Sweep(
-                number=len(sweeps),
-                frequencies=tuple(frequencies),
-                cost=seconds_of(n_unknowns, iterations_of_sweep(case.direction, len(frequencies))),
-                n_unknowns=n_unknowns,
-                follow=study.follow,
-                **case._asdict(),
-            )
+    outputs: dict[str, Any] = {
+        "cycles": study.output_counts,
+        "variables": tuple(study.recorded),
+        "loops": study.outputs.loops,
+        "until": study.until,
+        "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
+    }
+    for (joint, excitation, settings), starts in _cases(study, contacts, scenes).items():
+        ascending, direction = sorted(starts), excitation.direction
+        n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
+        case: dict[str, Any] = {"joint": joint, "excitation": excitation, "settings": settings}
+        case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
+        for frequencies in [[one] for one in ascending] if direction == "ramp" else [ascending]:
+            cost = seconds_of(n_unknowns, iterations_of_sweep(direction, len(frequencies)))
+            sweep = Sweep(number=len(sweeps), frequencies=tuple(frequencies), cost=cost, **case)
             sweeps.append(sweep)
             for position, frequency in enumerate(frequencies):
+                start: dict[str, Any] = {"sweep": sweep.number, "position": position, "frequency": frequency}
                 for law, points in starts[frequency].items():
-                    shared = _share_histories(study, points, causes)
-                    for together in _together(study, shared):
-                        histories.append(_history(study, len(histories), case, sweep, position, law, together))
+                    for together in _together(study, _share_histories(study, points, causes)):
+                        integrated, indices = zip(*together, strict=True)
+                        histories.append(
+                            History(
+                                number=len(histories),
+                                law=law,
+                                integrated=integrated,
+                                indices=tuple(itertools.chain.from_iterable(indices)),
+                                cost=seconds_of(n_unknowns, _iterations(study, integrated)),
+                                **start,
+                                **case,
+                                **outputs,
+                            )
+                        )
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
     return TaskPlan(tuple(histories), left_out, study.n_points, tuple(sweeps))
 
@@ -97,21 +104,13 @@ def build_tasks(
 def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet) -> dict[_Case, _Starts]:
     """Points that one sweep reaches."""
     cases, own_axes = dict[_Case, _Starts](), study.own_axes
-    lines = [(at, settings_at(study, at)) for at in grid(study, "excitation_amplitude", "sweep")]
     for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
-        sizes = (range(len(getattr(axes, name))) for name in _OF_HISTORY)
-        choices = [dict(zip(_OF_HISTORY, choice, strict=True)) for choice in itertools.product(*sizes)]
-        for at, settings in lines:
-            amplitude, direction = axes.excitation_amplitude[at["excitation_amplitude"]], axes.sweep[at["sweep"]]
-            starts = cases.setdefault(_Case(joint, amplitude, direction, settings), {})
-            for place, frequency in enumerate(axes.frequency):
-                points = starts.setdefault(frequency, {}).setdefault(law, [])
-                for choice in choices:
-                    places = {**at, "frequency": place, **choice}
-                    wear, step, scheme = (getattr(axes, name)[index] for name, index in choice.items())
-                    at_axes = (*(places[name] for name in own_axes), *part.place)
-                    points.append(_Point(wear, step, scheme, at_axes))
+        for at, settings in grid(part.study):
+            starts = cases.setdefault((joint, Excitation.at(part.study, at), settings), {})
+            points = starts.setdefault(axes.frequency[at["frequency"]], {}).setdefault(law, [])
+            wear, step, scheme = (getattr(axes, name)[at[name]] for name in ("wear_coefficient", "step", "scheme"))
+            points.append(_Point(wear, step, scheme, (*(at[name] for name in own_axes), *part.place)))
     return cases
 
 
@@ -158,31 +157,11 @@ def _together(study: Study, shared: Iterator[_Shared]) -> Iterator[tuple[_Shared
         alone = each[0].unworn or not study.solver.shortcuts
         groups.setdefault(each if alone else each[0].wear_coefficients[0], []).append(each)
     for group in groups.values():
-        for begin in range(0, len(group), MOST_TOGETHER):
-            yield tuple(group[begin : begin + MOST_TOGETHER])
+        for first in range(0, len(group), MOST_TOGETHER):
+            yield tuple(group[first : first + MOST_TOGETHER])
 
 
-def _history(
-    study: Study, number: int, case: _Case, sweep: Sweep, place: int, law: WearLaw, together: tuple[_Shared, ...]
-) -> History:
-    integrated, points = zip(*together, strict=True)
+def _iterations(study: Study, integrated: Sequence[Integrated]) -> float:
+    """Newton iterations of the histories of a task."""
     cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
-    steps = [(each.scheme, each.step) for each in integrated]
-    return History(
-        number=number,
-        law=law,
-        sweep=sweep.number,
-        position=place,
-        frequency=sweep.frequencies[place],
-        integrated=integrated,
-        indices=tuple(itertools.chain.from_iterable(points)),
-        cycles=study.output_counts,
-        variables=tuple(study.recorded),
-        loops=study.outputs.loops,
-        cost=seconds_of(sweep.n_unknowns, iterations_of_histories(steps, cycles)),
-        n_unknowns=sweep.n_unknowns,
-        until=study.until,
-        follow=study.follow,
-        to_the_end=ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
-        **case._asdict(),
-    )
+    return iterations_of_histories([(each.scheme, each.step) for each in integrated], cycles)

@@ -1,7 +1,5 @@
-"""Decides which rank gets which task, by expected run times that finished tasks correct. This module sends no messages
-and is given its clock: the server on real ranks and a simulation with thousands of ranks make the same decisions.
-
-Expected times decide the order of the tasks and the time left that a user sees. They decide no number of a result.
+"""Decides which rank gets which job, by expected run times that finished jobs correct. They decide no number of a
+result. Without messages and with a given clock: a simulation with thousands of ranks makes the same decisions.
 
 By hand: the pools of mpi4py and schwimmbad know no expected run times and leave rank 0 idle (speed-up 0.92 of 2 ranks,
 here 1.97).
@@ -15,45 +13,46 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass
 from typing import Any
 
-Task = Any
-"""What is done as a whole by one rank. It has
+Job = Any
+"""What is done as a whole by one rank: a task of a study, or a scene to build. It has
 
 - cost: estimated time, s, positive, of which each result takes an equal share;
-- cost_keys: groups of similar tasks, see `CostModel`;
-- n_results: that the task gives one after the other, at least 1;
-- gives_starts: whether other tasks wait for the results.
+- cost_keys: groups of similar jobs, see `CostModel`;
+- n_results: that the job gives one after the other, at least 1;
+- gives_starts: whether other jobs wait for the results.
 """
 
 CostKeys = Sequence[tuple[Hashable, ...]]
-"""Groups of similar tasks that a task belongs to: sequences of keys, each from a general group to a special one."""
+"""Groups of similar jobs: sequences of keys, each from a general group to a special one."""
 
 WATCH_SECONDS = 1.0
-"""Shortest time between two looks at the running tasks, s. Without these looks 256 ranks are 0.81 busy for 0.97, and
+"""Shortest time between two looks at the running jobs, s. Without these looks 256 ranks are 0.81 busy for 0.97, and
 without corrections 0.80 (`tests.benchmarks.scheduling usual`)."""
 
 _WATCH_SHARE = 0.02  # of the time since the start: later looks are rarer
-_AS_LONG_AGAIN = 2.0  # a task is expected to take at least this often what it has taken
+_AS_LONG_AGAIN = 2.0  # a job is expected to take at least this often what it has taken
 _WAITING = 1000
 _WAITING_A_RANK = 16
 _LEAST = 1e-6
 
 
 class CostModel:
-    """Corrects estimated times by the measured times of similar tasks.
+    """Corrects estimated times by the measured times of similar jobs.
 
     The correction is a product of factors, one for each sequence of keys. The factor of a key is the sum of the
     measured times over the sum of the expected times, which contain the corrections of all other sequences. The factor
     of the key before counts as one more measurement, so that a few unusual times do not decide.
+
+    sums: measured and expected times, s, and their number, by key.
     """
 
     def __init__(self, sums: Mapping[Hashable, tuple[float, float, int]] | None = None) -> None:
-        """sums: measured and expected times, s, and their number, by key."""
         self.sums = dict(sums or {})
-        # asked for since the last measurement: most of thousands of waiting tasks share their keys
+        # asked for since the last measurement: most of thousands of waiting jobs share their keys
         self._factors: dict[tuple[Hashable, ...], float] = {}
 
     def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> None:
-        """Adds the times of a task, s; the estimated time is positive."""
+        """Adds the times of a job, s; the estimated time is positive."""
         factors = [self._factor(keys) for keys in cost_keys]
         expected = estimated * math.prod(factors)
         for keys, factor in zip(cost_keys, factors, strict=True):
@@ -80,23 +79,18 @@ class CostModel:
 
 @dataclass
 class _Running:
-    """A task that a rank has: results still to come, and when the last one came or the task was given."""
+    """A job that a rank has: results still to come, and when the last one came or the job was given."""
 
-    task: Task
+    job: Job
     n_left: int
     began: float
 
 
-_Waiting = list[tuple[float, int, Task, CostKeys]]
-"""A heap: the task with the longest expected time first, of equal ones the earliest."""
-
-
 class Dispatcher:
-    """Decides which rank gets which task. No decision looks at all ranks.
+    """Decides which rank gets which job. No decision looks at all ranks.
 
-    - Tasks that give starts go first, unless enough tasks wait for all ranks: so the memory for waiting tasks is
-      bounded.
-    - Of the other tasks the longest go first, so that the ranks end together.
+    - Jobs that give starts go first, unless enough jobs wait for all ranks: so the memory for waiting jobs is bounded.
+    - Of the other jobs the longest go first, so that the ranks end together.
     """
 
     def __init__(self, n_ranks: int, costs: CostModel, clock: Callable[[], float]) -> None:
@@ -104,76 +98,75 @@ class Dispatcher:
         self._n_known = 0
         self._began = clock()
         self._next_watch = self._began + WATCH_SECONDS
-        self._first: _Waiting = []
-        self._others: _Waiting = []
+        # heaps: the job with the longest expected time first, of equal ones the earliest
+        self._first: list[tuple[float, int, Job, CostKeys]] = []
+        self._others: list[tuple[float, int, Job, CostKeys]] = []
         self._given: dict[int, _Running] = {}
-        # ranks without a task: the last is the next to get one
+        # ranks without a job: the last is the next to get one
         self._free = dict.fromkeys(reversed(range(n_ranks)))
 
     @property
     def done(self) -> bool:
-        """Whether no task waits and no task runs."""
+        """Whether no job waits and no job runs."""
         return not (self._given or self._first or self._others)
 
     @property
     def wants_more(self) -> bool:
-        """Whether fewer tasks wait than all ranks can use for some time."""
+        """Whether fewer jobs wait than all ranks can use for some time."""
         return len(self._others) < _WAITING + _WAITING_A_RANK * self._n_ranks
 
-    def add(self, tasks: Iterable[Task]) -> None:
-        """Adds tasks that have become possible."""
-        for task in tasks:
-            keys = task.cost_keys
-            entry = (-task.cost * self._costs.correction(keys), self._n_known, task, keys)
-            heapq.heappush(self._first if task.gives_starts else self._others, entry)
+    def add(self, jobs: Iterable[Job]) -> None:
+        """Adds jobs that have become possible."""
+        for job in jobs:
+            keys = job.cost_keys
+            entry = (-job.cost * self._costs.correction(keys), self._n_known, job, keys)
+            heapq.heappush(self._first if job.gives_starts else self._others, entry)
             self._n_known += 1
 
-    def assign(self) -> Iterator[tuple[int, int, Task]]:
-        """Ranks that get a task now, with the number of the task and the task."""
+    def assign(self) -> Iterator[tuple[int, int, Job]]:
+        """Ranks that get a job now, with the number of the job and the job."""
         while self._free and (self._first or self._others):
             rank, _ = self._free.popitem()
             is_first = self._first and (self.wants_more or not self._others)
-            _, number, task, _ = heapq.heappop(self._first if is_first else self._others)
-            self._given[number] = _Running(task, task.n_results, self._clock())
-            yield rank, number, task
+            _, number, job, _ = heapq.heappop(self._first if is_first else self._others)
+            self._given[number] = _Running(job, job.n_results, self._clock())
+            yield rank, number, job
 
-    def deliver(self, rank: int, number: int, seconds: float) -> Task:
-        """Notes a result, which took so many seconds; returns its task."""
+    def deliver(self, rank: int, number: int, seconds: float) -> Job:
+        """Notes a result, which took so many seconds; returns its job."""
         given = self._given[number]
-        task = given.task
-        self._costs.learn(task.cost_keys, task.cost / task.n_results, seconds)
+        job = given.job
+        self._costs.learn(job.cost_keys, job.cost / job.n_results, seconds)
         given.n_left, given.began = given.n_left - 1, self._clock()
         if given.n_left == 0:
             del self._given[number]
             self._free[rank] = None
-        return task
+        return job
 
-    def task(self, number: int) -> Task:
-        """A running task."""
-        return self._given[number].task
+    def job(self, number: int) -> Job:
+        """A running job."""
+        return self._given[number].job
 
-    def running(self) -> list[tuple[Task, int, float]]:
-        """Running tasks, longest first: the task, number of results to come, time since the last result, s."""
+    def running(self) -> list[tuple[Job, int, float]]:
+        """Running jobs, longest first: the job, number of results to come, time since the last result, s."""
         now = self._clock()
-        busy = [(each.task, each.n_left, now - each.began) for each in self._given.values()]
+        busy = [(each.job, each.n_left, now - each.began) for each in self._given.values()]
         return sorted(busy, key=lambda entry: -entry[2])
 
     def watch(self) -> None:
-        """Called many times a second: now and then orders the waiting tasks anew.
-
-        A running history that takes a hundred times as long as most counts as measured long before its end, in time for
-        the order of similar tasks.
+        """Called many times a second: now and then orders the waiting jobs anew. A running job that takes long counts
+        as measured before its end, in time for the order of similar jobs.
         """
         now = self._clock()
         if now < self._next_watch or not self._others:
             return
         self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
         costs = CostModel(self._costs.sums)
-        for given in self._given.values():
-            task, at_least = given.task, _AS_LONG_AGAIN * (now - given.began)
-            if not task.gives_starts and at_least > task.cost * costs.correction(task.cost_keys):
-                costs.learn(task.cost_keys, task.cost, at_least)
+        for job, _, seconds in self.running():
+            at_least = _AS_LONG_AGAIN * seconds
+            if not job.gives_starts and at_least > job.cost * costs.correction(job.cost_keys):
+                costs.learn(job.cost_keys, job.cost, at_least)
         self._others = [
-            (-task.cost * costs.correction(keys), number, task, keys) for _, number, task, keys in self._others
+            (-job.cost * costs.correction(keys), number, job, keys) for _, number, job, keys in self._others
         ]
         heapq.heapify(self._others)

@@ -22,8 +22,7 @@ from studyrunner.system.process import uninterrupted
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-POLL_SECONDS = 1e-3
-"""Time between two looks for a message, s. A blocking receive would keep a core busy."""
+POLL_SECONDS = 1e-3  # between two looks for a message: a blocking receive would keep a core busy
 
 _SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 _RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK", "SLURM_PROCID")
@@ -32,18 +31,11 @@ _SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _SECONDS_TO_PRINT = 1.0
 _SHARED = "/dev/shm/mpich_shm_"
 _MANY_SENT = 64
-_REMEDY = (
-    "start run-study with the mpiexec of the environment it is installed in or, on a cluster, install mpi4py against"
-    " the site's MPI"
-)
+_REMEDY = "start run-study with the mpiexec of its environment or, on a cluster, install mpi4py against the site's MPI"
 
 
 class LauncherError(Exception):
     """The launcher started processes that cannot work together: each would compute the whole study."""
-
-
-class RankInterrupted:
-    """Message of a rank that was ended from outside; all ranks end."""
 
 
 def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
@@ -77,13 +69,9 @@ class Ranks:
 
     def send(self, message: object, rank: int) -> None:
         """Sends without waiting for the receiver."""
-        raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
 
     def flush(self) -> None:
-        """Waits until all messages are received; called before a rank goes on computing.
-
-        The receiver has to look for messages: a large message moves only while its sender is in the MPI library.
-        """
+        """Waits until all messages are received: a large one moves only while its sender is in the MPI library."""
 
     def receive(self) -> tuple[int, object] | None:
         """Sender and content of the next message, or None where there is none yet."""
@@ -171,9 +159,8 @@ def _unlink_shared_memory() -> None:
 
 
 def start_ranks() -> Ranks:
-    """The ranks that the launcher started, or this process alone where there is no launcher.
-
-    Raises LauncherError where MPI knows of fewer processes, or one of them runs other software.
+    """The ranks that the launcher started, or this process alone without launcher. Raises LauncherError where MPI
+    knows of fewer processes, or one of them runs other software.
     """
     if not any(name in os.environ for name in _SIGNS):
         return Ranks()
@@ -184,25 +171,19 @@ def start_ranks() -> Ranks:
         if announced <= 1:
             return Ranks()
         raise LauncherError(f"{announced} processes were started that cannot talk ({error}): {_REMEDY}") from error
-    host, own = ranks.software[0]
-    other = next(((rank, name) for rank, (name, software) in enumerate(ranks.software) if software != own), None)
-    if announced <= ranks.size and other is None:
+    hosts = {software: host for host, software in ranks.software}
+    if announced > ranks.size:
+        wrong = f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}"
+    elif len(hosts) > 1:
+        versions = "different versions of this program, of Python or of numpy"
+        wrong = f"ranks on {' and '.join(hosts.values())} run {versions}: install the same software for all ranks"
+    else:
         return ranks
     ranks.close()
-    if other is None:
-        raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
-    said = f"rank {other[0]} on {other[1]} runs other versions of this program, of Python or of numpy than"
-    raise LauncherError(f"{said} rank 0 on {host}: install the same software for all ranks")
+    raise LauncherError(wrong)
 
 
 def describe_software() -> tuple[str, str]:
     """Name of this machine, and a hash of what this process runs."""
     packages = map(package_digest, ("solver", "studies", "studyrunner"))
     return platform.node(), " ".join((platform.machine(), *packages))
-
-
-def wait_for_message(ranks: Ranks) -> tuple[int, object]:
-    """Sender and content of the next message; for ranks that have nothing else to do."""
-    while (received := ranks.receive()) is None:
-        time.sleep(POLL_SECONDS)
-    return received

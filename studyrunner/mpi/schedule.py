@@ -1,10 +1,7 @@
-"""Sends tasks to ranks and receives results. This module does not know what a task computes.
+"""Sends jobs to ranks and receives results. Rank 0 computes as well: its main thread serves, a second thread computes.
 
-A task has one result or several; each result is handed on at once. A long task reports its progress from time to time,
-so that another run can continue from there. Rank 0 computes as well: the main thread sends tasks and receives results,
-a second thread computes. `dispatch` decides which rank gets which task.
-
-By hand: in the pools of mpi4py and schwimmbad a task has one result and no progress.
+A job has one result or several, each handed on at once, and reports its progress from time to time, so that another run
+can continue from there. By hand: in the pools of mpi4py and schwimmbad a job has one result and no progress.
 """
 
 from __future__ import annotations
@@ -15,98 +12,70 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
-from studyrunner.mpi.dispatch import CostModel, Dispatcher, Task
-from studyrunner.mpi.mapped_file import UnseenFileError
-from studyrunner.mpi.ranks import POLL_SECONDS, RankInterrupted, Ranks, wait_for_message
-from studyrunner.system.machine import MachineFaultError
+from studyrunner.mpi.dispatch import CostModel, Dispatcher, Job
+from studyrunner.mpi.ranks import POLL_SECONDS, Ranks
+from studyrunner.system.machine import UnseenFileError
 from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 
 SECONDS_TO_PROGRESS = 3.0
-"""Shortest time between two reports of progress of a task, s; longer with many ranks. Together with the second that a
-report waits for others (`checkpoint.store`) a kill loses no step that was finished more than 5 s before, where steps
-are short and the disk is fast enough."""
+"""Shortest time between two reports of progress of a job, s; longer with many ranks. With the time that a report waits
+for others (`checkpoint.store`) a kill loses no step that was finished more than 5 s before, where steps are short."""
 
 _MANY_RANKS = 100  # with more, each reports less often, as rank 0 writes all reports to the disk
 _LOOKS_A_TICK = 100
 _AT_ONCE = 64
 
-Result = Any
-
-Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
-"""Does a task: gives the results one by one and may hand the progress to the given function."""
+Run = Callable[[Job, Callable[[object], None]], Iterable[Any]]
+"""Does a job: gives the results one by one and may hand the progress to the given function."""
 
 
-@dataclass(frozen=True)
-class _Assignment:
-    """A task on its way to a rank."""
+class _Assignment(NamedTuple):
+    """A job on its way to a rank."""
 
     number: int
-    task: Task
+    job: Job
 
 
-@dataclass(frozen=True)
-class _Delivery:
-    """A result that is sent to rank 0, and the time that it took, s."""
-
-    number: int
-    result: Result
-    seconds: float
-
-
-@dataclass(frozen=True)
-class _Progress:
-    """Progress of a task: data to continue from, or words."""
+class _Reply(NamedTuple):
+    """What a rank sends of a job: a result with the time that it took, s; without a time progress, or
+    UnseenFileError where the rank does not see a file that the job brings.
+    """
 
     number: int
-    progress: object
-
-
-@dataclass(frozen=True)
-class _Unseen:
-    """A rank does not see a file that a task brings."""
-
-    number: int
+    content: Any
+    seconds: float | None = None
 
 
 class TaskHandler:
-    """What rank 0 does with tasks, results and messages. All of it is called in the main thread.
-
-    costs: learns the run times of the tasks.
-    """
+    """What rank 0 does with jobs and results, in the main thread. costs: learns the run times of the jobs."""
 
     def __init__(self) -> None:
         self.costs = CostModel()
 
-    def begin(self) -> Iterable[Task]:
-        """Tasks that are possible at the beginning; taken one by one, when ranks can use more."""
+    def begin(self) -> Iterable[Job]:
+        """Jobs that are possible at the beginning; taken one by one, when ranks can use more."""
         raise NotImplementedError
 
-    def take(self, task: Task, result: Result) -> Iterable[Task]:
-        """Takes a result, in the order in which results arrive; returns the tasks that the result makes possible."""
+    def take(self, job: Job, result: Any) -> Iterable[Job]:
+        """Takes a result, in the order in which results arrive; returns the jobs that the result makes possible."""
         raise NotImplementedError
 
-    def prepare(self, rank: int, task: Task, *, unseen: bool = False) -> Task:  # noqa: ARG002
-        """The task as a rank gets it; called once for each task that is sent, in the order of sending.
+    def prepare(self, rank: int, job: Job, *, unseen: bool = False) -> Job:  # noqa: ARG002
+        """The job as it is sent to a rank. unseen: once more, as the rank does not see the files that it brings."""
+        return job
 
-        unseen: whether the task is sent again, to a rank that does not see the files that the task brings.
-        """
-        return task
+    def keep(self, job: Job, progress: object) -> None:
+        """Takes the progress of a job; never after the last result of the job."""
 
-    def keep(self, task: Task, progress: object) -> None:
-        """Takes the progress of a task; never after the last result of the task."""
-
-    def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
-        """Called many times a second. running: returns the running tasks, as `Dispatcher.running`."""
+    def tick(self, running: Callable[[], Sequence[tuple[Job, int, float]]]) -> None:
+        """Called many times a second. running: returns the running jobs, as `Dispatcher.running`."""
 
 
 def serve_tasks(ranks: Ranks, handler: TaskHandler, run: Run) -> None:
-    """Rank 0: has all tasks done and computes some of them.
-
-    An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here, and
-    MachineFaultError or KeyboardInterrupt where another rank has said so.
+    """Rank 0: has all jobs done and does some of them. Raises the exception of a job of its own, or of another rank
+    that has sent one: a fault of the machine, or KeyboardInterrupt.
     """
     server = _Server(ranks, handler, run)
     try:
@@ -116,111 +85,117 @@ def serve_tasks(ranks: Ranks, handler: TaskHandler, run: Run) -> None:
             with uninterrupted():
                 server.look()
     except BaseException:
-        server.local.given_up = True
+        server.own.given_up = True
         raise
-    server.local.stop()
+    server.own.stop()
 
 
-def follow_rank_0(ranks: Ranks, run: Run) -> None:
-    """Any other rank: does the tasks that rank 0 sends, until rank 0 sends None."""
+def follow_rank_0(ranks: Ranks, run: Run, check: Callable[[], None] = raise_ending) -> None:
+    """Any other rank: does the jobs that rank 0 sends, until rank 0 sends None.
 
-    def send(reply: object) -> None:
-        ranks.send(reply, 0)
+    check: raises KeyboardInterrupt where the run ends.
+    """
+    while True:
+        while (received := ranks.receive()) is None:
+            time.sleep(POLL_SECONDS)
+        _, assignment = received
+        if assignment is None:
+            return
+        if not isinstance(assignment, _Assignment):
+            raise TypeError(f"rank 0 sent {assignment!r} instead of a job")
+        _work(assignment, ranks, run, check)
+
+
+def _work(assignment: _Assignment, ranks: Ranks, run: Run, check: Callable[[], None]) -> None:
+    """Sends the results of a job, each as soon as it is there."""
+    job, n_given, began = assignment.job, 0, time.perf_counter()
+    pause = SECONDS_TO_PROGRESS * max(1.0, ranks.size / _MANY_RANKS)
+    sent, first = dict[type, float](), began  # data and words have times of their own
+
+    def send(content: object, seconds: float | None = None) -> None:
+        ranks.send(_Reply(assignment.number, content, seconds), 0)
         ranks.flush()
-
-    while (message := wait_for_message(ranks)[1]) is not None:
-        if not isinstance(message, _Assignment):
-            raise TypeError(f"rank 0 sent {message!r} instead of a task")
-        _work(message, run, send, ranks.size, raise_ending)
-
-
-def _work(
-    assignment: _Assignment, run: Run, send: Callable[[object], None], n_ranks: int, check: Callable[[], None]
-) -> None:
-    """Sends the results of a task, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
-    task, n_given, began = assignment.task, 0, time.perf_counter()
-    pause = SECONDS_TO_PROGRESS * max(1.0, n_ranks / _MANY_RANKS)
-    sent, begin = dict[type, float](), began  # data and words have times of their own
 
     def keep(progress: object) -> None:
         check()
-        # a task that has given all its results has no progress
-        if n_given < task.n_results and time.perf_counter() > sent.get(type(progress), begin) + pause:
-            send(_Progress(assignment.number, progress))
+        # a job that has given all its results has no progress
+        if n_given < job.n_results and time.perf_counter() > sent.get(type(progress), first) + pause:
+            send(progress)
             sent[type(progress)] = time.perf_counter()
 
     try:
-        for result in run(task, keep):
+        for result in run(job, keep):
             n_given += 1
-            if n_given > task.n_results:
+            if n_given > job.n_results:
                 break
-            send(_Delivery(assignment.number, result, time.perf_counter() - began))
+            send(result, time.perf_counter() - began)
             began = time.perf_counter()
-    except UnseenFileError:
-        send(_Unseen(assignment.number))
+    except UnseenFileError as error:
+        send(error)
         return
-    if n_given != task.n_results:
-        raise ValueError(f"not {task.n_results} results from {task}")
+    if n_given != job.n_results:
+        raise ValueError(f"not {job.n_results} results from {job}")
 
 
-class _LocalWorker:
-    """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
+class _OwnThread(Ranks):
+    """The computing thread of rank 0, which is given jobs, and replies, as another rank.
 
-    def __init__(self, run: Run, n_ranks: int) -> None:
-        self._tasks: queue.SimpleQueue[_Assignment | None] = queue.SimpleQueue()
-        self._sent: deque[object] = deque()
+    replies: also the exception that has ended the thread. given_up: the thread ends at the next step of its job.
+    """
+
+    def __init__(self, run: Run, size: int) -> None:
+        self.size = size
+        self._jobs: queue.SimpleQueue[_Assignment | None] = queue.SimpleQueue()
+        self.assign = self._jobs.put
+        self.replies: deque[object] = deque()
         self.given_up = False
-        self.assign = self._tasks.put
-        # A daemon: an exception in the main thread ends the process although a task still runs.
-        name = "tasks of rank 0"
-        self._thread = threading.Thread(target=self._compute, args=(run, n_ranks), name=name, daemon=True)
+        # A daemon: an exception in the main thread ends the process although a job still runs.
+        self._thread = threading.Thread(target=self._follow, args=(run,), daemon=True)
         self._thread.start()
 
-    def receive(self) -> object:
-        """The next message, None where there is none. Raises the exception of a task."""
-        message = self._sent.popleft() if self._sent else None
-        if isinstance(message, BaseException):
-            raise message
-        return message
-
     def stop(self) -> None:
-        """Ends the thread after its last task. Raises an exception that the last task raised after its last result."""
-        self._tasks.put(None)
+        """Ends the thread after its last job. Raises an exception that the last job raised after its last result."""
+        self._jobs.put(None)
         with uninterrupted():
             self._thread.join()
-        self.receive()
+        for error in self.replies:
+            assert isinstance(error, BaseException)
+            raise error
 
-    def _compute(self, run: Run, n_ranks: int) -> None:
+    def _follow(self, run: Run) -> None:
         try:
-            while (assignment := self._tasks.get()) is not None:
-                _work(assignment, run, self._send, n_ranks, self._check)
+            follow_rank_0(self, run, self._check)
         except BaseException as error:  # handed to the main thread, which raises it
-            self._sent.append(error)
+            self.replies.append(error)
 
     def _check(self) -> None:
         if self.given_up:
             raise KeyboardInterrupt
 
-    def _send(self, message: object) -> None:
+    def send(self, message: object, rank: int) -> None:  # noqa: ARG002
         self._check()
-        self._sent.append(message)
+        self.replies.append(message)
+
+    def receive(self) -> tuple[int, object]:
+        return 0, self._jobs.get()
 
 
 class _Server:
+    """The main thread of rank 0."""
+
     def __init__(self, ranks: Ranks, handler: TaskHandler, run: Run) -> None:
         self._ranks, self._handler = ranks, handler
         self._waiting = iter(handler.begin())
         self.dispatcher = Dispatcher(ranks.size, handler.costs, time.monotonic)
-        self.local = _LocalWorker(run, ranks.size)
+        self.own = _OwnThread(run, ranks.size)
 
     def look(self) -> None:
         """Receives what there is; waits a moment where there is nothing."""
         for _ in range(_LOOKS_A_TICK):
-            received, message = self._ranks.receive(), self.local.receive()
-            for sender, content in (received or (0, None), (0, message)):
-                if content is not None:
-                    self._accept(sender, content)
-            if quiet := received is None and message is None:
+            received = [self._ranks.receive(), (0, self.own.replies.popleft()) if self.own.replies else None]
+            for each in filter(None, received):
+                self._accept(*each)
+            if quiet := not any(received):
                 break
         self.dispatcher.watch()
         self._handler.tick(self.dispatcher.running)
@@ -229,32 +204,31 @@ class _Server:
             time.sleep(POLL_SECONDS)
 
     def hand_out(self) -> None:
-        """Sends tasks to the ranks that have none."""
+        """Sends jobs to the ranks that have none."""
         while self.dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
             self.dispatcher.add(more)
-        for rank, number, task in self.dispatcher.assign():
-            self._send(rank, _Assignment(number, self._handler.prepare(rank, task)))
+        for rank, number, job in self.dispatcher.assign():
+            self._send(rank, _Assignment(number, self._handler.prepare(rank, job)))
 
     def _send(self, rank: int, assignment: _Assignment) -> None:
         if rank == 0:
-            self.local.assign(assignment)
+            self.own.assign(assignment)
         else:
             self._ranks.send(assignment, rank)
 
     def _accept(self, rank: int, message: object) -> None:
-        if isinstance(message, _Progress):
-            self._handler.keep(self.dispatcher.task(message.number), message.progress)
-        elif isinstance(message, _Delivery):
-            task = self.dispatcher.deliver(rank, message.number, message.seconds)
-            self.dispatcher.add(self._handler.take(task, message.result))
-            self.hand_out()
-        elif isinstance(message, _Unseen):
-            task = self._handler.prepare(rank, self.dispatcher.task(message.number), unseen=True)
-            self._send(rank, _Assignment(message.number, task))
-        elif isinstance(message, RankInterrupted):
-            begin_ending()
-            raise KeyboardInterrupt
-        elif isinstance(message, MachineFaultError):
+        if isinstance(message, BaseException):
+            if isinstance(message, KeyboardInterrupt):
+                begin_ending()
             raise message
-        else:
+        if not isinstance(message, _Reply):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
+        number, content = message.number, message.content
+        if message.seconds is not None:
+            self.dispatcher.add(self._handler.take(self.dispatcher.deliver(rank, number, message.seconds), content))
+            self.hand_out()
+        elif isinstance(content, UnseenFileError):
+            again = self._handler.prepare(rank, self.dispatcher.job(number), unseen=True)
+            self._send(rank, _Assignment(number, again))
+        else:
+            self._handler.keep(self.dispatcher.job(number), content)

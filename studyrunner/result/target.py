@@ -15,7 +15,7 @@ from studies.scene_error import SceneError
 from studyrunner.checkpoint.store import read_study
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.study.text import read_toml
-from studyrunner.system.files import new_partial, sync
+from studyrunner.system.machine import new_partial, sync
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from studyrunner.scene.answers import SmallArray, StoredScene
 from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.study.study import Study
 from studyrunner.study.text import SCENE_GROUP
-from studyrunner.system.files import find_fault, replacing
+from studyrunner.system.machine import find_fault, replacing
 from studyrunner.user_error import StorageError
 from studyrunner.variables import LOOPS, Variable
 

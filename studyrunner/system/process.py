@@ -1,10 +1,8 @@
 """The process of a command: signals that end it, and streams that nobody reads.
 
 The first signal raises KeyboardInterrupt in the main thread. A callback of an import or of a library may lose this
-exception; then the next call of `raise_ending` raises it again, until `begin_ending` was called.
-
-By hand: `signal` of Python raises at any instruction, and nothing in it defers a signal or keeps a lost one. Streams
-of Python raise an error where nobody reads, at the end of the process as well.
+exception; then the next call of `raise_ending` raises it again, until `begin_ending` was called. By hand: nothing in
+`signal` of Python defers a signal or keeps a lost one, and its streams raise an error where nobody reads.
 """
 
 from __future__ import annotations
@@ -23,23 +21,22 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 """Ctrl-C, the end of the time of a job or of a terminal, and signals that batch systems send before the end."""
 
 SECONDS_OF_GRACE = 10.0
-"""Time after the first signal in which further signals do nothing, s; later ones end the process at once. A launcher
-sends its signal more than once, and a user may press Ctrl-C again. A result of 200 MB is written in 3 s."""
+"""Time after the first signal in which further signals do nothing, s, as a launcher sends its signal more than once;
+later ones end the process at once. A result of 200 MB is written in 3 s."""
 
-INTERRUPTED = 130
-"""Exit status after an end from outside."""
+INTERRUPTED = 130  # exit status after an end from outside
 
 _LAST_STREAM = 2
 
 _n_uninterrupted = 0
 _came: float | None = None  # when the first signal came
-_begun = False
+_handled = False
 
 
 def take_endings() -> None:
     """From now on each of these signals raises KeyboardInterrupt in the main thread, once; ignored ones stay so."""
-    global _came, _begun
-    _came, _begun = None, False
+    global _came, _handled
+    _came, _handled = None, False
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
@@ -47,8 +44,8 @@ def take_endings() -> None:
 
 def begin_ending() -> None:
     """The process comes to its end now: a signal, which may come from the launcher and from a rank, is too late."""
-    global _begun
-    _begun = True
+    global _handled
+    _handled = True
 
 
 def is_ending(error: BaseException) -> bool:
@@ -64,10 +61,7 @@ def raise_ending() -> None:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """A block of the main thread that is done as a whole: a signal during it raises KeyboardInterrupt after it.
-
-    An exception would leave it half done: a message whose memory is freed before it is sent, a lock that is kept.
-    """
+    """A block of the main thread that is done as a whole: a signal during it raises KeyboardInterrupt after it."""
     global _n_uninterrupted
     _n_uninterrupted += 1
     try:
@@ -79,7 +73,7 @@ def uninterrupted() -> Iterator[None]:
 
 
 def _ending_waits() -> bool:
-    return _came is not None and not _begun
+    return _came is not None and not _handled
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
@@ -90,7 +84,7 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
             os._exit(INTERRUPTED)
         return
     _came = now
-    if not _n_uninterrupted and not _begun:
+    if not _n_uninterrupted and not _handled:
         raise KeyboardInterrupt
 
 
@@ -112,27 +106,22 @@ class _Patient(io.FileIO):
 
 
 def keep_talking() -> None:
-    """From here on stdout and stderr take what they are given: a closed pipe or a full log does not end a run.
-
-    What stands in for them, as in a test or a notebook, is left alone.
+    """From here on stdout and stderr, if no others stand in for them, take what they are given: a closed pipe or a full
+    log does not end a run.
     """
     # Closed streams leave their numbers to files that are opened later, and libraries write to these numbers.
     while (nowhere := os.open(os.devnull, os.O_RDWR)) <= _LAST_STREAM:
         pass
     os.close(nowhere)
-    if sys.stdout is sys.__stdout__:
-        sys.stdout = _open_patiently(1, sys.stdout)
-    if sys.stderr is sys.__stderr__:
-        sys.stderr = _open_patiently(_LAST_STREAM, sys.stderr)
+    for number, name in enumerate(("stdout", "stderr"), 1):
+        if (stream := getattr(sys, name)) is getattr(sys, f"__{name}__"):
+            raw: Any = _Patient(number, "w", closefd=False)
+            encoding = None if stream is None else stream.encoding
+            # line by line: those of several processes do not get mixed; what the encoding lacks is shown by its number
+            setattr(sys, name, io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True))
 
 
 def last_error(stream: TextIO) -> OSError | None:
     """Why something that was written to a stream did not arrive; None where it did, or where nobody can know."""
     buffer = getattr(stream, "buffer", None)
     return buffer.error if isinstance(buffer, _Patient) else None
-
-
-def _open_patiently(number: int, stream: TextIO | None) -> TextIO:
-    raw: Any = _Patient(number, "w", closefd=False)
-    # line by line: those of several processes do not get mixed; a name that the encoding lacks is shown by its numbers
-    return io.TextIOWrapper(raw, None if stream is None else stream.encoding, "backslashreplace", line_buffering=True)

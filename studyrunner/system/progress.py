@@ -26,10 +26,8 @@ _YEAR = 8766.0 * 3600.0  # s
 
 @dataclass(frozen=True)
 class Standing:
-    """How far the tasks of a run are.
-
-    n_done, n_points: points. share: of the work that is done, 0 to 1, parts of points included. seconds_left: expected.
-    running: what is computed at the moment, longest first.
+    """How far the tasks of a run are. n_done, n_points: points. share: of the work that is done, 0 to 1, with parts of
+    points. running: what is computed at the moment, longest first.
     """
 
     n_done: int

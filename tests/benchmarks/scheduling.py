@@ -23,6 +23,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskP
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.study.study_file import read_study
-from studyrunner.task_runs import TaskProgress
+from studyrunner.task_runs import StudyRun
 from tests.benchmarks.frame import Table, arguments
 from tests.studyrunner.fakes import plan_of
 
@@ -135,6 +136,7 @@ class MemoryIndex:
     """Takes the place of `CompletionIndex`, without a disk: nothing is there from an earlier run."""
 
     n_points_finished = 0
+    store = SimpleNamespace(crashes=())
 
     def __init__(self, plan: TaskPlan) -> None:
         # keys as in a file
@@ -150,8 +152,6 @@ class MemoryIndex:
     def is_finished(self, _: Task) -> bool:
         return False
 
-    is_suspect = is_finished
-
     def known_starts(self) -> list[tuple[Task, StartResult]]:
         return []
 
@@ -166,7 +166,7 @@ def replay(plan: TaskPlan, costs: DovetailCosts | ScatterCosts, n_ranks: int) ->
     """Tasks of a plan on ranks with a simulated clock: time, s, efficiency, and the one that no order exceeds."""
     clock = work = longest_way = 0.0
     index = MemoryIndex(plan)
-    plan, progress = index.plan, TaskProgress(index)  # type: ignore[arg-type]
+    plan, progress = index.plan, StudyRun(index, None, None)  # type: ignore[arg-type]
     dispatcher: Dispatcher = Dispatcher(n_ranks, progress.costs, lambda: clock)
     ticket = itertools.count()
     arrivals: list[tuple[float, int, int, int, float, Result]] = []

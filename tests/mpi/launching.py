@@ -18,8 +18,8 @@ from typing import IO
 import pytest
 import xarray as xr
 
-from studyrunner import task_runs
 from studyrunner.cli import main
+from studyrunner.kinds.wear import History, Sweep
 
 FAKED = str(Path(__file__).with_name("run_faked.py"))
 ROOT = Path(__file__).parents[2]
@@ -160,7 +160,8 @@ def run_here(arguments: Sequence[str], folder: Path, environment: Mapping[str, s
         for name, value in (environment or {}).items():
             patch.setenv(name, value)
         if arguments[0] == FAKED:
-            patch.setattr(task_runs, "compute_task", compute_fake)
+            for kind in (Sweep, History):
+                patch.setattr(kind, "compute", compute_fake)
             arguments = arguments[1:]
         return main(list(arguments))
 

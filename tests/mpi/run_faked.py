@@ -24,7 +24,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from solver.packing import Packed
-from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
 from studyrunner.kinds.wear import History, Sweep
@@ -47,7 +46,7 @@ FACTS: dict[int, tuple[object, SceneFacts]] = {}
 
 
 def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterator[Result]:
-    """Stands for `task_runs.compute_task`."""
+    """Stands for `Task.compute`."""
     model = models[task.scenes[0]]
     if id(model) not in FACTS:
         FACTS[id(model)] = model, describe_scene(model)
@@ -62,7 +61,7 @@ def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterat
 
 def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iterator[Result]:
     left = list(task.places)
-    for number, started in enumerate(fake_sweep(replace(task, known=frozenset()))):
+    for number, started in enumerate(fake_sweep(replace(task, skipped=frozenset()))):
         if not left:
             return
         if number < gone_on_from(task):
@@ -134,7 +133,7 @@ def watch_memory(samples: list[int]) -> None:
 
 
 if __name__ == "__main__":
-    task_runs.compute_task = compute_fake
+    Sweep.compute = History.compute = compute_fake
     schedule.SECONDS_TO_PROGRESS = float(os.environ.get("FAKE_PROGRESS", "0.03"))
     samples: list[int] = []
     watched = "FAKE_NOTHING" in os.environ and launcher_rank() == 0

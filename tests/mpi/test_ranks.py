@@ -97,8 +97,8 @@ MISSIONS = (
 @pytest.mark.parametrize(
     ("study", "kills"),
     [
-        # when some of the scenes are built, then when some of the histories are there
-        (SCENES, [("computed", 0, 1), ("result", 0, 0)]),
+        # when some of the scenes are built, then when some of the histories are there, and all start states
+        (SCENES, [("computed", 0, 1), ("result", 6, 0)]),
         (MODES, [("result", 2, 1)]),
         # two points with two scenes each: a rank gets both models of a mission with its task
         (MISSIONS, []),
@@ -180,7 +180,7 @@ def test_processes_of_the_launcher_of_another_library(names, said, tmp_path):
 def test_ranks_with_different_software(tmp_path):
     program = tmp_path / "other.py"
     program.write_text(OTHER_VERSION.format(root=str(ROOT), faked=FAKED), encoding="utf-8")
-    assert_refused(run_to_end(2, [str(program), *STUDY], tmp_path), "rank 1", "elsewhere")
+    assert_refused(run_to_end(2, [str(program), *STUDY], tmp_path), "elsewhere", "different versions")
     assert [path.name for path in tmp_path.iterdir()] == ["other.py"]
 
 

@@ -13,8 +13,8 @@ from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import Passage
 from solver.wear.slow_time import Guide
-from studyrunner import task_runs
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
+from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.scene import describe_scene
 from tests.studyrunner.fakes import fake_evaluate
 
@@ -30,7 +30,8 @@ class Solver:
         self.n_results = 0
         self.disturb: Callable[[Task, int], None] = lambda *_: None
         self.change: Callable[[Task, PointResult], PointResult] = lambda _, result: result
-        monkeypatch.setattr(task_runs, "compute_task", self.evaluate)
+        for kind in (Sweep, History):
+            monkeypatch.setattr(kind, "compute", lambda *given: self.evaluate(*given))
 
     def evaluate(self, task: Task, models: Mapping[int, object], _: Keep) -> Iterator[Result]:
         self.tasks.append(task)

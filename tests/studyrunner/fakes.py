@@ -49,11 +49,12 @@ def fake_evaluate(task: Task, facts: SceneFacts = FACTS, seconds: float = 0.0) -
 
 
 def fake_sweep(task: Sweep) -> Iterator[StartResult]:
-    """Start states in the order of the sweep, those that are known left out."""
+    """Start states in the order of the sweep, without those that are skipped."""
     given = (task.settings.harmonics, task.settings.samples, task.settings.tolerance, task.settings.rtol)
     settings = tuple(0.5 if value == "auto" else value for value in given)
     for place in task.places:
-        start = (task.frequencies[place], task.excitation_amplitude, task.direction == "up", *settings)
+        excitation = task.excitation
+        start = (task.frequencies[place], excitation.amplitude, excitation.direction == "up", *settings)
         yield StartResult(place, Packed("fake", (np.array(start),)), moves=place % 2 == 0, n_unknowns=18)
 
 

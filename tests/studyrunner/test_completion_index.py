@@ -13,11 +13,11 @@ import solver
 from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_CRASHES
-from studyrunner.checkpoint.store import RESULTS, STARTS
+from studyrunner.checkpoint.store import RESULTS
 from studyrunner.kinds.task import Identity, solver_digest
 from studyrunner.kinds.wear import Sweep
 from studyrunner.study.study_file import read_study
-from studyrunner.task_runs import TaskProgress
+from studyrunner.task_runs import StudyRun
 from tests.studyrunner.fakes import FACTS, fake_evaluate, fake_sweep, open_completion, plan_of
 
 BASE = (
@@ -39,7 +39,7 @@ def completion_of(folder, *overrides):
 
 def compute(completion, n_tasks=1000):
     """Does what is left as a run does, up to a number of tasks; how many start states and histories it computed."""
-    progress = TaskProgress(completion)
+    progress = StudyRun(completion, None, None)
     waiting = list(progress.begin())
     n_starts = n_histories = 0
     while waiting and n_starts + n_histories < n_tasks:
@@ -165,7 +165,7 @@ def test_tasks_with_which_runs_have_crashed_are_tried_one_after_the_other(folder
     with completion_of(folder) as completion:
         first, *others = completion.plan.sweeps
         completion.store.crashes |= {sweep.key: 1 for sweep in completion.plan.sweeps}
-        progress = TaskProgress(completion)
+        progress = StudyRun(completion, None, None)
         (tried,) = progress.begin()
         assert tried.number == first.number
         new = [progress.take(tried, start) for start in fake_sweep(tried)]
@@ -178,11 +178,11 @@ def test_only_states_from_which_something_begins_are_asked_for(finished):
     with completion_of(finished) as completion:
         sweep = completion.plan.sweeps[0]
         for name in sweep.names:
-            completion.store.forget(STARTS, name)
+            completion.store.forget(RESULTS, name)
         (task,) = [each for each in completion.plan.waiting[0, 1] if each.wear_coefficient == 1e-11]
         completion.store.forget(RESULTS, task.names[0])
         (left,) = completion.sweeps_left()
-        assert left == replace(sweep, known=frozenset({0, 2}))
+        assert left == replace(sweep, skipped=frozenset({0, 2}))
         assert left.n_results == 1
         assert compute(completion) == (1, 1)
 
@@ -200,7 +200,7 @@ def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder):
         completion.forget_failed()
         assert completion.n_points_finished == 10
         (left,) = completion.sweeps_left()
-        assert (left.number, left.known, left.resume) == (1, frozenset({0, 2}), None)
+        assert (left.number, left.skipped, left.resume) == (1, frozenset({0, 2}), None)
         assert compute(completion) == (1, 2)
 
 

@@ -15,12 +15,12 @@ from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
-from studyrunner.mpi.mapped_file import open_mapped, write_mapped
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.study.study_file import read_study
+from studyrunner.system.machine import open_mapped, write_mapped
 from studyrunner.system.progress import ProgressDisplay, Standing
-from studyrunner.task_runs import TaskProgress
+from studyrunner.task_runs import StudyRun
 from tests.benchmarks.scheduling import MemoryIndex
 from tests.studyrunner.fakes import fake_history, fake_sweep, plan_of
 
@@ -167,7 +167,7 @@ def tasks_of():
 
 def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     plan = tasks_of()
-    progress = TaskProgress(MemoryIndex(plan))
+    progress = StudyRun(MemoryIndex(plan), None, None)
     assert progress.look(()).seconds_left == pytest.approx(plan.cost)
     histories = []
     for sweep in plan.sweeps:

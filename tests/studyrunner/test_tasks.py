@@ -13,7 +13,7 @@ from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.cli import main
-from studyrunner.kinds.wear_result import build_result
+from studyrunner.kinds.results import build_result
 from studyrunner.plan import doubts_of_study
 from studyrunner.study.study_file import bundled_studies, read_study
 from studyrunner.variables import ASKED, USUAL
@@ -48,7 +48,7 @@ def assert_every_point_once(study, plan):
 def test_a_ramp_is_a_task_at_each_frequency():
     """Nothing is serial in it: as many ramps as points, and the histories of each from its only state."""
     study, plan = tasks_of("axes.frequency=[160, 150, 155]", "axes.sweep=['ramp', 'up']", *SHARED)
-    ramps = [sweep for sweep in plan.sweeps if sweep.direction == "ramp"]
+    ramps = [sweep for sweep in plan.sweeps if sweep.excitation.direction == "ramp"]
     assert [sweep.frequencies for sweep in ramps] == [(150.0,), (155.0,), (160.0,)]
     assert [sweep.number for sweep in plan.sweeps] == list(range(4))
     assert all(0.0 < sweep.cost < plan.sweeps[-1].cost for sweep in ramps)
@@ -70,8 +70,8 @@ def test_points_know_their_task():
         for point in points_of(task):
             values = {name: axis[place] for place, (name, axis) in zip(point, study.dimensions.items(), strict=True)}
             assert values["frequency"] == sweep.frequencies[task.position] == task.frequency
-            assert values["excitation_amplitude"] == sweep.excitation_amplitude
-            assert values["sweep"] == sweep.direction
+            assert values["excitation_amplitude"] == sweep.excitation.amplitude
+            assert values["sweep"] == sweep.excitation.direction
             assert values["harmonics"] == task.settings.harmonics == sweep.settings.harmonics
             ((integrated, number),) = [task.results[place] for place in task.order if point in task.points(place)]
             assert values["wear_coefficient"] == integrated.wear_coefficients[number]

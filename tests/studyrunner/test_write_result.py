@@ -23,7 +23,7 @@ from studyrunner.result.provenance import describe_run
 from studyrunner.result.target import Target
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
-from studyrunner.system import files
+from studyrunner.system import machine
 from studyrunner.user_error import StorageError
 from studyrunner.variables import ASKED, LOOPS, OF_A_HISTORY, USUAL
 from tests.mpi.launching import options
@@ -155,7 +155,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
             raise OSError("disk full")
         replace_file(source, target)
 
-    monkeypatch.setattr(files.os, "replace", fail)
+    monkeypatch.setattr(machine.os, "replace", fail)
     with pytest.raises(StorageError, match="disk full"):
         write(fake_results(), path)
     assert path.read_text(encoding="utf-8") == "an earlier result"
