@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, cast
@@ -30,7 +32,15 @@ from studyrunner.study.scene_axes import (
     variants_of,
 )
 from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, Worn, find_scene, parameters_of, read_worn
-from studyrunner.study.sections import DEFAULT, SECTIONS, SOLVER_AXES, VARIABLES, SlowTimeSection, WearSection
+from studyrunner.study.sections import (
+    DEFAULT,
+    SECTIONS,
+    SOLVER_AXES,
+    VARIABLES,
+    AxesSection,
+    SlowTimeSection,
+    WearSection,
+)
 from studyrunner.study.study import MODES, Study
 from studyrunner.study.text import format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError
@@ -65,7 +75,10 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
             table = read_toml(path, source)
     except OSError as error:
         raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
+    before = None if archived is None else _about_scenes(_tables_of(table, source))
     _override(table, overrides)
+    if archived is not None and _about_scenes(_tables_of(table, source)) != before:
+        archived = replace(archived, scene_sha256=None)
     return _check_study(table, Origin(source, path, archived, scene))
 
 
@@ -98,6 +111,13 @@ def _tables_of(table: Mapping[str, object], source: str) -> Tables:
     if "scatter" in tables:
         tables["scatter"] = flat_table(tables["scatter"])
     return tables
+
+
+def _about_scenes(tables: Tables) -> str:
+    """All that the scenes of a study depend on, as text."""
+    keys = [(name, value) for name, value in tables["axes"].items() if name not in AxesSection.model_fields]
+    scene = {name: value for name, value in tables["scene"].items() if name != "worn"}
+    return json.dumps([scene, keys, tables.get("scatter")], sort_keys=True, default=str)
 
 
 def _scene_of_result(table: Mapping[str, object], source: str) -> SceneSection:
