@@ -8,10 +8,9 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from studyrunner.study.mission import MissionBlock
 from studyrunner.study.mistakes import check_tables, keys_as_given, scene_errors
 from studyrunner.study.scene_section import SceneSection
-from studyrunner.study.sections import SECTIONS, StudySection
+from studyrunner.study.sections import SECTIONS, MissionBlock, StudySection
 from studyrunner.user_error import UserError, toml_value
 from studyrunner.values import Section
 
@@ -130,19 +129,19 @@ def _keys(table: str, kind: type[Section]) -> Iterator[tuple[str, str, str]]:
         value = None if field.is_required() else field.default
         if table in ("axes", "solver") and isinstance(value, tuple):
             value = value[0]
-        words = ", ".join(f'"{each}"' for each in _words(field.annotation))
-        if words and _is_number(field.annotation):
+        inner = [*_types_and_words(field.annotation)]
+        words = ", ".join(f'"{each}"' for each in inner if isinstance(each, str))
+        if words and {int, float} & {*inner}:
             words = f"a number, or {words}"
         if field.description:
             default = "" if value is None else toml_value(value)
             yield key, default, f"{words}: {field.description}" if words else field.description
 
 
-def _words(annotation: object) -> list[str]:
-    if get_origin(annotation) is Literal:
-        return [each for each in get_args(annotation) if isinstance(each, str)]
-    return [word for each in get_args(annotation) for word in _words(each)]
-
-
-def _is_number(annotation: object) -> bool:
-    return annotation in (int, float) or any(map(_is_number, get_args(annotation)))
+def _types_and_words(annotation: object) -> Iterator[object]:
+    """All types in an annotation, and the words that it takes."""
+    inner = get_args(annotation)
+    for each in inner:
+        yield from (each,) if get_origin(annotation) is Literal else _types_and_words(each)
+    if not inner:
+        yield annotation

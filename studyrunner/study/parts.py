@@ -12,8 +12,8 @@ from pydantic import BaseModel
 
 from studies.scene import ExpectedWear, as_scene
 from studyrunner.scatter import Scattered, ScatteredPairs, draw
-from studyrunner.study.mission import MissionBlock
 from studyrunner.study.scene_section import SceneSection
+from studyrunner.study.sections import MissionBlock
 from studyrunner.study.study import NUMBERS, Study
 from studyrunner.user_error import UserError, WrongValueError
 

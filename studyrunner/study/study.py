@@ -14,14 +14,15 @@ from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner import variables
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
-from studyrunner.study.mission import OWN_AXES, MissionBlock
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.sections import (
     AUTO,
+    OWN_AXES,
     SOLVER_AXES,
     AxesSection,
     LoadingSection,
+    MissionBlock,
     OutputsSection,
     SlowTimeSection,
     SolverSection,

@@ -17,7 +17,6 @@ from pydantic import BaseModel
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter import flat_table
-from studyrunner.study.mission import OWN_AXES, engine_frequency, read_blocks
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
 from studyrunner.study.parts import with_room_for_wear
 from studyrunner.study.rules import broken_rules
@@ -34,12 +33,14 @@ from studyrunner.study.scene_axes import (
 from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, Worn, find_scene, parameters_of, read_worn
 from studyrunner.study.sections import (
     DEFAULT,
+    OWN_AXES,
     SECTIONS,
     SOLVER_AXES,
     VARIABLES,
     AxesSection,
     SlowTimeSection,
     WearSection,
+    read_blocks,
 )
 from studyrunner.study.study import MODES, Study
 from studyrunner.study.text import format_toml, read_archived, read_toml
@@ -181,7 +182,11 @@ def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) 
             of_block = find_scene(SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin)
         own = {name: (getattr(block, name),) for name in OWN_AXES if isinstance(getattr(block, name), float)}
         if block.engine_order is not None:
-            own["frequency"] = (engine_frequency(block, parameters, source),)
+            speed, key = dict(parameters).get("rotation_speed"), f"mission.{block.name}.engine_order"
+            if not isinstance(speed, int | float) or speed <= 0.0:
+                remedy = "give scene.rotation_speed above 0, rpm, which the order multiplies, or a frequency"
+                raise UserError(source, key, block.engine_order, remedy)
+            own["frequency"] = (block.engine_order * float(speed) / 60.0,)
         axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own})
         update = {"mission": (), "slow_time": SlowTimeSection(), "scene": of_block, "axes": axes}
         studies.append(study.model_copy(update=update))
