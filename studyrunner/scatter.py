@@ -23,7 +23,6 @@ Of = Literal["all pairs", "each surface", "each pair"]
 OF_PAIRS = ("area", "friction_coefficient", "gap")
 """Inputs that may differ between the contact pairs; named as in a scene file."""
 
-_OF_ALL = ("friction_coefficient", "all pairs")
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
 _NOT_BELOW_ZERO = ("friction_coefficient", "surfaces_", "threshold", "wear_coefficient")
 
@@ -177,8 +176,8 @@ class ScatterSection(Section):
     @property
     def of_pairs(self) -> tuple[str, ...]:
         """Inputs that belong to contact pairs: gaps, areas, a friction coefficient with draws of its own."""
-        inputs = self.inputs.items()
-        return tuple(name for name, each in inputs if name in OF_PAIRS and (name, each.of) != _OF_ALL)
+        of_all = {name for name, each in self.inputs.items() if each.of == "all pairs"} & {"friction_coefficient"}
+        return tuple(name for name in self.inputs if name in OF_PAIRS and name not in of_all)
 
     @property
     def rows_a_sample(self) -> int:
@@ -193,11 +192,11 @@ class ScatterSection(Section):
 
 def flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
     """[scatter] with inputs by name, factors of surfaces as the dimensions that they have as axes: `surfaces_flat`."""
-    surfaces = table.get("surfaces")
-    if not isinstance(surfaces, Mapping):
-        return dict(sorted(table.items()))
-    others = {name: value for name, value in table.items() if name != "surfaces"}
-    return dict(sorted((others | {f"surfaces_{label}": value for label, value in surfaces.items()}).items()))
+    flat, surfaces = dict(table), table.get("surfaces")
+    if isinstance(surfaces, Mapping):
+        del flat["surfaces"]
+        flat |= {f"surfaces_{label}": value for label, value in surfaces.items()}
+    return dict(sorted(flat.items()))
 
 
 # --- what is drawn ---

@@ -58,10 +58,18 @@ def write_new_study(name: str, deck: Path | None = None) -> Path:
     path = Path(f"{name}.toml")
     with keys_as_given({"study.name": "--new"}):
         check_tables({"study": StudySection}, {"study": {"name": name}}, "command line")
-    text = _new_study(name, _NEW if deck is None else {**_NEW, **_tables_of_deck(deck)})
+    tables = _NEW | ({} if deck is None else _tables_of_deck(deck)) | {"study": {"name": (name, "")}}
+    lines = [_HEAD.format(name=name)]
+    for table in ("study", "scene", "axes", "slow_time", "wear", "solver", "outputs"):
+        given = tables.get(table, {})
+        lines.append(f"[{table}]")
+        lines += [f"{key} = {toml_value(value)}" + f" # {note}" * bool(note) for key, (value, note) in given.items()]
+        others = [each for each in _keys(table, SECTIONS[table]) if each[0] not in given] if table != "scene" else []
+        lines += [f"# {key} = {default} # {meaning}" for key, default, meaning in others if default]
+        lines.append("")
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+            file.write("\n".join([*lines, _TAIL]))
     except OSError as error:
         raise UserError("command line", "--new", name, f"give another name: {error.strerror}") from None
     return path
@@ -97,18 +105,6 @@ def _tables_of_deck(path: Path) -> dict[str, Given]:
         scene["friction_coefficient"] = (0.3, "")
     ratios = ([0.99, 1.0], "over the first natural frequency with all contact pairs stuck; or frequency, Hz")
     return {"scene": scene, "axes": {"frequency_ratio": ratios, "excitation_amplitude": (1.0, "N")}}
-
-
-def _new_study(name: str, tables: dict[str, Given]) -> str:
-    lines = [_HEAD.format(name=name)]
-    for table in ("study", "scene", "axes", "slow_time", "wear", "solver", "outputs"):
-        given: Given = {"name": (name, "")} if table == "study" else tables.get(table, {})
-        lines.append(f"[{table}]")
-        lines += [f"{key} = {toml_value(value)}" + f" # {note}" * bool(note) for key, (value, note) in given.items()]
-        others = [each for each in _keys(table, SECTIONS[table]) if each[0] not in given] if table != "scene" else []
-        lines += [f"# {key} = {default} # {meaning}" for key, default, meaning in others if default]
-        lines.append("")
-    return "\n".join([*lines, _TAIL])
 
 
 def key_list() -> str:

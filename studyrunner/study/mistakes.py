@@ -75,8 +75,8 @@ def check_tables(kinds: Mapping[str, type[BaseModel]], tables: Mapping[str, Any]
             # tables of scenes are made for other callers as well, and take this from their caller
             checked[name] = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
         except ValidationError as error:
-            for each in _wrong_keys(error, kind, table, elsewhere):
-                wrong.append(each._replace(key=f"{name}.{each.key}" if each.key else name))
+            found = _wrong_keys(error, kind, table, elsewhere)
+            wrong += (each._replace(key=f"{name}.{each.key}".removesuffix(".")) for each in found)
     raise_wrong(source, wrong)
     return checked
 

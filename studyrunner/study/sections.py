@@ -220,8 +220,7 @@ class OutputsSection(Section):
         (DEFAULT,), description="list of names; default: those that cost little"
     )
     loops: Annotated[
-        Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]],
-        AfterValidator(lambda loops: tuple(sorted(once(loops)))),
+        Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]], AfterValidator(lambda loops: tuple(sorted(once(loops))))
     ] = Field((), description="list of the contact pairs, from 0 on, whose fretting loops are stored")
     scene: bool = Field(False, description="whether the result holds the reduced model of a bundled scene")
 

@@ -30,7 +30,7 @@ from studyrunner.study.scene_axes import (
     take_axes,
     variants_of,
 )
-from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, Worn, find_scene, parameters_of, read_worn
+from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, parameters_of, read_worn
 from studyrunner.study.sections import (
     DEFAULT,
     OWN_AXES,
@@ -148,7 +148,11 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     with keys_as_given({**keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
         variants, studies = [*variants_of(tables, axes)], []
         sections = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
-        worn_axis = _worn_axis(worn, "cycle" if sections["axes"].modal_amplitude else WORN_AXIS)
+        worn_axis: tuple[SceneAxis, ...] = ()
+        if worn is not None and worn.cycle:
+            name = "cycle" if sections["axes"].modal_amplitude else WORN_AXIS
+            meaning = "number of vibration cycles that have worn the joint before"
+            worn_axis = (SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),)
         fixed = {"mission": blocks, "source": source, "folder": origin.path.parent, "archived": origin.archived}
         fixed |= {"solver_axes": solver_axes, "scene_axes": (*axes, *worn_axis)}
         for given in variants:
@@ -164,12 +168,6 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     if scene_axes := (*as_checked(axes, study), *worn_axis):
         study = study.model_copy(update={"scene_axes": scene_axes, "variants": tuple(studies)})
     return study
-
-
-def _worn_axis(worn: Worn | None, name: str) -> tuple[SceneAxis, ...]:
-    """The axis of worn states, the last one; none where their cycle counts are not known."""
-    meaning = "number of vibration cycles that have worn the joint before"
-    return (SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),) if worn and worn.cycle else ()
 
 
 def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
