@@ -246,7 +246,10 @@ def _lost(sweep: Sweep[ModeState]) -> Failure:
     assert here is not None
     at = f"{here.parameter:.4g} m sqrt(kg), at {here.omega / (2.0 * np.pi):.6g} Hz"
     ends = "the mode turns back there (a fold), meets another mode at a multiple of its frequency, or ends"
-    said = f"the mode is followed {way} to the amplitude {at}; no state is found at a {beyond} amplitude: {ends}"
+    # the sweep may go on behind a fold that one of its steps has passed
+    behind = sweep.here and sweep.ahead
+    where = f"from there to {behind.state.parameter:.4g} m sqrt(kg)" if behind else f"at a {beyond} amplitude"
+    said = f"the mode is followed {way} to the amplitude {at}; no state is found {where}: {ends}"
     return Failure(Outcome.BRANCH_LOST, said)
 
 

@@ -257,7 +257,9 @@ class Run:
             # no more accurate than the tolerance needs
             return direction(at, max(FORCING, 0.1 * self.tolerance / max(at.scaled_residual(), self.tolerance)))
 
-        end = solve_newton(evaluate, within_time, start, self.tolerance, MOST_ITERATIONS if most is None else most)
+        # an iteration that diverges ends by its residual, without a warning of numpy
+        with np.errstate(over="ignore", invalid="ignore"):
+            end = solve_newton(evaluate, within_time, start, self.tolerance, MOST_ITERATIONS if most is None else most)
         self.budget.iterations += end.iterations
         return end
 

@@ -251,3 +251,8 @@ def test_a_direction_without_any_stiffness_is_left_alone():
     end = Run(1e-10).solve(Balance(joint, np.zeros((1, 2)), np.zeros(1)), np.zeros((1, 7)))
     assert end.converged
     assert end.evaluation.displacement_h[0, 1, :3] == pytest.approx([0.0, -3.0, 0.0], abs=0.1)
+
+
+def test_an_iteration_that_leaves_all_numbers_gives_no_state_and_no_warning():
+    balance, predicted = random_balance(random_model(3, ("3d", "normal_only")), SolverSettings(3, 24), 4, wear=False)
+    assert not Run(1e-8).solve(balance, 1e305 * predicted).converged
