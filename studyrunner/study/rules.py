@@ -37,10 +37,8 @@ def _kind(study: Study) -> Iterator[Wrong]:
         yield Wrong("scene.worn.cycle", None, remedy)
     if kind is not MODES and axes.mode != (1,):
         yield Wrong("axes.mode", axes.mode, "give axes.modal_amplitude as well: mode is that of a nonlinear mode")
-    if kind is MISSIONS and missions is None:
-        yield Wrong("slow_time.missions", None, "missing: give how often the blocks are repeated")
-    if kind is WEAR and missions is not None:
-        yield Wrong("slow_time.missions", missions, "give slow_time.cycles in its place, or blocks under [[mission]]")
+    if kind is not MODES and (kind is MISSIONS) != (missions is not None):
+        yield Wrong("slow_time.missions", missions, "give it with blocks under [[mission]], else slow_time.cycles")
 
 
 def _blocks(study: Study) -> Iterator[Wrong]:
@@ -48,14 +46,13 @@ def _blocks(study: Study) -> Iterator[Wrong]:
     blocks, axes = study.mission, study.axes
     for before, block in zip((*blocks[-1:], *blocks), blocks, strict=False):
         key, (theirs, ours) = f"mission.{block.name}", (before.parameters, block.parameters)
-        changed = [name for name in {**theirs, **ours} if theirs.get(name) != ours.get(name)]
+        changed = any(theirs.get(name) != ours.get(name) for name in {**theirs, **ours})
         if not block.gives("frequency") and not axes.frequency:
             yield Wrong(f"{key}.frequency", None, "missing: give it here, or axes.frequency for all blocks without one")
-        if block.begin == "continue" and changed:
-            remedy = f'give "ramp": {before.name}, the block before, differs in {changed[0]}'
-            yield Wrong(f"{key}.begin", "continue", remedy)
-        if block.begin == "sweep" and block.passage is None and "ramp" in axes.sweep:
-            yield Wrong(f"{key}.begin", "sweep", 'give "ramp", or axes.sweep = "up" or "down"')
+        no_sweep = block.begin == "sweep" and block.passage is None and "ramp" in axes.sweep
+        if no_sweep or (block.begin == "continue" and changed):
+            remedy = 'give "ramp": only blocks with the same keys of [scene] continue, and axes.sweep sweeps up or down'
+            yield Wrong(f"{key}.begin", block.begin, remedy)
     for name in (*OWN_AXES, *(axis.name for axis in study.scene_axes)):
         given = name not in OWN_AXES or name in axes.model_fields_set
         if blocks and given and all(block.gives(name) for block in blocks):
@@ -66,23 +63,15 @@ def _frequency(study: Study) -> Iterator[Wrong]:
     """The frequency is given once: in Hz, as a ratio, or as a resonance in a range."""
     axes, word, frequency = study.axes, _followed(study), list(study.axes.frequency or ())
     given = axes.model_fields_set & {"frequency", "frequency_ratio"}
-    if study.kind is WEAR and not given:
-        yield Wrong("axes.frequency", None, "missing: give it, in Hz, or frequency_ratio")
-    if len(given) > 1:
-        yield Wrong("axes.frequency", frequency, "leave it out, or frequency_ratio: give one of both")
-    if word is None:
-        if study.loading is not None:
-            remedy = 'leave it out: it is the range of axes.frequency = "peak"'
-            yield Wrong("loading", study.loading.model_dump(), remedy)
-        return
-    if study.kind is MISSIONS:
-        yield Wrong("axes.frequency", word, "give frequencies in Hz: blocks of a mission follow no resonance")
-    if len(frequency) > 1:
-        yield Wrong("axes.frequency", frequency, f'give "{word}" alone: every point has the frequency that it finds')
-    if "ramp" in axes.sweep:
-        yield Wrong("axes.sweep", "ramp", f'give "up" or "down": a ramp has a fixed frequency, and no {word}')
-    if "final" in axes.scheme:
-        yield Wrong("axes.scheme", "final", f'give "adaptive": the scheme "final" has a fixed frequency, and no {word}')
+    if (study.kind is WEAR and not given) or len(given) > 1:
+        yield Wrong("axes.frequency", frequency or None, "give either it, in Hz, or frequency_ratio")
+    if word is None and study.loading is not None:
+        remedy = 'leave it out: it is the range of axes.frequency = "peak"'
+        yield Wrong("loading", study.loading.model_dump(), remedy)
+    is_fixed = study.kind is MISSIONS or "ramp" in axes.sweep or "final" in axes.scheme
+    if word is not None and (is_fixed or len(frequency) > 1):
+        remedy = f'give Hz: "{word}" stands alone, and goes with no mission, no sweep "ramp" and no scheme "final"'
+        yield Wrong("axes.frequency", frequency, remedy)
 
 
 def _followed(study: Study) -> str | None:
@@ -100,10 +89,9 @@ def _outputs(study: Study) -> Iterator[Wrong]:
         remedy = ""
         if name not in (DEFAULT, *OF_A_HISTORY, *known):
             remedy = f"give {nearest_name(name, known)}, for {study.kind.name}"
-        elif name in ("mesh", "exact") and name not in study.scene.offers:
+        elif name in ("mesh", "exact") and (name not in study.scene.offers or (name == "exact" and no_exact)):
             remedy = f"leave it out: the scene {study.scene.model} has none"
-        elif name == "exact" and no_exact:
-            remedy = "leave it out: it is of given frequencies and cycle counts, and of pairs that scatter in nothing"
+            remedy += ", or not with these frequencies, cycle counts and pairs" if name == "exact" else ""
         elif name == "natural_frequency" and "nodal_diameter" in study.dimensions and name in study.scene_variables:
             remedy = "leave it out: its own dimension is nodal_diameter, too"
         if remedy:
@@ -128,11 +116,9 @@ def _solver_and_end(study: Study) -> Iterator[Wrong]:
         yield Wrong("wear.law", "table", remedy)
     if study.to_the_end and "explicit" in schemes:
         yield Wrong("axes.scheme", "explicit", 'give "adaptive" or "implicit": with cycles = inf steps have to grow')
-    if "final" in schemes and not study.to_the_end:
-        remedy = 'give inf: the scheme "final" finds where nothing wears any more'
-        yield Wrong("slow_time.cycles", slow_time.cycles, remedy)
-    if "final" in schemes and slow_time.until is not None:
-        yield Wrong("slow_time.until", slow_time.until, 'leave it out: the scheme "final" computes no way to it')
+    if "final" in schemes and (not study.to_the_end or slow_time.until is not None):
+        remedy = "give slow_time.cycles = inf, without until, beside it: it finds where nothing wears any more"
+        yield Wrong("axes.scheme", "final", remedy)
 
 
 def _scatter(study: Study) -> Iterator[Wrong]:

@@ -125,11 +125,8 @@ class WearSection(Section):
         """Each law takes its own keys, and a table has a factor for each pressure and depth."""
         for law, keys in self.TAKEN.items():
             for key in keys:
-                value = getattr(self, key)
-                if law == self.law and value is None:
-                    yield Wrong("law", law, f"give wear.{key} beside it")
-                if law != self.law and value is not None:
-                    yield Wrong(key, value, f'leave it out: only the law "{law}" takes it')
+                if (law == self.law) != ((value := getattr(self, key)) is not None):
+                    yield Wrong(key, value, f'give it with the law "{law}", and with no other law')
         n_rows, n_columns = len(self.pressure or ()), len(self.depth or ())
         if self.factor is not None and [len(row) for row in self.factor] != [n_columns] * n_rows:
             remedy = f"give a row for each of {n_rows} pressures, with a number for each of {n_columns} depths"
@@ -184,19 +181,16 @@ class SlowTimeSection(Section):
         """The outputs lie on the way to the end."""
         missions, cycles, outputs = self.missions, self.cycles, self.outputs
         counts = outputs if isinstance(outputs, tuple) else ()
-        if missions is not None:
-            if counts and (counts[-1] > missions or any(count != round(count) for count in counts)):
-                remedy = f"give whole numbers of missions, at most slow_time.missions = {missions}"
-                yield Wrong("outputs", outputs, remedy)
-            if self.until is not None and "frequency_shift" in self.until:
-                remedy = "give wear_depth or worn_volume: blocks of a mission have frequencies of their own"
-                yield Wrong("until", self.until, remedy)
-        elif counts and cycles == math.inf:
+        if missions is not None and self.until is not None and "frequency_shift" in self.until:
+            remedy = "give wear_depth or worn_volume: blocks of a mission have frequencies of their own"
+            yield Wrong("until", self.until, remedy)
+        if counts and missions is None and cycles == math.inf:
             remedy = "give their number: with slow_time.cycles = inf they are spaced evenly in worn volume and cycles"
             yield Wrong("outputs", outputs, remedy)
-        elif counts and counts[-1] > cycles:
-            yield Wrong("outputs", counts[-1], f"give cycle counts of at most slow_time.cycles = {cycles:g}")
-        elif outputs == 1 and cycles > 0.0:
+        if counts and (counts[-1] > (missions or cycles) or (missions and any(each != round(each) for each in counts))):
+            remedy = "give cycle counts of at most slow_time.cycles, or whole numbers of at most slow_time.missions"
+            yield Wrong("outputs", outputs, remedy)
+        if outputs == 1 and missions is None and cycles > 0.0:
             yield Wrong("outputs", outputs, "give at least 2: cycle 0 and the last one")
 
 
@@ -258,13 +252,10 @@ class MissionBlock(Section):
         """A block has one frequency and one duration."""
         if self.frequency is not None and self.engine_order is not None:
             yield Wrong("engine_order", self.engine_order, "leave it out, or frequency: give one of both")
-        durations = [key for key in ("cycles", "seconds") if getattr(self, key) is not None]
-        if self.passage is not None:
-            for key in durations:
-                yield Wrong(key, getattr(self, key), "leave it out: a passage takes as long as its rate says")
-            if self.begin != "sweep":
-                yield Wrong("begin", self.begin, 'give "sweep", or leave it out: a passage is a sweep')
-        elif len(durations) != 1:
+        if self.passage is not None and (self.cycles or self.seconds or self.begin != "sweep"):
+            remedy = "leave out cycles, seconds and begin: a passage is a sweep, as long as its rate says"
+            yield Wrong("frequency", self.frequency, remedy)
+        if self.passage is None and (self.cycles is None) == (self.seconds is None):
             yield Wrong("cycles", self.cycles, "give either cycles or seconds, the duration of the block in a mission")
 
     @property
