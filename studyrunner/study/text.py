@@ -70,12 +70,9 @@ def _user_errors(name: str) -> Iterator[None]:
     """What is wrong with a result file, called `name` by the user, becomes UserError."""
     try:
         yield
-    except SceneError as error:
-        where = "the file" if error.key == "model" else f"the attribute {error.key}"
-        raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
     except (OSError, RuntimeError, ValueError, TypeError, KeyError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "damaged"
-        raise UserError(name, "the file", Verbatim(reason), "give a result file that can be read") from None
+        reason = error.value if isinstance(error, SceneError) else getattr(error, "strerror", None) or "damaged"
+        raise UserError(name, "the file", Verbatim(reason), "give a result file of run-study that is whole") from None
 
 
 def read_archived(path: Path, name: str) -> Archived:
