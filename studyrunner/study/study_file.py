@@ -264,18 +264,18 @@ def _worn_states(study: Study) -> dict[str, object] | None:
 def _override(table: Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
     """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
     if isinstance(overrides, Mapping):
-        for key, value in overrides.items():
-            _set_key(table, key, _plain(value), "overrides", key)
-        return
-    for text in [overrides] if isinstance(overrides, str) else overrides:
-        key, equals, value_text = (part.strip() for part in text.partition("="))
-        if not equals or not all(key.split(".")):
-            raise UserError("command line", "--set", text, "give KEY=VALUE with the dotted name of a key")
-        _set_key(table, key, _value_of(key, value_text), "command line", f"--set {key}")
+        source, option, given = "overrides", "", [(key, _plain(value)) for key, value in overrides.items()]
+    else:
+        texts = [overrides] if isinstance(overrides, str) else overrides
+        source, option, given = "command line", "--set ", [_key_and_value(text) for text in texts]
+    for key, value in given:
+        if not isinstance(key, str) or not all(key.split(".")) or not _set_key(table, key, value):
+            remedy = "give the dotted name of a key in a table, that of a block with the name of the block"
+            raise UserError(source, f"{option}{key}", value, remedy)
 
 
-def _set_key(table: Tables, key: str, value: object, source: str, shown: str) -> None:
-    """Sets the key of a dotted name. source, shown: where the user gave it, and how it is called there."""
+def _set_key(table: Tables, key: str, value: object) -> bool:
+    """Sets the key of a dotted name, or with None leaves it out; whether there is a table that can hold it."""
     (*names, last), place = key.split("."), cast("Any", table)
     for name in names:
         if isinstance(place, list):
@@ -283,14 +283,12 @@ def _set_key(table: Tables, key: str, value: object, source: str, shown: str) ->
             blocks = {str(number): each for number, each in enumerate(place)}
             place = (blocks | {str(each.get("name")): each for each in place if isinstance(each, dict)}).get(name)
         else:
-            place = place.setdefault(name, {})
-        if not isinstance(place, dict | list):
-            raise UserError(source, shown, value, f"{name} is no table: give a key of a table")
+            place = place.setdefault(name, {}) if isinstance(place, dict) else None
     if not isinstance(place, dict):
-        raise UserError(source, shown, value, f"give {'.'.join(names)}.NAME.KEY with the name of a table in this list")
+        return False
     if value is None:
         place.pop(last, None)
-        return
+        return True
     place[last] = value
     place.pop(_INSTEAD.get(key, ""), None)
     # the last place where a key is given counts, here or under [axes]
@@ -300,19 +298,22 @@ def _set_key(table: Tables, key: str, value: object, source: str, shown: str) ->
         given = table.get(other)
         if isinstance(given, dict) and not is_table(given.get(last)):
             given.pop(last, None)
+    return True
 
 
-def _value_of(key: str, text: str) -> object:
+def _key_and_value(text: str) -> tuple[str, object]:
+    """The key and the value in KEY=VALUE, where VALUE is TOML or a bare word. Raises UserError."""
+    key, _, value = (part.strip() for part in text.partition("="))
     try:
-        parsed = read_toml(f"value = {text}".encode(), "")
+        parsed = read_toml(f"value = {value}".encode(), "")
     except UserError:
-        if re.fullmatch(r"[^\s\"'\[\]{}=,#]+", text):
-            return text
-        remedy = f'give a TOML value or a bare word; words in a list stand in quotes, as \'{key}=["up", "down"]\''
-        raise UserError("command line", f"--set {key}", text, remedy) from None
+        parsed = {"value": value} if re.fullmatch(r"[^\s\"'\[\]{}=,#]+", value) else {}
     if set(parsed) != {"value"}:
-        raise UserError("command line", f"--set {key}", text, "give one TOML value")
-    return parsed["value"]
+        remedy = (
+            f'give KEY=VALUE with a TOML value or a bare word; words in a list in quotes, as \'{key}=["up", "down"]\''
+        )
+        raise UserError("command line", f"--set {key}", value, remedy)
+    return key, parsed["value"]
 
 
 def _plain(value: object) -> object:

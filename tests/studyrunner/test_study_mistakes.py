@@ -209,6 +209,7 @@ COMMANDS = [
     ("s.toml --bogus", "command line: options"),
     ("s.toml --set axes.step=[1,", "command line: --set axes.step"),
     ("s.toml --set study.name.first=a", "command line: --set study.name.first"),
+    ("s.toml --set axes.step", "command line: --set axes.step"),
     ("s.toml -o nowhere/out.nc", "command line: -o"),
     ("s.toml -o \udcff.nc", "command line: -o"),
     ("s.toml -o s.toml", "command line: -o"),
