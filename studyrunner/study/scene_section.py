@@ -160,10 +160,11 @@ def parameters_of(model: object, source: str, folder: Path | None = None) -> typ
         raise UserError(source, "scene.model", model, error.remedy) from None
 
 
-def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
+def find_scene(scene: SceneSection, origin: Origin, known: SceneSection | None = None) -> SceneSection:
     """The scene with its files and what it offers: in the result that is read, in files, or to be built.
 
-    scene: checked. Raises UserError where there is no such file, or the result holds the model of another scene.
+    scene: checked. known: of another variant of the study, whose file is not read again. Raises UserError where there
+    is no such file, or the result holds the model of another scene.
     """
     model, before = scene.model, origin.scene
     if scene.is_bundled:
@@ -172,7 +173,7 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
         ours, theirs = scene.of_model, before.of_model
         changed = [key for key in {**theirs, **ours} if ours.get(key) != theirs.get(key)]
         if not changed:
-            return _in_file(scene, origin.path, SCENE_GROUP, origin)
+            return _in_file(scene, origin.path, SCENE_GROUP, origin, known)
         if not scene.is_bundled:
             remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
             raise UserError(origin.source, f"scene.{changed[0]}", ours.get(changed[0]), remedy)
@@ -185,7 +186,7 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
         if not exists:
             remedy = "there is no such file: give a path relative to the study file"
             raise UserError(origin.source, "scene.model", model, remedy)
-        return _in_file(scene, path, "", origin)
+        return _in_file(scene, path, "", origin, known)
     # what reads and reduces it is loaded where there is one
     from studies.fe_models.from_files.model import find_files
     from studies.fe_models.from_files.parameters import Parameters
@@ -196,10 +197,12 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
     return scene.model_copy(update={"files": files, "offers": ("mesh",) if files.has_faces else ()})
 
 
-def _in_file(scene: SceneSection, path: Path, group: str, origin: Origin) -> SceneSection:
+def _in_file(scene: SceneSection, path: Path, group: str, origin: Origin, known: SceneSection | None) -> SceneSection:
     """The scene in a file, once it is known that it can be read at all."""
     from studies.scene_file import read_mesh
 
+    if known is not None and (known.path, known.group) == (path, group):
+        return scene.model_copy(update={"path": path, "group": group, "offers": known.offers})
     with scene_errors(origin.source, path):
         offers = scene.offers or (("mesh",) if read_mesh(path, group) is not None else ())
     return scene.model_copy(update={"path": path, "group": group, "offers": offers})

@@ -146,7 +146,7 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
         tables.setdefault("loading", {})
     kinds: dict[str, type[BaseModel]] = {name: each for name, each in SECTIONS.items() if name in tables}
     with keys_as_given({**keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
-        variants, studies = [*variants_of(tables, axes)], []
+        variants, studies = [*variants_of(tables, axes)], list[Study]()
         sections = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
         worn_axis: tuple[SceneAxis, ...] = ()
         if worn is not None and worn.cycle:
@@ -159,7 +159,8 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
             checked = check_tables({"scene": kind, "wear": WearSection}, given, source)
             for state in (None,) if worn is None else worn.states():
                 scene = SceneSection(model=model, parameters=checked["scene"], worn=state)
-                own = {"scene": find_scene(scene, origin), "wear": checked["wear"]}
+                known = studies[0].scene if studies else None
+                own = {"scene": find_scene(scene, origin, known), "wear": checked["wear"]}
                 study = Study.model_construct(**{**sections, **fixed, **own})
                 raise_wrong(source, broken_rules(study))
                 study = study.model_copy(update={"scene_axes": ()})
@@ -177,7 +178,9 @@ def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) 
         with keys_as_given({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
             table = {"scene": {**given, **block.parameters}}
             parameters = check_tables({"scene": type(scene.parameters)}, table, source)["scene"]
-            of_block = find_scene(SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin)
+            of_block = find_scene(
+                SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin, scene
+            )
         own = {name: (getattr(block, name),) for name in OWN_AXES if isinstance(getattr(block, name), float)}
         if block.engine_order is not None:
             speed, key = dict(parameters).get("rotation_speed"), f"mission.{block.name}.engine_order"
