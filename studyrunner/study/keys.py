@@ -79,8 +79,6 @@ def _tables_of_deck(path: Path) -> dict[str, Given]:
     """[scene] and [axes] for a deck: the load acts on the free set of nodes that is farthest from what is held."""
     from studies.fe_models.deck.read import read_deck  # where it is used: it takes a while to load
 
-    if path.suffix.lower() == ".csv":
-        raise UserError("command line", "--from", str(path), "give a deck; of reduced matrices: see OWN_MODEL.md")
     with scene_errors("command line", path):
         deck = read_deck(path)
     held = np.unique(np.concatenate([each.nodes for each in deck.boundaries] or [deck.node_numbers[:1]]))

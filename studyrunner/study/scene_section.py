@@ -143,8 +143,7 @@ def parameters_of(model: object, source: str, folder: Path | None = None) -> typ
     folder: relative paths start here; None where a result holds the scene.
     """
     if not isinstance(model, str):
-        remedy = "give a bundled scene or the path of a scene file, in quotes"
-        raise UserError(source, "scene.model", model, remedy if model is not None else f"missing: {remedy}")
+        raise UserError(source, "scene.model", model, "give a bundled scene or the path of a scene file, in quotes")
     if _names_model(model):
         if folder is not None:  # a file that is missing is named before keys that are
             with scene_errors(source, None):
