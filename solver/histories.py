@@ -31,7 +31,7 @@ from solver.settings import (
 )
 from solver.structure.joint import friction_of_pairs
 from solver.wear.history import integrate_together
-from solver.wear.problem import WearRequest, steps_of
+from solver.wear.wearing_joint import WearRequest, steps_of
 
 
 def march_wear(
@@ -115,8 +115,8 @@ def march_wear(
     _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     steps = steps_of(scheme, length, settings.rtol)
-    asked = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
-    return next(integrate_together(model, friction, settings, start, (asked,)))
+    request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
+    return next(integrate_together(model, friction, settings, start, (request,)))
 
 
 def _check_frequency(
@@ -180,11 +180,10 @@ def integrate_mission(
     if isinstance(blocks, Block) or not blocks:
         raise ValueError("blocks: give a list with at least one block")
     check_kind("law", law, WearLaw)
-    for place, block in enumerate(blocks):
-        check_kind(f"blocks[{place}]", block, Block)
     checked = tuple(_checked(block, place, settings, law) for place, block in enumerate(blocks))
     for place, block in enumerate(checked):
-        _check_neighbours(checked[place - 1], block, place)
+        if (reason := _does_not_follow(checked[place - 1], block)) is not None:
+            raise ValueError(f"{_called(place, block)}: {reason}")
     counts = check_numbers("missions", missions, least=0.0)
     if (np.diff(counts) <= 0.0).any() or (counts != np.round(counts)).any() or counts[-1] < 1.0:
         raise ValueError("missions: give ascending whole numbers, the last of at least 1")
@@ -200,6 +199,7 @@ def integrate_mission(
 
 def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -> Block:
     """The block with its numbers checked; errors name it by its number and its name."""
+    check_kind(f"blocks[{place}]", block, Block)
     try:
         check_word("begin", block.way, get_args(Begin))
         load, friction = check_case(block.model, block.excitation_amplitude, block.friction_coefficient, "up", settings)
@@ -225,23 +225,22 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
         raise ValueError(f"{_called(place, block)}: {error}") from error
 
 
-def _check_neighbours(before: Block, block: Block, place: int) -> None:
-    """Raises ValueError where a block does not have the pairs of the block before, or cannot continue it."""
+def _does_not_follow(before: Block, block: Block) -> str | None:
+    """Why a block does not have the pairs of the block before, or cannot continue it; else None."""
     one, other = before.model.contact, block.model.contact
     same = one.n_contact == other.n_contact and (one.area == other.area).all() and one.surface == other.surface
-    said = ""
     if not same or ((one.dofs < 0) != (other.dofs < 0)).any():
-        said = "model: give equal contact pairs to all blocks"
-    elif before.model.response_names != block.model.response_names:
-        said = "model: give equal responses to all blocks"
-    elif block.way == "continue":
-        rubs = [friction_of_pairs(each.model, each.friction_coefficient) for each in (before, block)]
-        if before.excitation_amplitude == 0.0:
-            said = "begin: the block before does not vibrate: begin with a ramp"
-        elif before.model is not block.model or (rubs[0] != rubs[1]).any():
-            said = 'begin: continue goes with the model and friction of the block before: give "ramp", "up" or "down"'
-    if said:
-        raise ValueError(f"{_called(place, block)}: {said}")
+        return "model: give equal contact pairs to all blocks"
+    if before.model.response_names != block.model.response_names:
+        return "model: give equal responses to all blocks"
+    if block.way != "continue":
+        return None
+    if before.excitation_amplitude == 0.0:
+        return "begin: the block before does not vibrate: begin with a ramp"
+    friction = [friction_of_pairs(each.model, each.friction_coefficient) for each in (before, block)]
+    if before.model is block.model and (friction[0] == friction[1]).all():
+        return None
+    return 'begin: continue goes with the model and friction of the block before: give "ramp", "up" or "down"'
 
 
 def _called(place: int, block: Block) -> str:

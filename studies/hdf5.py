@@ -51,10 +51,9 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
 
 
 def find_datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
-    """Datasets below a group, by name with the groups above.
+    """Datasets below a group, by name with the groups above, without those that only name a dimension.
 
-    Datasets that only name a dimension, and named types, are left out. Raises SceneError where a dataset is stored
-    elsewhere, has another type than numbers and text, or all together are too large.
+    Raises SceneError where a dataset is stored elsewhere or of an unknown type, or all together are too large.
     """
     links: list[tuple[str, Any]] = []
     group.visititems_links(lambda name, link: links.append((name, link)))
@@ -72,8 +71,6 @@ def find_datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
         # a dimension without variable, in the sense of NetCDF
         if kind is None or (item.ndim == 1 and item.is_scale and "_Netcdf4Dimid" in item.attrs):
             continue
-        if not _is_number(kind) and h5py.check_string_dtype(kind) is None:
-            raise SceneError(key, f"type {kind}", "give numbers or text")
         if item.external or item.is_virtual:
             raise SceneError(key, "data in another file", "store the data in this file")
         # numbers become real or complex ones of double precision
@@ -99,9 +96,14 @@ def read_dataset(datasets: Datasets, key: str, kind: str) -> Any:
         if h5py.check_string_dtype(dataset.dtype) is None or dataset.ndim != 1:
             raise SceneError(key, f"type {dataset.dtype} of shape {dataset.shape}", "give a row of text")
         return tuple(_as_text(key, text) for text in dataset[()])
-    if not _is_number(dataset.dtype):
-        raise SceneError(key, f"type {dataset.dtype}", "give numbers")
-    values, names = dataset[()], dataset.dtype.names
+    type_, names = dataset.dtype, dataset.dtype.names
+    if names in (("r", "i"), ("real", "imag")):
+        is_number = all(type_[name].kind in "iuf" and not type_[name].shape for name in names)
+    else:
+        is_number = type_.kind in "iufc" and h5py.check_enum_dtype(type_) is None
+    if not is_number:
+        raise SceneError(key, f"type {type_}", "give numbers")
+    values = dataset[()]
     if names is not None:
         parts, values = values, np.empty(dataset.shape, dtype=np.complex128)
         values.real, values.imag = parts[names[0]], parts[names[1]]
@@ -117,7 +119,7 @@ def read_dataset(datasets: Datasets, key: str, kind: str) -> Any:
 
 
 def as_whole(key: str, values: Any) -> Any:
-    """Numbers that are whole, of any type: MATLAB writes them as floating ones. Raises SceneError."""
+    """Whole numbers, which MATLAB writes as floating ones. Raises SceneError."""
     with np.errstate(invalid="ignore"):
         whole = values.real.astype(np.int64)
     wrong = values[whole != values]
@@ -127,7 +129,7 @@ def as_whole(key: str, values: Any) -> Any:
 
 
 def read_attribute(group: h5py.HLObject, name: str) -> NDArray[np.generic] | None:
-    """A number or text that is an attribute, of shape () or (1,), None where there is none. Raises SceneError."""
+    """An attribute, a number or text of shape () or (1,); None where there is none. Raises SceneError."""
     if name not in group.attrs:
         return None
     attribute = group.attrs.get_id(name)
@@ -151,11 +153,3 @@ def _as_text(key: str, value: object) -> str:
     if not isinstance(text, str):
         raise SceneError(key, str(text), "give a text")
     return text
-
-
-def _is_number(kind: np.dtype[Any]) -> bool:
-    """Whether a type is that of real or complex numbers."""
-    names = kind.names
-    if names in (("r", "i"), ("real", "imag")):
-        return all(kind[name].kind in "iuf" and not kind[name].shape for name in names)
-    return kind.kind in "iufc" and h5py.check_enum_dtype(kind) is None

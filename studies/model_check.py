@@ -1,9 +1,7 @@
-"""Whether a reduced model describes a possible structure with contact pairs on it.
+"""Whether the reduced model of a scene file describes a possible structure with contact pairs on it.
 
-Used for scene files and for the bundled scenes alike; so keys are named after the datasets of the scene file. What is
-legal and may surprise: a massless displacement that has stiffness, a rigid body motion that has mass and that a contact
-can hold, a negative gap (interference: the pair presses in the unloaded state), a stiffness matrix that is not positive
-definite (spin softening).
+What is legal and may surprise: a massless displacement that has stiffness, a rigid body motion that has mass and that a
+contact can hold, a negative gap (interference), a stiffness that is not positive definite (spin softening).
 """
 
 from __future__ import annotations
@@ -17,12 +15,9 @@ from scipy.linalg import LinAlgError, cholesky, get_lapack_funcs
 from solver.model import ContactInterface, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
 from studies.scene_error import SceneError
 
-SYMMETRY_TOLERANCE = 1e-8
+_SYMMETRY = 1e-8
 """Largest difference of two entries that should mirror each other, relative to the geometric mean of the two diagonal
 entries that bound them in a positive semidefinite matrix. Differences below 1e-12 of the largest entry never count."""
-
-PAIRS_ARE_ROWS = ("rows", "pairs")
-"""Name and value of an attribute of the dataset `contact/dofs` that is not transposed."""
 
 TRANSPOSED = ": MATLAB and Fortran write columns first, so transpose every matrix of the file"
 """End of the remedy where a matrix has the right shape once it is transposed."""
@@ -31,65 +26,38 @@ _NEGATIVE_MASS = 1e-9  # of the largest entry: a negative eigenvalue of that siz
 _REAL = 1e-9  # imaginary part at nodal diameter 0, relative to the largest entry, that is round-off
 
 
-def check_model(model: ReducedModel, n_harmonics: int = 1, *, grouped: bool | None = None) -> None:
-    """Raise SceneError for the first thing in the model that cannot be.
+def check_model(model: ReducedModel, n_harmonics: int = 1) -> None:
+    """Raise SceneError, with the dataset of the scene file as its key, for the first thing in the model that cannot be.
 
-    n_harmonics: harmonics 0..n_harmonics must find their nodal diameter in the model. grouped: whether the datasets are
-    named `nd/<k>/...`; as `is_grouped` says if not given.
+    n_harmonics: harmonics 0..n_harmonics must find their nodal diameter in the model.
     """
-    grouped = is_grouped(model) if grouped is None else grouped
-    check_sector(model.n_sectors, model.nodal_diameter)
+    if model.n_sectors < 0:
+        remedy = "give the number of sectors, or 0 for a structure that is no sector"
+        raise SceneError("n_sectors", str(model.n_sectors), remedy)
+    # above half the number of sectors a wave travels backwards
+    if not 0 <= model.nodal_diameter <= max(model.n_sectors - 1, 0):
+        raise SceneError("nodal_diameter", str(model.nodal_diameter), f"give 0 to {max(model.n_sectors - 1, 0)}")
     names = model.response_names
     if not names or "" in names or len(set(names)) < len(names):
         found = ", ".join(f'"{name}"' for name in names) or "no name"
         raise SceneError("response/names", found, "give at least one response, each with a name of its own")
-    _check_harmonics(model, n_harmonics)
+    for harmonic in range(n_harmonics + 1):
+        for k in set(needed_nodal_diameters(model.nodal_diameter, model.n_sectors, harmonic)) - set(model.linear):
+            wave = f"harmonic {harmonic} of a wave of nodal diameter {model.nodal_diameter}"
+            few = f", or use fewer than {harmonic} harmonics" if harmonic > 1 else ""
+            raise SceneError(f"nd/{k}", "missing", f"give this group, which {wave} needs{few}")
     for k, linear in model.linear.items():
         if not 0 <= k <= model.n_sectors // 2:
             found = f"there are {model.n_sectors} sectors"
             raise SceneError(f"nd/{k}", found, f"give nodal diameters of 0 to {model.n_sectors // 2}")
-        _check_linear(linear, f"nd/{k}/" if grouped else "", len(model.response_names))
+        _check_linear(linear, f"nd/{k}/" if is_grouped(model) else "", len(model.response_names))
     _check_contact(model.contact, min(len(linear.stiffness) for linear in model.linear.values()))
-    _check_static(model.linear[0], model.contact, "nd/0/" if grouped else "")
+    _check_static(model.linear[0], model.contact, "nd/0/" if is_grouped(model) else "")
 
 
 def is_grouped(model: ReducedModel) -> bool:
     """Whether a scene file holds the model in groups `nd/<k>/`: a travelling wave, or several nodal diameters."""
     return model.nodal_diameter > 0 or len(model.linear) > 1
-
-
-def check_sector(n_sectors: int, nodal_diameter: int) -> None:
-    """Raise SceneError where there is no such number of sectors, or no such travelling wave on them.
-
-    A nodal diameter above half the number of sectors is a wave that travels backwards.
-    """
-    if n_sectors < 0:
-        remedy = "give the number of sectors, or 0 for a structure that is no sector"
-        raise SceneError("n_sectors", str(n_sectors), remedy)
-    if not 0 <= nodal_diameter <= max(n_sectors - 1, 0):
-        raise SceneError("nodal_diameter", str(nodal_diameter), f"give 0 to {max(n_sectors - 1, 0)}")
-
-
-def _check_harmonics(model: ReducedModel, n_harmonics: int) -> None:
-    """Each nodal diameter that one of the harmonics 0..n_harmonics sees is in the model."""
-    for harmonic in range(n_harmonics + 1):
-        for k in needed_nodal_diameters(model.nodal_diameter, model.n_sectors, harmonic):
-            if k not in model.linear:
-                few = f", or use fewer than {harmonic} harmonics" if harmonic > 1 else ""
-                wave = f"harmonic {harmonic} of a wave of nodal diameter {model.nodal_diameter}"
-                raise SceneError(f"nd/{k}", "missing", f"give this group, which {wave} needs{few}")
-
-
-def check_order(contact: ContactInterface) -> None:
-    """Raise SceneError where `contact/dofs`, checked before, may as well be transposed: of three pairs it is square."""
-    dofs, turned = contact.dofs, contact.dofs.T
-    if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
-        return
-    if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
-        name, value = PAIRS_ARE_ROWS
-        found = "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction"
-        remedy = f'write one row for each pair, and give the dataset the attribute {name} = "{value}"'
-        raise SceneError("contact/dofs", found, remedy)
 
 
 def _check_contact(contact: ContactInterface, n: int) -> None:
@@ -184,7 +152,7 @@ def _refuse(key: str, values: NDArray[Any], wrong: NDArray[np.bool_], remedy: st
 
 def _check_hermitian(key: str, matrix: Matrix) -> None:
     diagonal = np.sqrt(np.abs(np.diag(matrix)))
-    allowed = SYMMETRY_TOLERANCE * np.outer(diagonal, diagonal) + 1e-12 * _largest(matrix)
+    allowed = _SYMMETRY * np.outer(diagonal, diagonal) + 1e-12 * _largest(matrix)
     difference = np.abs(matrix - matrix.conj().T)
     if (difference > allowed).any():
         row, column = np.unravel_index(int(np.argmax(difference - allowed)), matrix.shape)

@@ -17,6 +17,13 @@ from studies.scene_error import SceneError
 N_MODES = 6
 """Number of natural frequencies that are given for each nodal diameter."""
 
+Progress = Callable[[str], None]
+"""Takes a line on the next step, where a step may take long."""
+
+
+def silent(_: str) -> None:
+    """Prints nothing."""
+
 
 @dataclass(frozen=True)
 class SurfaceMesh:
@@ -101,16 +108,11 @@ class Scene(BaseModel):
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, 1")
     contact_stiffness: ContactStiffness = None
 
-    def build(self, n_harmonics: int) -> ReducedModel:
+    def build(self, n_harmonics: int, /) -> ReducedModel:
         """Reduced model without its contact stiffness, with all nodal diameters that the harmonics 0..n_harmonics see.
 
         Raises SceneError where the parameters describe no possible structure.
         """
-        del n_harmonics
-        return self.reduced_model()
-
-    def reduced_model(self) -> ReducedModel:
-        """The same of a scene whose harmonics all see one structure."""
         raise NotImplementedError
 
     def natural_frequencies(self, model: ReducedModel) -> dict[int, FloatArray]:
@@ -134,26 +136,38 @@ def as_scene(parameters: BaseModel) -> Scene:
     return parameters
 
 
-_last_rigid: dict[str, ReducedModel] = {}
-
-
-def build_compliant(key: str, contact_stiffness: float | None, build: Callable[[], ReducedModel]) -> ReducedModel:
-    """A model with its contact stiffness, N/m3.
-
-    build: gives the model without it. The last of these models is kept under the key, which names all that the model
-    depends on: a study with many contact stiffnesses reduces its finite-element model once.
-    """
-    if contact_stiffness is None:
-        return build()
-    if key not in _last_rigid:
-        _last_rigid.clear()
-        _last_rigid[key] = build()
-    return with_contact_stiffness(_last_rigid[key], contact_stiffness)
-
-
 def make_compliant(model: ReducedModel, contact_stiffness: float | None) -> ReducedModel:
     """A model with a contact stiffness, N/m3; as it is without one."""
     return model if contact_stiffness is None else with_contact_stiffness(model, contact_stiffness)
+
+
+_last_rigid: dict[str, ReducedModel] = {}
+
+
+def build_compliant(
+    name: str, key: str, contact_stiffness: float | None, build: Callable[[], ReducedModel]
+) -> ReducedModel:
+    """A model with its contact stiffness, N/m3. name: for messages.
+
+    build: gives the model without it. The last of these models is kept under the key, which names all that the model
+    depends on: a study with many contact stiffnesses reduces its finite-element model once. Raises SceneError where the
+    model cannot be.
+    """
+    # far from what can be, numbers overflow
+    with np.errstate(all="ignore"):
+        try:
+            if contact_stiffness is None:
+                return build()
+            if key not in _last_rigid:
+                _last_rigid.clear()
+                _last_rigid[key] = build()
+            return with_contact_stiffness(_last_rigid[key], contact_stiffness)
+        except SceneError:
+            raise
+        except (ArithmeticError, ValueError, IndexError, MemoryError) as error:
+            # what a parameter alone does not show: LinAlgError is a ValueError, too
+            remedy = "give parameters of a possible structure"
+            raise SceneError("model", f"{name} cannot be built: {error}", remedy) from None
 
 
 def list_keys(parameters: type[BaseModel]) -> str:

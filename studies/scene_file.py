@@ -1,13 +1,8 @@
-"""Scene files: a reduced model from any finite-element code, in HDF5.
+"""Scene files: a reduced model from any finite-element code, in HDF5, as `studies/OWN_MODEL.md` describes them.
 
 Numbers may be of any integer or floating type; complex ones are compounds `{r, i}`, as h5py, PyTables and netCDF4 write
-them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or variable length. Files are read without
-following anything out of them: external and soft links, external storage and virtual datasets are refused. Attributes
-other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: coefficients
-of mass and stiffness. `contact/edge` is 1 for pairs beyond which the bodies go on without pairs, 0 for the others.
-
-Programs that store columns first (MATLAB, Fortran) write matrices transposed, which their shapes show. `contact/dofs`
-of three pairs is square: where no other array of the file shows the order, it needs the attribute rows = "pairs".
+them, or `{real, imag}`, as Octave and MATLAB do. Text is UTF-8, of fixed or variable length. Nothing out of the file is
+followed. Attributes other than `n_sectors` and `nodal_diameter` are the user's own.
 
 For pictures a file may hold outer faces of the mesh, without influence on the model or its hash: `mesh/x`, `mesh/y`,
 `mesh/z` (n_nodes,), m; `mesh/quad` (n_faces, 4), nodes anticlockwise from outside, of a triangle the last one twice;
@@ -19,7 +14,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -30,7 +25,7 @@ from numpy.typing import NDArray
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.hdf5 import Datasets, as_whole, find_datasets, open_hdf5, read_attribute, read_dataset, read_text_attribute
-from studies.model_check import PAIRS_ARE_ROWS, check_model, check_order, check_sector, is_grouped
+from studies.model_check import check_model, is_grouped
 from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
 
@@ -48,6 +43,8 @@ CONTACT = {
 LINEAR = ("mass", "damping", "stiffness", "load/static", "load/harmonic", "response/dofs", "response/names")
 MESH = ("x", "y", "z", "quad", "part")
 ATTRIBUTES = ("n_sectors", "nodal_diameter")
+PAIRS_ARE_ROWS = ("rows", "pairs")
+"""Name and value of an attribute of the dataset `contact/dofs` that is not transposed."""
 ORIGIN = ("model_files", "model_units", "model_reduced_by")
 """Attributes of a file whose scene was reduced here from a finite-element model."""
 
@@ -84,25 +81,23 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
     Raises SceneError about the dataset that is wrong, about "model" where the file is no HDF5; OSError where there is
     no such file or it cannot be opened.
     """
-    with _open_scene(Path(path), group) as (root, datasets):
-        prefixes = _prefixes(datasets)
-        grouped = prefixes != {0: ""}
-        n_sectors, nodal_diameter = (_read_count(root, name, required=grouped) for name in ATTRIBUTES)
-        check_sector(n_sectors, nodal_diameter)
+    with _open_scene(Path(path), group) as (root, datasets, prefixes):
+        n_sectors, nodal_diameter = (_read_count(root, name, required=prefixes != {0: ""}) for name in ATTRIBUTES)
         linear = {k: _read_linear(datasets, prefix, real=k == 0) for k, prefix in prefixes.items()}
-        names = _read_names(datasets, [f"{prefix}response/names" for prefix in prefixes.values()])
+        names = _read_names(datasets, prefixes.values())
         model = ReducedModel(linear, _read_contact(datasets), names, n_sectors, nodal_diameter)
-        # results are written here
-        shows_order = bool(group) or _shows_order(datasets)
-    check_model(model, n_harmonics, grouped=grouped)
-    if not shows_order:
-        check_order(model.contact)
+        marked = read_text_attribute(datasets["contact/dofs"], PAIRS_ARE_ROWS[0]) == PAIRS_ARE_ROWS[1]
+        shapes = [each.shape for key, each in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
+    check_model(model, n_harmonics)
+    # results are written here
+    if not (group or marked or any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)):
+        _check_order(model.contact)
     return model
 
 
 def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
     """The mesh of a scene file, None where it has none. Raises what `read_scene` raises."""
-    with _open_scene(Path(path), group) as (_, datasets):
+    with _open_scene(Path(path), group) as (_, datasets, _):
         return _read_mesh(datasets) if any(key.startswith("mesh/") for key in datasets) else None
 
 
@@ -113,14 +108,15 @@ def read_origin(path: str | Path) -> dict[str, str]:
 
 
 @contextmanager
-def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets]]:
-    """Group and datasets of a scene, found and looked at, but not read."""
+def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets, dict[int, str]]]:
+    """Group and datasets of a scene, and how their names begin for each nodal diameter, "" without groups `nd`."""
     with open_hdf5(path) as file:
         root = file.get(group) if group else file
         if not isinstance(root, h5py.Group):
             raise SceneError(group, "missing", f"give a file with a group {group}")
         datasets = find_datasets(root)
-        prefixes = _prefixes(datasets)
+        diameters = {int(match[1]) for key in datasets if (match := re.match(r"nd/(0|[1-9][0-9]*)/", key))}
+        prefixes = {k: f"nd/{k}/" for k in sorted(diameters)} or {0: ""}
         known = [f"contact/{name}" for name in CONTACT] + [f"mesh/{name}" for name in MESH]
         known += [prefix + name for prefix in prefixes.values() for name in LINEAR]
         for key in datasets:
@@ -128,26 +124,18 @@ def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets]]
                 remedy = f"remove it, known are {', '.join(known[: len(CONTACT) + len(MESH)] + list(LINEAR))}"
                 where = "" if prefixes == {0: ""} else ", the latter in nd/<nodal diameter>/"
                 raise SceneError(key, "unknown dataset", remedy + where)
-        yield root, datasets
-
-
-def _prefixes(datasets: Datasets) -> dict[int, str]:
-    """Beginnings of the names of the datasets of each nodal diameter; of 0 alone where the file has no groups `nd`."""
-    found = {int(match[1]) for key in datasets if (match := re.match(r"nd/(0|[1-9][0-9]*)/", key))}
-    return {k: f"nd/{k}/" for k in sorted(found)} or {0: ""}
+        yield root, datasets, prefixes
 
 
 def _read_mesh(datasets: Datasets) -> SurfaceMesh:
     axes = [read_dataset(datasets, f"mesh/{axis}", "real") for axis in "xyz"]
-    n_nodes = axes[0].size
     for axis, values in zip("xyz", axes, strict=True):
-        if values.shape != (n_nodes,) or not np.isfinite(values).all():
-            found = f"shape {values.shape}" if values.shape != (n_nodes,) else "not finite"
-            raise SceneError(f"mesh/{axis}", found, "give one finite number for each node")
+        if values.shape != (axes[0].size,) or not np.isfinite(values).all():
+            raise SceneError(f"mesh/{axis}", f"shape {values.shape}", "give one finite number for each node")
     quads = read_dataset(datasets, "mesh/quad", "whole")
     if quads.ndim != 2 or quads.shape[1] != 4:
         raise SceneError("mesh/quad", f"shape {quads.shape}", "give one row of 4 nodes for each face")
-    _check_indices("mesh/quad", quads, n_nodes)
+    _check_indices("mesh/quad", quads, axes[0].size)
     parts = read_dataset(datasets, "mesh/part", "text")
     if len(parts) != len(quads):
         raise SceneError("mesh/part", f"{len(parts)} labels", f"give one label for each of {len(quads)} faces")
@@ -170,16 +158,16 @@ def _read_count(root: h5py.Group, name: str, *, required: bool) -> int:
     return int(number)
 
 
-def _read_names(datasets: Datasets, keys: list[str]) -> tuple[str, ...]:
+def _read_names(datasets: Datasets, prefixes: Iterable[str]) -> tuple[str, ...]:
     """Names of the responses, the same in all groups, or beside them."""
-    shared = "response/names"
-    names = {key: read_dataset(datasets, key if key in datasets or shared not in datasets else shared, "text")
-             for key in keys}  # fmt: skip
-    first: tuple[str, ...] = names[keys[0]]
-    for key, others in names.items():
-        if others != first:
-            raise SceneError(key, ", ".join(others), f"give the same names as elsewhere: {first}")
-    return first
+    shared, found = "response/names", tuple[str, ...]()
+    for prefix in prefixes:
+        key = f"{prefix}{shared}"
+        names = read_dataset(datasets, key if key in datasets or shared not in datasets else shared, "text")
+        if names != (found or names):
+            raise SceneError(key, ", ".join(names), f"give the same names as elsewhere: {found}")
+        found = names
+    return found
 
 
 def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
@@ -200,7 +188,7 @@ def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
         if np.iscomplexobj(damping) or not np.isfinite(damping).all():
             remedy = "give two finite numbers: of mass, 1/s, and stiffness, s"
             raise SceneError(key, f"{damping[0]}, {damping[1]}", remedy)
-        # what fits not is said of the mass
+        # a wrong shape is said of the mass
         fits = mass.shape == stiffness.shape
         damping = damping[0] * mass + damping[1] * stiffness if fits else np.zeros(stiffness.shape)
     return LinearModel(
@@ -221,20 +209,24 @@ def _read_contact(datasets: Datasets) -> ContactInterface:
     return ContactInterface(**{**absent, "position": np.full((n_contact, 3), np.nan), **found})
 
 
-def _shows_order(datasets: Datasets) -> bool:
-    """Whether the file shows that its arrays are not transposed: by the attribute, or by one that is not square."""
-    name, value = PAIRS_ARE_ROWS
-    if read_text_attribute(datasets["contact/dofs"], name) == value:
-        return True
-    shapes = [dataset.shape for key, dataset in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
-    return any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)
+def _check_order(contact: ContactInterface) -> None:
+    """Raise SceneError where `contact/dofs` may as well be transposed: that of three pairs is square.
+
+    Of a file without the attribute PAIRS_ARE_ROWS, or an array that is not square and has the right shape.
+    """
+    dofs, turned = contact.dofs, contact.dofs.T
+    if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
+        return
+    if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
+        name, value = PAIRS_ARE_ROWS
+        found = "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction"
+        remedy = f'write one row for each pair, and give the dataset the attribute {name} = "{value}"'
+        raise SceneError("contact/dofs", found, remedy)
 
 
 def scene_attributes(model: ReducedModel) -> dict[str, int]:
     """Attributes of the scene; none where the structure is no sector."""
-    if model.n_sectors == 0:
-        return {}
-    return {"n_sectors": model.n_sectors, "nodal_diameter": model.nodal_diameter}
+    return {name: getattr(model, name) for name in ATTRIBUTES} if model.n_sectors else {}
 
 
 def scene_datasets(model: ReducedModel, mesh: SurfaceMesh | None) -> Iterator[tuple[str, NDArray[np.generic]]]:

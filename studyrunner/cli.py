@@ -254,7 +254,7 @@ def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     version = f"fretwear {metadata.version('fretwear')}"
     add("--version", action="version", version=version, help="print the version")
     add("--new", metavar="NAME", help="write NAME.toml, a study to start from, and stop")
-    add("--from", dest="deck", metavar="DECK", help="with --new: a study of this deck", **path)
+    add("--from", dest="deck", metavar="DECK", help="with --new: a study of this deck or mesh", **path)
     add("--plan", help="print what would be computed; compute nothing", **flag)
     add("--check", help="print what a finite-element model is, draw its contact pairs; then stop", **flag)
     changed = "override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated"

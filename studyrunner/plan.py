@@ -86,12 +86,13 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
 def _of_study(study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan) -> Iterator[tuple[str, str]]:
     facts, tasks = merge_facts(of_scenes), (*plan.sweeps, *plan.results)
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
-    contact = f"{count(len(facts.area), 'contact pair')} with {count(facts.n_displacements, 'relative displacement')}"
+    n_contact = facts.contact.n_contact
+    contact = f"{count(n_contact, 'contact pair')} with {count(facts.n_displacements, 'relative displacement')}"
     yield "study", f"{study.study.name}: {study.study.title}".rstrip(": ")
     yield "scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"
     if len(of_scenes) > 1:
-        fewest = min(len(each.area) for each in of_scenes)
-        pairs = f"{fewest} to " * (fewest < len(facts.area)) + count(len(facts.area), "contact pair")
+        fewest = min(each.contact.n_contact for each in of_scenes)
+        pairs = f"{fewest} to " * (fewest < n_contact) + count(n_contact, "contact pair")
         yield "scenes", f"{len(of_scenes)}, built once each, with {pairs}"
     yield "points", f"{plan.n_points}" + (f" = {shape}" if shape else "")
     if study.follow is not None:

@@ -1,8 +1,7 @@
-"""The scenes of a run: built once, for all ranks.
+"""The scenes of a run: each built once, by rank 0 or, where there are several, by all ranks side by side.
 
-A single scene is built by rank 0, several scenes by all ranks side by side, each scene once. They are kept in the file
-of the run. A task brings the model to a rank that does not have it: as a file that the ranks map
-(`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
+They are stored in the file of the run. A task brings the model to a rank that does not have it: as a file that the
+ranks map (`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from solver.packing import Packed, pack_model, unpack_model
+from studies.scene import Progress
 from studyrunner.checkpoint.store import COMPUTED, Store
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.dispatch import CostKeys
@@ -128,11 +128,11 @@ class Scenes:
     models: SceneModels
 
 
-def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], None]) -> Scenes:
+def build_scenes(ranks: Ranks, study: Study, store: Store, say: Progress) -> Scenes:
     """Rank 0: builds the scenes of a study, several of them together with the other ranks.
 
-    store: the file of the run, with what an earlier run has computed. say: takes a line on the next step, where a step
-    may take long. Raises UserError where a scene is wrong, or lacks what the study asks for.
+    store: the file of the run, with what an earlier run has computed. Raises UserError where a scene is wrong, or lacks
+    what the study asks for.
     """
     scenes = find_scenes(study)
     building = _Building(scenes, store, say)
@@ -157,7 +157,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
 class _Building(TaskHandler):
     """Rank 0 while the scenes are built. found: those that are, by number."""
 
-    def __init__(self, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> None:
+    def __init__(self, scenes: SceneSet, store: Store, say: Progress) -> None:
         super().__init__()
         self._keys = [model_key(study) for study in scenes.studies]
         self._studies = scenes.studies
@@ -190,7 +190,7 @@ class _Building(TaskHandler):
         return unpack_model(packed)
 
 
-def build_scene_task(task: SceneTask, progress: Callable[[str], None]) -> Iterator[SceneBuilt]:
+def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt]:
     """Builds one scene, or takes its model from an earlier run, which is equal to the last bit (`solver.packing`)."""
     known = None
     # what is damaged, or of another version, is built again

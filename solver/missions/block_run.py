@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from solver.accuracy.history_error import HISTORY_SAFETY
 from solver.clock import computing_time
-from solver.contact.wear_law import WearLaw
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, State, vibration_change
@@ -28,10 +26,11 @@ from solver.results.state_report import periodic_state
 from solver.settings import Direction, Passage, Resolution
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
-from solver.wear.problem import Adaptive, WearProblem, WearRequest, reference_of
+from solver.wear.errors import HISTORY_SAFETY
+from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.wearing_joint import Adaptive, WearingJoint, WearRequest, WearState
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
@@ -44,11 +43,11 @@ sweep chooses them and estimates its error. Without a sweep, which alone says on
 
 @packable
 @dataclass(frozen=True)
-class Begun:
-    """The way by which a block began in an earlier mission.
+class EarlierSweep:
+    """The sweep with which a block began in an earlier mission.
 
-    nodes: frequencies, rad/s, or load factors of the nodes of its sweep; of a passage the frequencies that count, Hz.
-    start, resolution: state at the end of the sweep, and harmonics and samples of the last node; None for a passage.
+    nodes: frequencies, rad/s, or load factors of its nodes; of a passage the frequencies that count, Hz.
+    start, resolution: state at its end, and harmonics and samples of the last node; None for a passage.
     """
 
     nodes: tuple[float, ...]
@@ -56,7 +55,6 @@ class Begun:
     resolution: Resolution | None = None
 
 
-@packable
 @dataclass(frozen=True)
 class BlockResult:
     """A block that was computed once.
@@ -67,7 +65,7 @@ class BlockResult:
     response_error, growth_error: estimated relative errors.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
     held, cut_off: whether a joint that slides as a whole was held, or a pair at an edge of the contact carries load.
-    guide, begun: what the reference solution takes over, and the next mission (None for a block that continues).
+    guide, sweep: what the reference solution takes over, and the next mission (None for a block that continues).
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: of Newton's method, start state included.
     sweep_rate: |df/dt| / (zeta f)^2 of a passage; 0 for steady vibration.
@@ -84,7 +82,7 @@ class BlockResult:
     cut_off: bool = False
     guide: Guide | None = None
     last: StartState | None = None
-    begun: Begun | None = None
+    sweep: EarlierSweep | None = None
     iterations: int = 0
     sweep_rate: float = 0.0
 
@@ -95,8 +93,8 @@ class BlockInput:
 
     mission, place: the mission, and the place of the block in it. depth (n_contact,): m, worn before the block.
     deadline: CPU time of the thread, s, at which the time of the history is over.
-    carried: state that the block continues; None for a block that begins anew.
-    begun, guide: of this block in an earlier mission, and in the history for its reference solution; else None.
+    before: last state of the block before, which the block continues; None for a block with a sweep of its own.
+    earlier, guide: of this block in an earlier mission, and in the history for its reference solution; else None.
     with_slope: whether the slope of the growth is asked for.
     with_switching: whether stability is tested at start and end, also where nothing speaks for a loss of stability.
     """
@@ -105,8 +103,8 @@ class BlockInput:
     place: int
     depth: FloatArray
     deadline: float = math.inf
-    carried: StartState | None = None
-    begun: Begun | None = None
+    before: StartState | None = None
+    earlier: EarlierSweep | None = None
     guide: Guide | None = None
     with_slope: bool = False
     with_switching: bool = True
@@ -135,60 +133,55 @@ class BlockInput:
         return replace(self.block.model, contact=replace(contact, gap=contact.gap + self.depth))
 
     @property
-    def law(self) -> WearLaw:
-        """The wear law from the depth on."""
-        return self.mission.law.begun_at(self.depth)
+    def counts(self) -> FloatArray:
+        """Cycle counts (2,) at start and end of a block of steady vibration."""
+        return np.array([0.0, self.block.cycles or 0.0])
 
     @property
-    def time_left(self) -> float:
-        """CPU seconds until the deadline."""
-        return self.deadline - computing_time()
+    def request(self) -> WearRequest:
+        """The wear history of the block, with the wear law from the depth before on."""
+        mission, law = self.mission, self.mission.law.begun_at(self.depth)
+        steps = Adaptive(mission.settings.rtol)
+        return WearRequest(mission.wear_coefficient, steps, self.counts, law=law, ends_at_last=True)
 
-    def run(self) -> Run:
-        """A computation until the deadline."""
-        return Run(self.mission.settings.tolerance, Budget(deadline=self.deadline))
-
-    def sweeps(self, direction: Direction, amplitude: float | None = None) -> FrequencySweep:
-        """A sweep at the depth before the block. amplitude: N; that of the block if not given."""
-        load = self.block.excitation_amplitude if amplitude is None else amplitude
-        settings = replace(self.mission.settings, time_limit=self.time_left)
-        sweeps = FrequencySweep(self.model, self.block.friction_coefficient, load, direction, settings)
+    def sweeps(self, direction: Direction, amplitude: float) -> FrequencySweep:
+        """A sweep at the depth before the block. amplitude: N."""
+        settings = replace(self.mission.settings, time_limit=self.deadline - computing_time())
+        sweeps = FrequencySweep(self.model, self.block.friction_coefficient, amplitude, direction, settings)
         sweeps.with_switching = self.with_switching
         sweeps.set_deadline(self.deadline)
         return sweeps
 
-    def at(self, start: StartState) -> Case:
+    def case_of(self, start: StartState) -> Case:
         """The case at the depth before the block, with harmonics, samples and penalty of a state."""
         friction = self.block.friction_coefficient
         return build_case(self.model, friction, start.penalty_omega, self.mission.settings, start.resolution)
 
-    def begin(self, start: StartState) -> tuple[WearingJoint, WearState]:
+    def wearing_joint(self, start: StartState) -> tuple[WearingJoint, WearState]:
         """The joint at the depth before the block, and a state of it."""
-        setup = WearingJoint(self.at(start), start, self.mission.wear_coefficient, self.law)
-        return setup, setup.begin()
+        wearing = WearingJoint(self.case_of(start), start, self.request)
+        return wearing, wearing.unworn_state()
 
 
 def run_block(given: BlockInput) -> BlockResult | Failure:
     """Compute a block of steady vibration, or why it does not come to its end. Raises OutOfTimeError, LinAlgError."""
-    start, begun = find_start(given)
+    start, sweep = find_start(given)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    counts, steps = np.array([0.0, given.block.cycles]), Adaptive(given.mission.settings.rtol)
-    asked = WearRequest(given.mission.wear_coefficient, steps, counts, law=given.law, ends_at_last=True)
+    case, counts = given.case_of(start), given.counts
     if given.guide is None:
-        problem = WearProblem(given.at(start), start, asked, stable_end=given.with_switching)
+        problem = WearProblem(case, start, given.request, stable_end=given.with_switching)
     else:
-        problem = reference_of(given.at(start), start, asked, given.guide, counts)
-    solution = Integrator(given.time_left).integrate(problem)
-    state = solution.state
-    if state is None or solution.end.outcome is not Outcome.CONVERGED:
-        return solution.end
-    values, slope = solution.course.read(counts), None
+        problem = reference_of(case, start, given.request, given.guide, counts)
+    solution = Integrator(given.deadline - computing_time()).integrate(problem)
+    if solution.failure is not None:
+        return solution.failure
+    state, values, slope = solution.state, solution.course.read(counts), None
     depth = values["wear_depth"]
     volume = float(depth[-1] @ given.mission.area)
     if given.with_slope:
         # the flow of the linearised wear rate
-        rates = rate_slope(problem.setup, state, given.depth + depth[-1] > 0.0)
+        rates = rate_slope(problem, state, given.depth + depth[-1] > 0.0)
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
@@ -204,7 +197,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         cut_off=not math.isnan(first_cut_off(given.model.contact, counts, values["mean_pressure"], depth)),
         guide=Guide(state.resolutions, state.first_length),
         last=_last(state, start) if given.is_continued else None,
-        begun=begun,
+        sweep=sweep,
         iterations=start.newton_iterations + solution.iterations,
     )
 
@@ -226,62 +219,62 @@ def _last(state: WearState, start: StartState) -> StartState:
     )
 
 
-def find_start(given: BlockInput) -> tuple[StartState, Begun | None]:
+def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
     """The state with which a block begins, or why there is none; and what the block of the next mission takes over."""
-    if given.carried is not None:
-        return _continued(given, given.carried), None
-    if given.begun is not None and (again := _by_earlier_sweep(given, given.begun)) is not None:
-        return again, given.begun
-    way = given.block.way
-    sweeps = given.sweeps(given.mission.first if way == "continue" else way)
-    _, start = next(states_of_sweeps(sweeps, np.array([given.block.ends[0]])))
+    block = given.block
+    if given.before is not None:
+        return _continued(given, given.before), None
+    if given.earlier is not None and (again := _by_earlier_sweep(given, given.earlier)) is not None:
+        return again, given.earlier
+    direction = given.mission.first if block.way == "continue" else block.way
+    sweeps = given.sweeps(direction, block.excitation_amplitude)
+    _, start = next(states_of_sweeps(sweeps, np.array([block.ends[0]])))
     present = sweeps.present
-    if start.state is None or present is None or way == "continue":
+    if start.state is None or present is None or block.way == "continue":
         return start, None
     passed = tuple(present.passed) if present.here is not None and start.branch == 0 else ()
-    return start, Begun(passed, start, present.path.case.resolution)
+    return start, EarlierSweep(passed, start, present.path.case.resolution)
 
 
-def _by_earlier_sweep(given: BlockInput, begun: Begun) -> StartState | None:
-    """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None: where the way
-    has jumped over a fold, there is no stable state, or the way may lead to another branch.
+def _by_earlier_sweep(given: BlockInput, earlier: EarlierSweep) -> StartState | None:
+    """The state through the nodes of an earlier sweep, at other depths, with its errors; else None: where the sweep has
+    jumped over a fold, there is no stable state, or the sweep may lead to another branch.
 
     With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
     Where each pair slips or opens within the period, the state follows from the depths alone.
     """
-    start, run = begun.start, given.run()
+    start, run = earlier.start, Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
     if start is None or start.state is None or start.branch > 0:
         return None
-    ramp, omega, (setup, earlier) = given.block.way == "ramp", start.state.omega, given.begin(start)
-    path = LoadingPath(setup.case, given.block.excitation_amplitude, omega if ramp else None)
+    ramp, omega, (wearing, unworn) = given.block.way == "ramp", start.state.omega, given.wearing_joint(start)
+    path = LoadingPath(wearing.case, given.block.excitation_amplitude, omega if ramp else None)
     target = 1.0 if ramp else omega
-    before = State(earlier.at, start.state.start_history, target)
+    before = State(unworn.at, start.state.start_history, target)
     try:
-        found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
-        if found is None or not path.forgets(found):
+        state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
+        if state is None or not path.forgets(state):
             stride = 1 if given.guide is None else STEPS_OF_REFERENCE
-            found, most = _through_nodes(path, begun, target, stride, run), NEW_SWEEP_CHANGE
-        if found is None or vibration_change(earlier.at, found.evaluation) > most:
+            state, most = _through_nodes(path, earlier, target, stride, run), NEW_SWEEP_CHANGE
+        if state is None or vibration_change(unworn.at, state.evaluation) > most:
             return None
         joint = path.joint_at(target)
-        if find_instability(setup.case, joint, found.evaluation, run, given.with_switching):
+        if find_instability(wearing.case, joint, state.evaluation, run, given.with_switching):
             return None
     except np.linalg.LinAlgError:
         return None
-    state = periodic_state(joint, found)
-    return replace(start, state=state, reference=None, newton_iterations=run.budget.iterations)
+    return replace(start, state=periodic_state(joint, state), reference=None, newton_iterations=run.budget.iterations)
 
 
-def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, run: Run) -> State | None:
+def _through_nodes(path: LoadingPath, earlier: EarlierSweep, target: float, stride: int, run: Run) -> State | None:
     """The state at a target of the path, through nodes of an earlier sweep; None where it is not found."""
-    if not begun.nodes or begun.resolution is None:
+    if not earlier.nodes or earlier.resolution is None:
         return None
-    coarse, (first, *nodes) = path.at(begun.resolution), begun.nodes[::stride]
+    coarse, (first, *nodes) = path.at(earlier.resolution), earlier.nodes[::stride]
     joint, unworn = coarse.joint_at(first), np.zeros(path.case.model.contact.n_contact)
-    found = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
-    if not isinstance(found, State):
+    begin = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
+    if not isinstance(begin, State):
         return None
-    states: tuple[State, ...] = (replace(found, parameter=first),)
+    states: tuple[State, ...] = (replace(begin, parameter=first),)
     ahead, halvings, rough = [*nodes, target], 0, run.with_tolerance(coarse.case.settings.rough_tolerance)
     while ahead:
         after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
@@ -296,37 +289,37 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, stride: int, 
     return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
 
 
-def _continued(given: BlockInput, carried: StartState) -> StartState:
+def _continued(given: BlockInput, before: StartState) -> StartState:
     """The state of a block that keeps the tangential history of the block before, or why there is none.
 
-    carried: state at the end of the block before, solved first at the depth before the block. Then amplitude and
+    before: state at the end of the block before, solved first at the depth before the block. Then amplitude and
     frequency change, one after the other, the frequency at the smaller amplitude. Raises OutOfTimeError, LinAlgError.
     """
-    before, run, frequency = carried.state, given.run(), given.block.ends[0]
-    assert before is not None
-    setup, last = given.begin(carried)
-    balance = setup.balance_of(last)
-    found = run.state(balance, last.at.predicted_h)
-    if found is None:
-        return replace(carried, state=None, outcome=Outcome.BRANCH_LOST)
-    start = replace(carried, state=periodic_state(balance.joint, State(found.evaluation, before.start_history)))
-    along: Direction = "up" if 2.0 * np.pi * frequency > before.omega else "down"
-    amplitude, iterations = given.block.excitation_amplitude, run.budget.iterations
-    lower = min(amplitude, before.excitation_amplitude)
+    last, run = before.state, Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
+    assert last is not None
+    frequency, amplitude = given.block.ends[0], given.block.excitation_amplitude
+    wearing, unworn = given.wearing_joint(before)
+    balance = wearing.balance_of(unworn)
+    state = run.state(balance, unworn.at.predicted_h)
+    if state is None:
+        return replace(before, state=None, outcome=Outcome.BRANCH_LOST)
+    start = replace(before, state=periodic_state(balance.joint, State(state.evaluation, last.start_history)))
+    along: Direction = "up" if 2.0 * np.pi * frequency > last.omega else "down"
+    iterations, lower = run.budget.iterations, min(amplitude, last.excitation_amplitude)
     legs: tuple[tuple[Direction, float, float], ...] = (
-        ("ramp", before.omega / (2.0 * np.pi), lower),
+        ("ramp", last.omega / (2.0 * np.pi), lower),
         (along, frequency, lower),
         ("ramp", frequency, amplitude),
     )
-    for way, target, load in legs:
+    for direction, target, load in legs:
         here = start.state
         if here is None:
             break
-        if here.excitation_amplitude == load if way == "ramp" else here.omega == 2.0 * np.pi * target:
+        if here.excitation_amplitude == load if direction == "ramp" else here.omega == 2.0 * np.pi * target:
             continue
-        sweeps, (setup, last) = given.sweeps(way, load), given.begin(start)
-        parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
-        if not sweeps.go_on_from(setup.case, replace(last.point, parameter=parameter), target):
+        sweeps, (wearing, unworn) = given.sweeps(direction, load), given.wearing_joint(start)
+        parameter = here.excitation_amplitude / load if direction == "ramp" else here.omega
+        if not sweeps.go_on_from(wearing.case, replace(unworn.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)
         _, after = next(states_of_sweeps(sweeps, np.array([target])))
         start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)

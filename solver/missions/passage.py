@@ -31,16 +31,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.accuracy.resolved_state import first_response
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure, largest_responses
 from solver.loading_history.start_states import states_of_sweeps
-from solver.missions.block_run import Begun, BlockInput, BlockResult
+from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
-from solver.structure.fourier import to_complex
 from solver.structure.joint import friction_of_pairs
 from solver.wear.slow_time import RTOL_RATIO, Guide
 from solver.wear.step import rate_slope
@@ -118,7 +118,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         inaccurate=max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start if given.is_continued else None,
-        begun=Begun(swept.needed),
+        sweep=EarlierSweep(swept.needed),
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
@@ -128,7 +128,7 @@ def _slope_of(given: BlockInput, state: SweptState) -> FloatArray:
     """Derivative (n_contact, n_contact) of the density of a state with respect to the depths, 1/Hz."""
     if not state.density.any():
         return np.zeros((state.density.size, state.density.size))
-    slope = rate_slope(*given.begin(state.start), (state.density > 0.0) | (given.depth > 0.0))
+    slope = rate_slope(*given.wearing_joint(state.start), (state.density > 0.0) | (given.depth > 0.0))
     return np.asarray(slope * state.frequency / given.passage.rate)
 
 
@@ -161,14 +161,14 @@ def find_states(given: BlockInput) -> Swept | Failure:
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
-    wanted, iterations = list(given.begun.nodes if given.begun else least), 0
+    wanted, iterations = list(given.earlier.nodes if given.earlier else least), 0
     states: list[SweptState] = []
     while wanted:
-        found = states_at(given, np.array(sorted(wanted)))
-        if isinstance(found, Failure):
-            return found
-        iterations += max(state.start.newton_iterations for state in found)
-        states = sorted([*states, *found], key=lambda state: state.frequency)
+        more = states_at(given, np.array(sorted(wanted)))
+        if isinstance(more, Failure):
+            return more
+        iterations += max(state.start.newton_iterations for state in more)
+        states = sorted([*states, *more], key=lambda state: state.frequency)
         errors, volume = interval_errors(states, area), float((parts_of(states) @ area).sum())
         # wear that is small beside the wear so far, or beside that by all work of the excitation, may be round-off
         size = max(float(np.abs(state.response).max()) for state in states)
@@ -184,14 +184,14 @@ def find_states(given: BlockInput) -> Swept | Failure:
 
 def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least: Sequence[float]) -> tuple[float, ...]:
     """The frequencies `least`, Hz, and those whose absence makes the error of an interval larger than allowed, m3."""
-    found = [states[0].frequency]
+    needed = [states[0].frequency]
     for place in range(1, len(states) - 1):
         at = states[place].frequency
         # an interval twice as long has eight times the error; of two neighbours one is kept
-        dropped = found[-1] == states[place - 1].frequency and 8.0 * errors[place - 1 : place + 1].sum() < allowed
+        dropped = needed[-1] == states[place - 1].frequency and 8.0 * errors[place - 1 : place + 1].sum() < allowed
         if at in least or not dropped:
-            found.append(at)
-    return (*found, states[-1].frequency)
+            needed.append(at)
+    return (*needed, states[-1].frequency)
 
 
 def _between(one: SweptState, other: SweptState, finest: float) -> list[float]:
@@ -223,7 +223,7 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    found, sweeps = [], given.sweeps(given.passage.sweep)
+    states, sweeps = list[SweptState](), given.sweeps(given.passage.sweep, given.block.excitation_amplitude)
     if given.guide is not None:
         # errors of a reference solution are not used
         sweeps.known = given.guide.resolutions
@@ -232,12 +232,12 @@ def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | 
             return Failure(start.outcome, start.message)
         if computing_time() > given.deadline:
             return Failure(Outcome.TIME_LIMIT)
-        setup, state = given.begin(start)
-        joint, frequency = setup.joint_of(state), float(frequencies[index])
+        wearing, state = given.wearing_joint(start)
+        joint, frequency = wearing.joint_of(state), float(frequencies[index])
         density = state.rate * frequency / given.passage.rate
-        response = to_complex(joint.structure.response_h(joint.to_relative(state.at.displacement_h)))[:, 0]
-        found.append(SweptState(frequency, start, density, response, largest_responses(joint, state.at)))
-    return found
+        response = first_response(joint, state.at)
+        states.append(SweptState(frequency, start, density, response, largest_responses(joint, state.at)))
+    return states
 
 
 def delay_of(given: BlockInput, states: Sequence[SweptState]) -> tuple[float, float]:

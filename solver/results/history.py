@@ -155,48 +155,61 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     if not rows.size:
         return Outcome.CONVERGED, ""
     last = int(rows[-1])
-    if history.cycles[last] >= history.cut_off_cycle:
-        return Outcome.CONTACT_CUT_OFF, describe_cut_off(history.cut_off_cycle / slower)
-    outcome, said = Outcome.CONVERGED, []
-    error = float(history.worn_volume_error[last])
-    if error > SENSITIVE_ERROR:
-        volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
-        coarser = "with longer steps, fewer harmonics and a coarser sweep"
-        outcome, said = Outcome.SENSITIVE, [describe_uncertain(*volumes, error, rtol, coarser)]
+    at, error = history.cycles[last], float(history.worn_volume_error[last])
+    volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
+    uncertain = describe_uncertain(*volumes, error, rtol, "with longer steps, fewer harmonics and a coarser sweep")
+    cut_off = describe_cut_off(history.cut_off_cycle / slower) if at >= history.cut_off_cycle else ""
+    inaccurate = held = ""
     # inf means "never", but is the count of a final state, too
-    elif math.inf > history.inaccurate_from <= history.cycles[last]:
+    if math.inf > history.inaccurate_from <= at:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
-        said = [begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"]
-        outcome = Outcome.INACCURATE
-    if math.inf > history.held_from <= history.cycles[last]:
-        said.append(
+        inaccurate = begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"
+    if math.inf > history.held_from <= at:
+        held = (
             f"from cycle {in_digits(history.held_from / slower)} on every pair slips and only friction holds the joint"
             f" in one direction: its mean position is held there, by at most {HELD_FORCE:g} of the friction"
         )
-    return outcome, "; ".join(said)
+    return verdict(error, uncertain, inaccurate, cut_off, held)
+
+
+def verdict(error: float, uncertain: str, inaccurate: str, cut_off: str, *notes: str) -> tuple[Outcome, str]:
+    """Outcome of a complete history of wear or of missions, and its sentence.
+
+    error: of the last worn volume, relative; uncertain: sentence in case it is too large. The other sentences are ""
+    where there is nothing to say: about states above rtol, about a contact that is cut off, and additions.
+    """
+    if cut_off:
+        return Outcome.CONTACT_CUT_OFF, cut_off
+    outcome, reason = Outcome.CONVERGED, ""
+    if error > SENSITIVE_ERROR:
+        outcome, reason = Outcome.SENSITIVE, uncertain
+    elif inaccurate:
+        outcome, reason = Outcome.INACCURATE, inaccurate
+    return outcome, "; ".join(filter(None, (reason, *notes)))
 
 
 def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: float) -> float:
     """Estimated relative error of the last worn volume of a history; NaN where there is none, as where a history
     reaches its target before its first count.
 
-    counts, error, rate (n,): of cycles or missions that were reached; errors of the worn volume and wear rates there.
+    counts, error, rate (n,): of cycles or missions; errors of the worn volume, NaN where not reached, and wear rates.
     last: count that was computed.
     """
-    if not counts.size or (counts[-1] == 0.0 and last > 0.0 and bool(rate[-1] > 0.0)):
+    reached = np.flatnonzero(~np.isnan(error))
+    if not reached.size or (counts[reached[-1]] == 0.0 and last > 0.0 and bool(rate[reached[-1]] > 0.0)):
         return math.nan
-    return float(error[-1])
+    return float(error[reached[-1]])
 
 
 def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
     """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before."""
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
-    own, its = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
+    volumes, others = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
     if not math.isfinite(other):
-        return f"{own}, {known}: {coarser} the history does not go so far"
+        return f"{volumes}, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:
-        return f"{own}, {known}: {its}, but worn at other pairs or counts"
-    return f"{own}, but {its}: {known}"
+        return f"{volumes}, {known}: {others}, but worn at other pairs or counts"
+    return f"{volumes}, but {others}: {known}"
 
 
 def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:

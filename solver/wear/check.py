@@ -22,7 +22,7 @@ from solver.results.state_report import report_state
 from solver.settings import NEGLIGIBLE, Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.jump import creeps, free_slide
-from solver.wear.slow_time import REGULAR_END, Course
+from solver.wear.slow_time import Course
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
@@ -37,17 +37,15 @@ Checked = tuple[WearState, dict[str, Any]]
 """A state that passed the check, possibly with other harmonics than before, and its report."""
 
 
-def full_check(
-    setup: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
-) -> Checked | Failure:
+def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
     """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
-    certificate = None if (anew := needs_new_choice(setup, state)) else _certificate(setup, state)
+    certificate = None if (anew := needs_new_choice(wearing, state)) else _certificate(wearing, state)
     # more harmonics or samples may suffice
-    if anew or (certificate is None and state.accurate and setup.case.settings.automatic):
-        chosen = choose_anew(setup, state)
+    if anew or (certificate is None and state.accurate and wearing.case.settings.automatic):
+        chosen = choose_anew(wearing, state)
         if isinstance(chosen, Failure):
             return chosen
-        state, certificate = chosen, _certificate(setup, chosen)
+        state, certificate = chosen, _certificate(wearing, chosen)
     if certificate is None:
         return Failure(Outcome.CERTIFICATE_FAILED)
     # NaN for given harmonics and samples, where no state with others was found for a comparison
@@ -57,43 +55,42 @@ def full_check(
         if not state.estimate.largest < worst.largest:
             worst = UNKNOWN if unknown else state.estimate
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
-    case, joint = setup.case_and_joint(state)
+    case, joint = wearing.case_and_joint(state)
     if state.hold is not None and creeps(joint, state.hold, state.at):
         return Failure(Outcome.ADRIFT)
     if _vibrates_otherwise(state):
-        if (unstable := find_instability(case, joint, state.at, setup.run, False)) is not None:
+        if (unstable := find_instability(case, joint, state.at, wearing.run, False)) is not None:
             return unstable
         state = replace(state, judged_h=state.at.predicted_h)
-    report = report_state(joint, state.at, certificate, loops, with_resonance=with_resonance)
-    return state, report | {"excitation_frequency_error": setup.frequency_error(state)}
+    report = report_state(joint, state.at, certificate, wearing.request.loops, with_resonance=wearing.shifts)
+    return state, report | {"excitation_frequency_error": wearing.frequency_error(state)}
 
 
-def _certificate(setup: WearingJoint, state: WearState) -> Certificate | None:
+def _certificate(wearing: WearingJoint, state: WearState) -> Certificate | None:
     """The certificate of a state, with the errors of the last choice of its harmonics; None where it does not hold."""
-    found, estimate = certify(setup.joint_of(state), state.at), state.estimate
-    wear_rate_error = setup.wearing.amplification(*worn_by(state.at)) * estimate.wear_rate
-    found = replace(found, response_error=estimate.response, wear_rate_error=wear_rate_error)
-    return found if found.holds(setup.case.settings.tolerance) else None
+    estimate = state.estimate
+    wear_rate_error = wearing.wearing_work.amplification(*worn_by(state.at)) * estimate.wear_rate
+    certificate = certify(wearing.joint_of(state), state.at)
+    certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
+    return certificate if certificate.holds(wearing.case.settings.tolerance) else None
 
 
-def report_only(
-    setup: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
-) -> Checked:
+def report_only(wearing: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...]) -> Checked:
     """A state of a reference solution with its report, where it is found with the harmonics wanted at its count."""
     wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
-        case, _ = setup.case_and_joint(state)
-        point = setup.run.move(case, case.at(wanted).joint(state.omega, setup.excitation_amplitude), state.point)
-        moved = point and setup.at_followed(setup.with_rates(replace(state, point=point, resolution=wanted)))
+        case, _ = wearing.case_and_joint(state)
+        point = wearing.run.move(case, case.at(wanted).joint(state.omega, wearing.excitation_amplitude), state.point)
+        moved = point and wearing.at_followed(wearing.with_rates(replace(state, point=point, resolution=wanted)))
         state = moved if isinstance(moved, WearState) else state
-    return state, report_state(setup.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=with_resonance)
+    return state, report_state(wearing.joint_of(state), state.at, NOT_CERTIFIED, with_resonance=wearing.shifts)
 
 
-def needs_new_choice(setup: WearingJoint, state: WearState) -> bool:
+def needs_new_choice(wearing: WearingJoint, state: WearState) -> bool:
     """Whether harmonics and samples have to be chosen again: where the part of the contact force in harmonics that are
     left out, which grows with the error, is so large that the error may be above rtol, or so small that fewer may do.
     """
-    settings, orders = setup.case.settings, state.resolution.orders
+    settings, orders = wearing.case.settings, state.resolution.orders
     if not settings.automatic:
         return False
     if settings.harmonics == "auto" and lacks_even(orders, state.at):
@@ -109,13 +106,13 @@ def needs_new_choice(setup: WearingJoint, state: WearState) -> bool:
     return now < RELAXED_FRACTION**2 * state.left_out
 
 
-def choose_anew(setup: WearingJoint, state: WearState) -> WearState | Failure:
+def choose_anew(wearing: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    refined = refine(*setup.case_and_joint(state), state.point, setup.run)
+    refined = refine(*wearing.case_and_joint(state), state.point, wearing.run)
     resolution, point = refined.case.resolution, refined.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
     state = replace(state, estimate=refined.estimate, accurate=refined.accurate)
-    return setup.at_followed(setup.with_rates(state))
+    return wearing.at_followed(wearing.with_rates(state))
 
 
 def _vibrates_otherwise(state: WearState) -> bool:
@@ -126,25 +123,29 @@ def _vibrates_otherwise(state: WearState) -> bool:
     return float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
 
 
-def unstable_at_end(setup: WearingJoint, state: WearState) -> Failure | None:
+def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
-    if state.cycle == 0.0 and setup.follow is None and not _vibrates_otherwise(state):
+    if state.cycle == 0.0 and wearing.follow is None and not _vibrates_otherwise(state):
         return None
-    case, joint = setup.case_and_joint(state)
+    case, joint = wearing.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, state.at) is None and not setup.is_stable(state):
+    if free_slide(joint, state.at) is None and not wearing.run.is_stable_finely(wearing.balance_of(state), state.at):
         return Failure(Outcome.UNSTABLE)
-    return find_instability(case, joint, state.at, setup.run, True)
+    return find_instability(case, joint, state.at, wearing.run, True)
 
 
-def end_of_wear(state: WearState, course: Course, final_share: float) -> Failure | None:
-    """Why a history to the end of wear ends: REGULAR_END, or NO_FINAL_STATE where wear has no end; None to go on."""
+def is_final(state: WearState, final_share: float) -> bool:
+    """Whether a state is the final one. final_share: as in `ToTheEnd`."""
     largest = state.largest_rates[:-1]
-    if (state.rates[:-1] <= final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))).all():
-        return REGULAR_END
+    least = final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))
+    return bool((state.rates[:-1] <= least).all())
+
+
+def wears_without_end(state: WearState, course: Course) -> Failure | None:
+    """NO_FINAL_STATE where wear has no end; None to go on."""
     n_steps = len(course.ends) - 1
-    if state.depth.max() > DEEPEST or state.cycle > LONGEST_HISTORY or n_steps >= STEPS_TO_THE_END:
-        at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
-        said = f"{at}, the joint still wears at {float(state.rates[-1]):.6g} m3 a cycle"
-        return Failure(Outcome.NO_FINAL_STATE, said)
-    return None
+    if state.depth.max() <= DEEPEST and state.cycle <= LONGEST_HISTORY and n_steps < STEPS_TO_THE_END:
+        return None
+    at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
+    rate = f"the joint still wears at {float(state.rates[-1]):.6g} m3 a cycle"
+    return Failure(Outcome.NO_FINAL_STATE, f"{at}, {rate}")

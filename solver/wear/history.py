@@ -1,16 +1,16 @@
-"""Wear histories from one start state: integration, errors by comparison with other solutions, outcome."""
+"""Wear histories from one start state: integration, what each is compared with, result."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED
-from solver.accuracy.history_error import Compared, HistoryError, error_of_given_steps, error_of_target, history_error
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
@@ -19,9 +19,10 @@ from solver.results.history import StartState, WearHistory, first_cut_off, judge
 from solver.results.state_report import LOOP_PHASES
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
-from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest, reference_of
-from solver.wear.slow_time import ENDS_ALL, Course, Guide, Integrator, Node, Solution
-from solver.wear.wearing_joint import WearState
+from solver.wear.errors import compare, error_of_target
+from solver.wear.problem import WearProblem, reference_of
+from solver.wear.slow_time import Course, Guide, Integrator, Node, Solution
+from solver.wear.wearing_joint import Adaptive, Given, WearRequest, WearState
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
 
@@ -31,7 +32,7 @@ def integrate_together(
     friction_coefficient: float | FloatArray | None,
     settings: SolverSettings,
     start: StartState,
-    asked: Sequence[WearRequest],
+    requests: Sequence[WearRequest],
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
 ) -> Iterator[WearHistory]:
@@ -39,30 +40,28 @@ def integrate_together(
 
     Each is that which it would be alone. All those with given steps are compared with one adaptive history.
 
-    asked: they differ in nothing else but their steps, and their counts up to one last count.
+    requests: they differ in nothing else but their steps, and their counts up to one last count.
     keep: called from time to time with the progress. resume: such progress of some of these histories, which go on from
         there; the results are equal to the last bit, except `run_time`.
     """
     integrator, case = Integrator(settings.time_limit, keep, resume), None
     if start.state is not None:
         case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
-    for each in asked:
+    for request in requests:
         if case is None:
-            own = Solution(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)))
+            course = _unknown_course(model, len(request.loops))
+            solution = Solution(None, course, Failure(start.outcome, start.message))
         else:
-            own = _solve(integrator, case, start, each)
-        history = _assembled(model, start, each, own)
-        # the counts that were reached
-        rows = np.flatnonzero(np.isfinite(history.worn_volume))
-        reached = (history.cycles[rows], history.worn_volume_error[rows], history.wear_rate[rows])
-        history = replace(history, error_estimate=last_error(*reached, history.last_cycle))
+            solution = _solve(integrator, case, start, request)
+        history = _assembled(model, start, request, solution)
         if history.outcome is Outcome.CONVERGED:
+            rows = np.flatnonzero(np.isfinite(history.worn_volume))
             outcome, message = judge(history, rows, settings.rtol)
             history = replace(history, outcome=outcome, message=message)
         yield history
 
 
-def unknown_course(model: ReducedModel, n_loops: int) -> Course:
+def _unknown_course(model: ReducedModel, n_loops: int) -> Course:
     """The course of a history without any state: all values are NaN."""
     of_pairs, of_responses = np.full(model.contact.n_contact, np.nan), np.full(len(model.response_names), np.nan)
     values: dict[str, Any] = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), of_pairs)
@@ -74,89 +73,65 @@ def unknown_course(model: ReducedModel, n_loops: int) -> Course:
     return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
 
 
-def _solve(integrator: Integrator, case: Case, start: StartState, asked: WearRequest, spent: float = 0.0) -> Solution:
+def _solve(integrator: Integrator, case: Case, start: StartState, request: WearRequest, spent: float = 0.0) -> Solution:
     """A history with what it is compared with; without a step the errors of the start state suffice."""
-    own = integrator.integrate(WearProblem(case, start, asked, stable_end=True), spent)
-    if own.state is None:
-        return replace(own, course=unknown_course(case.model, len(asked.loops)))
-    if (len(own.course.ends) == 1 and asked.follow is None) or own.end.outcome in ENDS_ALL:
-        return own
-    spent += own.seconds
-    if isinstance(asked.steps, Given):
+    solution = integrator.integrate(WearProblem(case, start, request, stable_end=True), spent)
+    state, course = solution.state, solution.course
+    if state is None:
+        return replace(solution, course=_unknown_course(case.model, len(request.loops)))
+    if (len(course.ends) == 1 and request.follow is None) or solution.breaks_off:
+        return solution
+    spent += solution.seconds
+    end = min(course.ends[-1], request.end)
+    if isinstance(request.steps, Given):
         # one for all given steps to one last count; to another end no longer than needed
-        known = not isinstance(asked.cycles, ToTheEnd) and asked.until is None
-        cycles = _counts(asked, own) if known else np.array([0.0, min(own.course.ends[-1], asked.end)])
-        adaptive = asked.with_steps(Adaptive(case.settings.rtol), cycles)
-        return replace(own, compared=_solve(integrator, case, start, adaptive, spent))
-    guide = Guide(own.state.resolutions, own.state.first_length)
+        known = not isinstance(request.cycles, ToTheEnd) and request.until is None
+        cycles = _counts(request, solution) if known else np.array([0.0, end])
+        adaptive = request.with_steps(Adaptive(case.settings.rtol), cycles)
+        return replace(solution, compared=_solve(integrator, case, start, adaptive, spent))
     # NaN where no target was reached
-    counts = np.concatenate([[0.0, own.course.reached], _counts(asked, own), own.course.counts])
-    counts = np.unique(counts[counts <= min(own.course.ends[-1], asked.end)])
-    return replace(own, compared=integrator.integrate(reference_of(case, start, asked, guide, counts), spent))
+    counts = np.concatenate([[0.0, course.reached], _counts(request, solution), course.counts])
+    guide = Guide(state.resolutions, state.first_length)
+    reference = reference_of(case, start, request, guide, np.unique(counts[counts <= end]))
+    return replace(solution, compared=integrator.integrate(reference, spent))
 
 
-def _counts(asked: WearRequest, own: Solution) -> FloatArray:
+def _counts(request: WearRequest, solution: Solution) -> FloatArray:
     """Counts (n_output,) at which a history is read."""
-    if not isinstance(asked.cycles, ToTheEnd):
-        return asked.cycles
-    return np.zeros(asked.cycles.n_outputs) if own.state is None else own.course.even_counts(asked.cycles.n_outputs)
+    if not isinstance(request.cycles, ToTheEnd):
+        return request.cycles
+    n_outputs = request.cycles.n_outputs
+    return np.zeros(n_outputs) if solution.state is None else solution.course.even_counts(n_outputs)
 
 
-def compare(
-    counts: FloatArray,
-    fine: Course,
-    reference: Course | None,
-    area: FloatArray,
-    part: Callable[[dict[str, Any]], dict[str, Any]] = lambda values: values,
-    *,
-    follows: bool = False,
-) -> tuple[Compared, HistoryError]:
-    """An adaptive history beside its reference solution at ascending counts (n,), and its errors there.
-
-    part: what is compared of the values of both. follows: whether the frequency of the excitation is followed.
-    """
-    known = reference if reference is not None and reference.nodes else None
-    both, steps = (
-        Compared(at, part(fine.read(at)), {} if known is None else part(known.read(at)), follows)
-        for at in (counts, fine.counts)
-    )
-    return both, history_error(both, steps, area)
-
-
-def _compare_own(own: Solution, counts: FloatArray, *, given: bool, follows: bool) -> tuple[Compared, HistoryError]:
-    """A history, of given steps or adaptive, beside what it is compared with at ascending counts, and its errors."""
-    area, other = own.course.area, own.compared
-    if given and other is not None and other.state is not None:
-        _, error = _compare_own(other, counts, given=False, follows=follows)
-        both = Compared(counts, own.course.read(counts), other.course.read(counts), follows)
-        return both, error_of_given_steps(both, error, area)
-    return compare(counts, own.course, None if given or other is None else other.course, area, follows=follows)
-
-
-def _assembled(model: ReducedModel, start: StartState, asked: WearRequest, own: Solution) -> WearHistory:
+def _assembled(model: ReducedModel, start: StartState, request: WearRequest, solution: Solution) -> WearHistory:
     """The result, not judged yet."""
-    area, counts = model.contact.area, _counts(asked, own)
-    both, error = _compare_own(own, counts, given=isinstance(asked.steps, Given), follows=asked.follow is not None)
-    found, target = both.fine, own.course.reached
-    ends_at_target = target <= asked.end
+    course, state, area, counts = solution.course, solution.state, model.contact.area, _counts(request, solution)
+    compare_at = partial(compare, solution, given=isinstance(request.steps, Given), follows=request.follow is not None)
+    both, error = compare_at(counts)
+    values, totals, target, target_error = both.values, solution.totals, math.nan, math.nan
+    if request.until is not None and course.reached <= request.end:
+        target, target_error = course.reached, error_of_target(solution, request.until, compare_at)
+    last_cycle = math.nan if state is None else min(course.ends[-1], float(counts[-1]))
     return WearHistory(
-        **{name: value for name, value in found.items() if name in _REPORTED}
+        **{name: value for name, value in values.items() if name in _REPORTED}
         | {f"{name}_error": values for name, values in vars(error).items()}
-        | ({} if own.state is None else _of_state(own.state, asked.end)),
-        outcome=own.end_of_all.outcome,
-        message=own.end_of_all.message,
+        | ({} if state is None else _of_state(state, request.end))
+        | totals
+        | {
+            "newton_iterations": start.newton_iterations + totals["newton_iterations"],
+            "run_time": start.run_time + totals["run_time"],
+        },
         cycles=counts,
-        worn_volume=found["wear_depth"] @ area,
+        worn_volume=values["wear_depth"] @ area,
         reference_volume=both.other("wear_depth") @ area,
-        error_estimate=math.nan,
-        newton_iterations=start.newton_iterations + sum(each.iterations for each in own.all),
-        run_time=start.run_time + sum(each.seconds for each in own.all),
-        last_cycle=math.nan if own.state is None else min(own.course.ends[-1], float(counts[-1])),
+        error_estimate=last_error(counts, error.worn_volume, values["wear_rate"], last_cycle),
+        last_cycle=last_cycle,
         branch=start.branch,
         fold_frequency=start.fold_frequency,
-        cycles_to_target=target if ends_at_target else math.nan,
-        cycles_to_target_error=_target_error(own, asked) if ends_at_target else math.nan,
-        cut_off_cycle=first_cut_off(model.contact, counts, found["mean_pressure"], found["wear_depth"]),
+        cycles_to_target=target,
+        cycles_to_target_error=target_error,
+        cut_off_cycle=first_cut_off(model.contact, counts, values["mean_pressure"], values["wear_depth"]),
     )
 
 
@@ -171,15 +146,3 @@ def _of_state(state: WearState, end: float) -> dict[str, Any]:
         # adaptive steps go beyond the last count
         "jump_cycle": state.jump_cycle if state.jump_cycle <= end else math.nan,
     }
-
-
-def _target_error(own: Solution, asked: WearRequest) -> float:
-    """Estimated error, cycles, of the count at which a history has reached its target."""
-    course, until = own.course, asked.until
-    if own.compared is None or until is None:
-        return math.inf
-    at, by_interpolation = course.reach(until)
-    given, follows = isinstance(asked.steps, Given), asked.follow is not None
-    both, error = _compare_own(own, np.array([0.0, at]), given=given, follows=follows)
-    of_other = own.compared.course.reach(until)[0]
-    return error_of_target(until, at, of_other, both.fine, course.nodes[-1].rate, error, course.area) + by_interpolation

@@ -29,50 +29,49 @@ from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 
-def jump(setup: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
+def jump(wearing: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
     """A stable state of depths (n_contact,), m, beyond the end of a branch: with a hold, or of another branch."""
-    setup.run.budget.limit = setup.run.budget.iterations + SEARCH_ITERATIONS
-    reached = _held(setup, state, worn) or _on_another_branch(setup, state, worn)
+    wearing.run.budget.limit = wearing.run.budget.iterations + SEARCH_ITERATIONS
+    reached = _with_hold(wearing, state, worn) or _on_another_branch(wearing, state, worn)
     if isinstance(reached, Failure) and reached.outcome is Outcome.ADRIFT:
         # the last pairs that stick come loose together
-        reached = _held(setup, state, worn, drifts=True) or reached
-    setup.run.budget.limit = float("inf")
+        reached = _with_hold(wearing, state, worn, drifts=True) or reached
+    wearing.run.budget.limit = float("inf")
     if isinstance(reached, Failure):
         return reached
-    return setup.with_rates(replace(reached, cycle=cycle, previous=None, error=0.0))
+    return wearing.with_rates(replace(reached, cycle=cycle, previous=None, error=0.0))
 
 
-def _held(setup: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
+def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
     """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends."""
-    case, joint = setup.case_and_joint(state)
+    case, joint = wearing.case_and_joint(state)
     hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
     if hold is None:
         return None
-    balance = Balance(
-        replace(case, hold=hold).joint(state.omega, setup.excitation_amplitude), state.point.history, worn
-    )
-    found = setup.run.state(balance, state.at.predicted_h)
-    if found is None or not setup.run.is_stable(balance, found.evaluation):
+    joint = replace(case, hold=hold).joint(state.omega, wearing.excitation_amplitude)
+    balance = Balance(joint, state.point.history, worn)
+    point = wearing.run.state(balance, state.at.predicted_h)
+    if point is None or not wearing.run.is_stable(balance, point.evaluation):
         return None
-    if creeps(joint, hold, found.evaluation) or vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
+    if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         return None
-    return replace(state, point=found, hold=hold, held_from=state.cycle)
+    return replace(state, point=point, hold=hold, held_from=state.cycle)
 
 
-def _on_another_branch(setup: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
+def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
     """The state of another branch to which the structure relaxes in time at depths `worn` (n_contact,), m.
 
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
-    joint = setup.joint_of(state)
-    found = relax_to_periodic(joint, worn, state.point, joint, setup.run)
-    if isinstance(found, Failure):
-        return found if found.outcome is Outcome.ADRIFT else Failure(Outcome.MARCH_FAILED)
+    joint = wearing.joint_of(state)
+    point = relax_to_periodic(joint, worn, state.point, joint, wearing.run)
+    if isinstance(point, Failure):
+        return point if point.outcome is Outcome.ADRIFT else Failure(Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners
-    if vibration_change(state.at, found.evaluation) > OTHER_BRANCH:
+    if vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))
-    return replace(state, point=found)
+    return replace(state, point=point)
 
 
 def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | None:

@@ -1,25 +1,23 @@
 """A wear history, or its reference solution, as a problem over the slow time: its steps, their lengths, their rescues.
 
-The reference solution is a second computation whose difference, pair by pair, is taken for the error. It starts from
-another sweep, with a third of the nodes (`solver.loading_history`), and is coarser in all: twice the tolerance of the
-steps, the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch ends, errors grow,
-and this difference with them; a sum of local errors does not.
+The difference of a history to its reference solution, pair by pair, is taken for the error. The reference solution
+starts from another sweep, with a third of the nodes (`solver.loading_history`), and is coarser: twice the tolerance of
+the steps, a quarter of their parts, the next lower harmonics and samples. Where pairs stick again, a resonance passes
+or a branch ends, errors grow, and this difference with them; a sum of local errors does not.
 
 A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
-with the same steps errs as they do: where a pair only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit
-steps, 1.89 mm3, with steps of 250 cycles 1.90; the truth is 2.03.
+with the same steps errs as they do: dovetail, 16 pairs, 212.5 Hz, where a pair only just slips: 1.89 mm3 with implicit
+steps, 1.90 with steps of 250 cycles; the truth is 2.03.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, replace
-from typing import ClassVar
+from dataclasses import astuple, replace
 
 import numpy as np
 
 from solver.accuracy.resolved_state import fewer, shifted
-from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray, ReducedModel
@@ -29,19 +27,24 @@ from solver.results.history import StartState
 from solver.settings import (
     FIRST_HARMONICS,
     ROUND_OFF,
-    FollowedFrequency,
     Resolution,
     Scheme,
     SolverSettings,
     ToTheEnd,
-    WearTarget,
 )
 from solver.structure.joint import Case
-from solver.wear.check import end_of_wear, full_check, report_only, unstable_at_end
+from solver.wear.check import full_check, is_final, report_only, unstable_at_end, wears_without_end
 from solver.wear.jump import jump
-from solver.wear.slow_time import REGULAR_END, RTOL_RATIO, Course, Guide, Node
-from solver.wear.step import allowed_error, attempt_step, explicit_step_limit, too_long
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
+from solver.wear.step import (
+    PARTS_OF_REFERENCE,
+    PARTS_OF_STEP,
+    allowed_error,
+    attempt_step,
+    explicit_step_limit,
+    too_long,
+)
+from solver.wear.wearing_joint import Adaptive, Given, WearingJoint, WearRequest, WearState
 
 HISTORY_ITERATIONS = 3000
 """Most Newton iterations of a history or a reference solution, in addition to `NEAR_ITERATIONS` for each step. A
@@ -51,9 +54,8 @@ FOLD_RESOLUTION = 0.005
 """Shortest adaptive step, as a fraction of the cycle count."""
 
 STEP_ERROR_FRACTION = 0.25
-"""Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of rtol.
-Dovetail, 16 pairs, 212.42 to 213 Hz, `rtol` 1e-2: errors of the worn volume up to 0.21 %. With 0.5 a quarter to a third
-less steps, up to 0.5 %, and 5.9 % at 212.5 Hz, where a pair that only just slips then sticks."""
+"""Share of rtol in `allowed_error`. Dovetail, 16 pairs, 212.42 to 213 Hz, `rtol` 1e-2: errors up to 0.21 %. With 0.5 a
+quarter to a third fewer steps, up to 0.5 %, and 5.9 % at 212.5 Hz, where a pair that only just slips then sticks."""
 
 FIRST_STEP, FIRST_DEPTH = 0.05, 0.01
 """Length of the first adaptive step, whose error is not known, as a fraction of the explicit step limit, and its
@@ -67,75 +69,14 @@ DOUBLINGS_ACROSS = 4
 across, by 3, 2, 2 and 4 doublings, errors 0.1 to 2.7 times the allowed ones; else `march_failed` at 846 cycles."""
 
 
-@dataclass(frozen=True)
-class Given:
-    """Euler steps of `length` cycles, which end at its multiples also after a shorter step: equal steps in `k_w h` of
-    histories that differ in k_w only. To the end of wear, each step wears about as much as the first one.
+class WearProblem(WearingJoint):
+    """The joint of a history, or of the reference solution of an adaptive one, as `SlowProblem`; stepped by `take_step`
+    over its cycles.
 
-    depth: in place of the length, wear of the fastest pair at the rate of the start of a step, m, Eq. (22).
-    """
-
-    length: float
-    scheme: Scheme = "implicit"
-    depth: float | None = None
-
-
-@dataclass(frozen=True)
-class Adaptive:
-    """BDF2 steps with a relative error of the worn volume near `rtol`. The last cycle count is interpolated.
-
-    first: length of the first step, cycles; 0: by the explicit step limit.
-    """
-
-    rtol: float
-    first: float = 0.0
-    scheme: ClassVar[Scheme] = "adaptive"
-
-
-def steps_of(scheme: str, length: float, rtol: float, largest_depth: float | None = None) -> Given | Adaptive:
-    """The steps of a scheme by its name, "final" included; largest_depth: in place of the length of explicit steps."""
-    if scheme in ("adaptive", "final"):
-        return Adaptive(rtol)
-    return Given(length, "explicit", largest_depth) if scheme == "explicit" else Given(length)
-
-
-@dataclass(frozen=True)
-class WearRequest:
-    """What a wear history is asked for, Eqs. (20) to (26).
-
-    wear_coefficient: k_w, 1/Pa. law: part of the slip work that wears.
-    cycles (n_output,): ascending counts to report, the first 0; the last Euler step ends at the last one. Or
-        `ToTheEnd`: until nothing wears any more; not with explicit steps, which cannot grow.
-    until: target of the wear, with whose step the history ends. loops: pairs with reported fretting loops.
-    ends_at_last: whether the last adaptive step ends at the last count, for a joint that vibrates otherwise from there.
-    follow: what the frequency of the excitation follows; None for that of the start state.
-    """
-
-    wear_coefficient: float
-    steps: Given | Adaptive
-    cycles: FloatArray | ToTheEnd
-    law: WearLaw = ARCHARD
-    until: WearTarget | None = None
-    loops: tuple[int, ...] = ()
-    ends_at_last: bool = False
-    follow: FollowedFrequency | None = None
-
-    @property
-    def end(self) -> float:
-        """Last cycle count; inf where it is not known."""
-        return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
-
-    def with_steps(self, steps: Adaptive, counts: FloatArray) -> WearRequest:
-        """The same with other steps, to the last of some counts (n,), whatever target is reached before."""
-        never = self.until and replace(self.until, value=math.inf)
-        return replace(self, steps=steps, cycles=counts, until=never)
-
-
-class WearProblem:
-    """The problem over the slow time of a history, or of the reference solution of an adaptive one, as `SlowProblem`;
-    stepped by `take_step` over its cycles.
-
-    guide: of a reference solution; None for a history. stable_end: whether the stability of the last state is tested.
+    guide: of a reference solution; None for a history. A reference solution takes a step that is `too_long`: its
+        difference is the warning, and in a last long step nearly all of the force of a joint at rest is moved.
+    stable_end: whether the stability of the last state is tested.
+    parts: of a step, in each of which the pairs slide.
     limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`.
     """
 
@@ -143,77 +84,76 @@ class WearProblem:
     iterations_per_save = 100
 
     def __init__(
-        self, case: Case, start: StartState, asked: WearRequest, guide: Guide | None = None, *, stable_end: bool = False
+        self,
+        case: Case,
+        start: StartState,
+        request: WearRequest,
+        guide: Guide | None = None,
+        *,
+        stable_end: bool = False,
     ) -> None:
-        self.setup = WearingJoint(case, start, asked.wear_coefficient, asked.law, asked.follow)
-        self.asked, self.steps, self.guide, self.stable_end = asked, asked.steps, guide, stable_end
+        super().__init__(case, start, request)
+        self.steps, self.guide, self.stable_end = request.steps, guide, stable_end
+        self.parts = PARTS_OF_STEP if guide is None else PARTS_OF_REFERENCE
         if guide is not None:
-            self.setup.run = self.setup.run.with_tolerance(case.settings.rough_tolerance)
+            self.run = self.run.with_tolerance(case.settings.rough_tolerance)
             coarse = tuple((count, coarser(resolution, case.model)) for count, resolution in guide.resolutions)
             self.guide = replace(guide, resolutions=coarse)
-        self.budget = self.setup.run.budget
-        target = None if asked.until is None else astuple(asked.until)
-        self.name = f"{asked.steps!r} {asked.end!r} {target!r} {guide is None}"
-        counts = np.zeros(0) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
-        self.course = Course(self.setup.area, counts, asked.until)
-        self.limit = math.inf if isinstance(self.steps, Adaptive) and not asked.ends_at_last else asked.end
+        until = None if request.until is None else astuple(request.until)
+        self.name = f"{request.steps!r} {request.end!r} {until!r} {guide is None}"
+        counts = np.zeros(0) if isinstance(request.cycles, ToTheEnd) else request.cycles
+        self.course = Course(self.area, counts, request.until)
+        self.limit = math.inf if isinstance(self.steps, Adaptive) and not request.ends_at_last else request.end
 
-    def drop_factor(self) -> None:
-        """As in SlowProblem."""
-        self.setup.drop_factor()
-
-    def advance(self, state: WearState | None, course: Course) -> tuple[WearState, Course] | Failure:
+    def advance(self, state: WearState | None, course: Course) -> tuple[WearState, Course] | Failure | None:
         """As in SlowProblem: the next state is checked and stored."""
-        setup, asked, local = self.setup, self.asked, 0.0
+        request, local = self.request, 0.0
         if state is None:
-            found = setup.at_followed(setup.begin() if self.guide is None else setup.begin_reference())
-        elif (ended := self._ended(state, course)) is not None:
-            return ended
+            end = self.at_followed(self.unworn_state() if self.guide is None else self.unworn_state_of_reference())
+        elif self._is_complete(state, course):
+            return unstable_at_end(self, state) if self.stable_end else None
+        elif (failure := self._gives_up(state, course)) is not None:
+            return failure
         elif not state.wears:
             # the state holds for all later counts
-            return state, course.after(replace(course.nodes[-1], count=asked.end))
+            return state, course.after(replace(course.nodes[-1], count=request.end))
         else:
-            found, local = self.step(state), course.nodes[-1].values["local"]
-        if isinstance(found, Failure):
-            return found
-        shifts = asked.until is not None and asked.until.quantity == "frequency_shift"
-        if self.guide is None:
-            checked = full_check(setup, found, asked.loops, with_resonance=shifts)
-        else:
-            checked = report_only(setup, found, self.guide.resolutions, with_resonance=shifts)
+            end, local = self.step(state), course.nodes[-1].values["local"]
+        if isinstance(end, Failure):
+            return end
+        checked = full_check(self, end) if self.guide is None else report_only(self, end, self.guide.resolutions)
         if isinstance(checked, Failure):
             return checked
         after, report = checked
         if state is None:
-            after = self.begin(after)
+            after = self.with_first_length(after)
         if not after.resolutions or after.resolutions[-1][1] != after.resolution:
             after = replace(after, resolutions=(*after.resolutions, (after.cycle, after.resolution)))
         # local: sum of the local errors of the steps so far, m3
         values = report | {"local": after.error + local}
         return after, course.after(Node(after.cycle, after.depth, after.rate, values))
 
-    def _ended(self, state: WearState, course: Course) -> Failure | None:
-        """Why the history ends at a state; None to go on."""
-        found, cycles, end = None, self.asked.cycles, self.asked.end
-        still = not state.wears and end == math.inf
-        if still or not math.isnan(course.reached) or course.ends[-1] >= end * (1.0 - 1e-12):
-            found = REGULAR_END
-        elif isinstance(cycles, ToTheEnd):
-            found = end_of_wear(state, course, cycles.final_share)
-        most = HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
-        if found is None and state.wears and self.budget.iterations > most:
-            found = Failure(Outcome.MARCH_FAILED)
-        if found is REGULAR_END and self.stable_end:
-            found = unstable_at_end(self.setup, state) or found
-        return found
+    def _is_complete(self, state: WearState, course: Course) -> bool:
+        """Whether a history has come to its last count, its target, or its final state."""
+        cycles, end = self.request.cycles, self.request.end
+        if isinstance(cycles, ToTheEnd) and (not state.wears or is_final(state, cycles.final_share)):
+            return True
+        return not math.isnan(course.reached) or course.ends[-1] >= end * (1.0 - 1e-12)
 
-    def begin(self, state: WearState) -> WearState:
+    def _gives_up(self, state: WearState, course: Course) -> Failure | None:
+        """Why a history does not go on although it is not complete."""
+        if isinstance(self.request.cycles, ToTheEnd) and (failure := wears_without_end(state, course)) is not None:
+            return failure
+        most = HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
+        return Failure(Outcome.MARCH_FAILED) if state.wears and self.run.budget.iterations > most else None
+
+    def with_first_length(self, state: WearState) -> WearState:
         """The first state with its step limit, and the length of an adaptive step; at least two lead to the limit."""
         steps, length = self.steps, state.length
         if isinstance(steps, Adaptive) and steps.first > 0.0:
             length = steps.first
         elif state.wears:
-            state = replace(state, step_limit=explicit_step_limit(self.setup, state))
+            state = replace(state, step_limit=explicit_step_limit(self, state))
             moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), state.rate.max()
             # the step limit is no bound where almost nothing slips
             length = min(FIRST_STEP * state.step_limit, float(FIRST_DEPTH * moved / fastest), 0.5 * self.limit)
@@ -221,7 +161,7 @@ class WearProblem:
 
     def step(self, state: WearState) -> WearState | Failure:
         """The state after one step, with the largest length of the next one; or why there is none."""
-        length, steps = state.length, self.steps
+        length, shortest, steps = state.length, self._shortest(state), self.steps
         if isinstance(steps, Given):
             length = steps.length
             if steps.depth is not None:
@@ -231,7 +171,7 @@ class WearProblem:
             else:
                 left = length * (math.floor(state.cycle / length + ROUND_OFF) + 1.0) - state.cycle
                 length = left if left < (1.0 - ROUND_OFF) * length else length
-        shortest = self._shortest(state, length)
+            shortest = SHORTEST_STEP * length
         length = length if state.previous is None else min(length, state.length)
         # no extra step for a remainder below the round-off of the count
         if state.cycle + length >= self.limit * (1.0 - 1e-12):
@@ -240,28 +180,25 @@ class WearProblem:
         taken = take_step(self, state, length, Lengths(2, shortest=shortest, rescue=shortest))
         if isinstance(taken, Failure):
             return taken
-        end, follow = replace(taken[0], length=taken[1]), self.asked.follow
+        end, follow = replace(taken[0], length=taken[1]), self.follow
         if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
-            return self.setup.lost(end)
-        return self._too_long(state, end.depth, end.cycle - state.cycle) or end
+            return self.lost(end)
+        failure = too_long(self, state, end.depth, end.cycle - state.cycle) if self.guide is None else None
+        return failure or end
 
-    def _too_long(self, state: WearState, depth: FloatArray, length: float) -> Failure | None:
-        """As `too_long`; never of a reference solution, whose difference is the warning: in a last long step nearly all
-        of the force of a joint that comes to its end is moved.
+    def _shortest(self, state: WearState) -> float:
+        """Shortest adaptive step, cycles: the accuracy to which the end of a branch is located."""
+        return max(FOLD_RESOLUTION * state.cycle, SHORTEST_SLOW_STEP * state.first_length)
+
+    def attempt(self, state: WearState, length: float, scheme: Scheme | None = None) -> WearState | None:
+        """As in SteppedProblem. scheme: another one than that of the steps. An Euler step ends in a stable state; a
+        followed resonance may be unstable at constant frequency.
         """
-        return None if self.guide is not None else too_long(self.setup, state, depth, length)
-
-    def _shortest(self, state: WearState, length: float) -> float:
-        """Shortest step, cycles, of one that is `length` long: the accuracy to which a branch end is located."""
-        if isinstance(self.steps, Adaptive):
-            return max(FOLD_RESOLUTION * state.cycle, SHORTEST_SLOW_STEP * state.first_length)
-        return SHORTEST_STEP * length
-
-    def attempt(self, state: WearState, length: float) -> WearState | None:
-        """As in SteppedProblem."""
-        if isinstance(self.steps, Adaptive):
-            return attempt_step(self.setup, state, length, "adaptive")
-        return self._euler_step(state, length, self.steps.scheme)
+        scheme = scheme or self.steps.scheme
+        end = attempt_step(self, state, length, scheme, self.parts)
+        if end is None or scheme == "adaptive" or self.follow is not None:
+            return end
+        return end if self.run.is_stable_finely(self.balance_of(end), end.at) else None
 
     def ratio(self, state: WearState, end: WearState, length: float) -> float:
         """As in SteppedProblem: an Euler step counts whatever its error, the shortest adaptive step where the vibration
@@ -269,30 +206,24 @@ class WearProblem:
         """
         if not isinstance(self.steps, Adaptive):
             return 0.0
-        before, after = (float(each.depth @ self.setup.area) for each in (state, end))
+        before, after = (float(each.depth @ self.area) for each in (state, end))
         ratio = end.error / allowed_error(STEP_ERROR_FRACTION * self.steps.rtol, before, after, state.cycle, length)
-        smooth = length <= self._shortest(state, length) and vibration_change(state.at, end.at) < SMOOTH_CHANGE
+        smooth = length <= self._shortest(state) and vibration_change(state.at, end.at) < SMOOTH_CHANGE
         return min(ratio, 1.0) if smooth else ratio
 
     def rescue(self, state: WearState, length: float) -> WearState | Failure:
         """As in SteppedProblem. In this order: an Euler step, a longer one across corners (both adaptive), a jump."""
-        setup = self.setup
         if isinstance(self.steps, Adaptive):
-            found = self._euler_step(state, length, "implicit") or self._step_across(state, length)
-            if found is not None:
-                return found
+            end = self.attempt(state, length, "implicit") or self._step_across(state, length)
+            if end is not None:
+                return end
         worn = state.depth + length * state.rate
-        if (failure := self._too_long(state, worn, length)) is not None:
+        if self.guide is None and (failure := too_long(self, state, worn, length)) is not None:
             return failure
-        beyond = jump(setup, state, worn, state.cycle + length)
+        beyond = jump(self, state, worn, state.cycle + length)
         if isinstance(beyond, Failure):
-            return beyond if setup.follow is None else setup.lost(state)
-        return setup.at_followed(beyond)
-
-    def _euler_step(self, state: WearState, length: float, scheme: Scheme) -> WearState | None:
-        """An Euler step to a stable state, or None. A followed resonance may be unstable at constant frequency."""
-        end = attempt_step(self.setup, state, length, scheme)
-        return end if end is None or self.setup.follow is not None or self.setup.is_stable(end) else None
+            return beyond if self.follow is None else self.lost(state)
+        return self.at_followed(beyond)
 
     def _step_across(self, state: WearState, shortest: float) -> WearState | None:
         """A step longer than the shortest one, cycles, across corners of the branch; None where it is not found.
@@ -300,26 +231,26 @@ class WearProblem:
         Where the last pairs that stick come loose one by one, no step ends between the small folds, however short.
         """
         # a search without success leaves no trace: where a joint begins to slide, round-off decides what is found next
-        before = self.setup.run
-        self.setup.drop_factor()
+        before, self.run = self.run, self.run.fresh()
         for doubling in range(1, DOUBLINGS_ACROSS + 1):
             length = 2.0**doubling * shortest
             if state.cycle + length > self.limit:
                 break
-            end = attempt_step(self.setup, state, length, "adaptive")
+            end = attempt_step(self, state, length, "adaptive", self.parts)
             if end is not None and vibration_change(state.at, end.at) < SMOOTH_CHANGE:
                 return end
-        self.setup.run = before
+        self.run = before
         return None
 
 
-def reference_of(case: Case, start: StartState, asked: WearRequest, guide: Guide, counts: FloatArray) -> WearProblem:
+def reference_of(case: Case, start: StartState, request: WearRequest, guide: Guide, counts: FloatArray) -> WearProblem:
     """The reference solution of an adaptive history, whose start state may be another one, to be read at ascending
     counts (n,), the first 0.
     """
     # a short history may consist of its first steps, which do not depend on rtol
-    first = guide.first_length * (2.0 if asked.ends_at_last else 1.0)
-    return WearProblem(case, start, asked.with_steps(Adaptive(RTOL_RATIO * case.settings.rtol, first), counts), guide)
+    first = guide.first_length * (2.0 if request.ends_at_last else 1.0)
+    steps = Adaptive(RTOL_RATIO * case.settings.rtol, first)
+    return WearProblem(case, start, request.with_steps(steps, counts), guide)
 
 
 def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:

@@ -17,21 +17,14 @@ from solver.accuracy.certificate import Certificate
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, IntArray
-from solver.newton.run import Budget, guarded
+from solver.newton.run import Run, guarded
 from solver.outcome import Outcome
 from solver.packing import Packed, in_rows, pack, packable, unpack
 from solver.settings import Resolution, WearTarget
 
-REGULAR_END, UNFINISHED = Failure(Outcome.CONVERGED), Failure(Outcome.NOT_COMPUTED)
-"""The regular end of a history, and that of one that goes on."""
-
-ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
-"""Ends of an integration that end the whole history, and after which no other solution is integrated."""
-
 RTOL_RATIO = 2.0
-"""Ratio of the step tolerances of reference solution and adaptive history: BDF2 steps are then a quarter longer. With 4
-the steps of a reference solution are too long for pairs that stick again: dovetail, 16 pairs, 13 harmonics, 212.75 Hz:
-1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true."""
+"""Ratio of the step tolerances of reference solution and adaptive history. With 4 steps are too long for pairs that
+stick again (dovetail, 16 pairs, 13 harmonics, 212.75 Hz: 1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true)."""
 
 MOST_NODES = 800
 """Most stored steps of a history beside those with an output; half as many after those with the least progress are
@@ -95,14 +88,9 @@ class Course:
         return np.array([node.rate for node in self.nodes])
 
     @cached_property
-    def volumes(self) -> FloatArray:
-        """Worn volumes (n_node,), m3."""
-        return self._volumes(self.depths)
-
-    @cached_property
     def reached(self) -> float:
         """Count at which the target was reached, NaN until then."""
-        return math.nan if self.target is None or not self.nodes else self.reach(self.target)[0]
+        return math.nan if self.target is None else self.reach(self.target)[0]
 
     def after(self, node: Node) -> Course:
         """The course with another step."""
@@ -111,7 +99,7 @@ class Course:
 
     def _thinned(self) -> Course:
         """The course without nodes of little progress in count and volume, between which nothing is read."""
-        at, volumes = self.counts, self.volumes
+        at, volumes = self.counts, self._volumes(self.depths)
         read = np.append(self.outputs, self.reached)
         ends = np.searchsorted(at, read[read <= at[-1]])
         way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
@@ -148,7 +136,8 @@ class Course:
         `wear_depth`, `depth_rate` (n, k): m, m per count; `wear_rate` (n,): m3 per count; and the values of the nodes.
         """
         (start, end, fraction), depth = self._steps_of(counts), self.depth_at(counts)
-        grown, part = self.volumes[end] - self.volumes[start], self._volumes(depth) - self.volumes[start]
+        volumes = self._volumes(self.depths)
+        grown, part = volumes[end] - volumes[start], self._volumes(depth) - volumes[start]
         fraction = np.divide(part, grown, out=fraction, where=grown > 0.0)
 
         def between(each: FloatArray) -> FloatArray:
@@ -181,6 +170,8 @@ class Course:
         """Count at which a target is reached, NaN if never, and its error by a resonance and its interpolation."""
         from scipy.optimize import brentq  # where it is used: it takes a while to load
 
+        if not self.nodes:
+            return math.nan, 0.0
         values = self._values_of(target, self.counts)
         end = int(np.argmax(values >= target.value))
         if not values[end] >= target.value:
@@ -215,20 +206,19 @@ class Course:
 class SlowProblem(Protocol):
     """What is integrated. The next step depends on state and course alone; both are frozen and packable.
 
-    name: tells apart histories that belong together. course: before the first step. budget: Newton iterations so far,
-    and the deadline. iterations_per_save: iterations after which the progress is saved.
+    name: tells apart histories that belong together. course: before the first step. run: has a factorisation, and the
+    Newton iterations so far. iterations_per_save: iterations after which the progress is saved.
     """
 
     name: str
     course: Course
-    budget: Budget
+    run: Run
     iterations_per_save: int
 
-    def advance(self, state: Any, course: Course, /) -> tuple[Any, Course] | Failure:
-        """State and course after the next step, or the first ones where the state is None; or why the history ends."""
-
-    def drop_factor(self) -> None:
-        """Drop what a resumed history would not have beside its state."""
+    def advance(self, state: Any, course: Course, /) -> tuple[Any, Course] | Failure | None:
+        """State and course after the next step, or the first ones where the state is None; None where the history is
+        complete, or why it ends before.
+        """
 
 
 @packable
@@ -249,27 +239,38 @@ class Guide:
 class Solution:
     """What an integration has found at its end, or when it is saved, with Newton iterations and CPU seconds.
 
-    state: the last one; None where there is no first state. end: why it ends, UNFINISHED where it goes on.
+    state: the last one; None where there is no first state. failure: why it ends before it is complete, else None.
+    ended: False when it is saved on its way.
     compared: the solution whose difference is the error: of a history with given steps the adaptive one, of an adaptive
         one its reference solution; None where there is none.
     """
 
     state: Any
-    end: Failure
     course: Course
+    failure: Failure | None
+    ended: bool = True
     iterations: int = 0
     seconds: float = 0.0
     compared: Solution | None = None
 
     @property
-    def all(self) -> tuple[Solution, ...]:
-        """The solution, and those with which it is compared."""
-        return (self, *(() if self.compared is None else self.compared.all))
+    def breaks_off(self) -> bool:
+        """Whether the time is over, or an error has ended the whole history: no other solution is integrated then."""
+        return self.failure is not None and self.failure.outcome in (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
 
     @property
-    def end_of_all(self) -> Failure:
-        """The end of the whole history."""
-        return next((each.end for each in self.all if each.end.outcome in ENDS_ALL), self.end)
+    def totals(self) -> dict[str, Any]:
+        """Outcome, message and effort of a whole history, with all that is compared, by their names in its result."""
+        every: list[Solution] = [self]
+        while (other := every[-1].compared) is not None:
+            every.append(other)
+        failure = next((each.failure for each in every if each.breaks_off), self.failure)
+        return {
+            "outcome": Outcome.CONVERGED if failure is None else failure.outcome,
+            "message": "" if failure is None else failure.message,
+            "newton_iterations": sum(each.iterations for each in every),
+            "run_time": sum(each.seconds for each in every),
+        }
 
 
 class Integrator:
@@ -286,24 +287,24 @@ class Integrator:
 
     def integrate(self, problem: SlowProblem, spent: float = 0.0) -> Solution:
         """Integrate from the first or the saved state to the end. spent: CPU seconds of the time limit so far."""
-        name, course, budget = problem.name, problem.course, problem.budget
+        name, course, budget = problem.name, problem.course, problem.run.budget
         state, began, known = None, computing_time(), self._known.get(name)
-        if known is not None and known.end != UNFINISHED:
+        if known is not None and known.ended:
             return known
         if known is not None:
             state, course, budget.iterations, began = known.state, known.course, known.iterations, began - known.seconds
         budget.deadline, saved_at = began + self._time_limit - spent, budget.iterations
         while True:
             after = guarded(partial(problem.advance, state, course))
-            if isinstance(after, Failure):
-                self._known[name] = Solution(state, after, course, budget.iterations, computing_time() - began)
+            if after is None or isinstance(after, Failure):
+                self._known[name] = Solution(state, course, after, True, budget.iterations, computing_time() - began)
                 return self._known[name]
             state, course = after
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
-                problem.drop_factor()
+                problem.run = problem.run.fresh()
                 state, saved_at = in_rows(state), budget.iterations
-                self._known[name] = Solution(state, UNFINISHED, course, saved_at, computing_time() - began)
+                self._known[name] = Solution(state, course, None, False, saved_at, computing_time() - began)
                 if self._keep is not None:
                     # what its time limit has ended is not complete
-                    self._keep(pack({key: s for key, s in self._known.items() if s.end.outcome not in ENDS_ALL}))
+                    self._keep(pack({key: each for key, each in self._known.items() if not each.breaks_off}))

@@ -1,4 +1,7 @@
-"""A joint that wears: its state, from which a history goes on, and how its states are solved.
+"""A joint that wears: what its history is asked for, its state, from which it goes on, and how its states are solved.
+
+A `StartState` of a sweep has a `PeriodicState`, which is evaluated (`WearingJoint.unworn_state`) and becomes a `State`,
+as Newton's method gives it. A `WearState` has a `State` at a cycle count, and all with which the history goes on.
 
 A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
 amplitude (`solver.continuation.phase_lag`).
@@ -8,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -23,11 +27,75 @@ from solver.outcome import Outcome, in_digits
 from solver.packing import packable
 from solver.results.history import PeriodicState, StartState
 from solver.results.state_report import evaluated
-from solver.settings import FollowedFrequency, Resolution
+from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case, Hold, Joint
 
 NO_WEAR = 1e-12
 """Fraction of `WearState.most_rate`: a joint that wears less sticks, and its rate is round-off."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """Euler steps of `length` cycles, which end at its multiples also after a shorter step: equal steps in `k_w h` of
+    histories that differ in k_w only. To the end of wear, each step wears about as much as the first one.
+
+    depth: in place of the length, wear of the fastest pair at the rate of the start of a step, m, Eq. (22).
+    """
+
+    length: float
+    scheme: Scheme = "implicit"
+    depth: float | None = None
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """BDF2 steps with a relative error of the worn volume near `rtol`. The last cycle count is interpolated.
+
+    first: length of the first step, cycles; 0: by the explicit step limit.
+    """
+
+    rtol: float
+    first: float = 0.0
+    scheme: ClassVar[Scheme] = "adaptive"
+
+
+def steps_of(scheme: str, length: float, rtol: float, largest_depth: float | None = None) -> Given | Adaptive:
+    """The steps of a scheme by its name, "final" included; largest_depth: in place of the length of explicit steps."""
+    if scheme in ("adaptive", "final"):
+        return Adaptive(rtol)
+    return Given(length, "explicit", largest_depth) if scheme == "explicit" else Given(length)
+
+
+@dataclass(frozen=True)
+class WearRequest:
+    """What a wear history is asked for, Eqs. (20) to (26).
+
+    wear_coefficient: k_w, 1/Pa. law: part of the slip work that wears.
+    cycles (n_output,): ascending counts to report, the first 0; the last Euler step ends at the last one. Or
+        `ToTheEnd`: until nothing wears any more; not with explicit steps, which cannot grow.
+    until: target of the wear, with whose step the history ends. loops: pairs with reported fretting loops.
+    ends_at_last: whether the last adaptive step ends at the last count, for a joint that vibrates otherwise from there.
+    follow: what the frequency of the excitation follows; None for that of the start state.
+    """
+
+    wear_coefficient: float
+    steps: Given | Adaptive
+    cycles: FloatArray | ToTheEnd
+    law: WearLaw = ARCHARD
+    until: WearTarget | None = None
+    loops: tuple[int, ...] = ()
+    ends_at_last: bool = False
+    follow: FollowedFrequency | None = None
+
+    @property
+    def end(self) -> float:
+        """Last cycle count; inf where it is not known."""
+        return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
+
+    def with_steps(self, steps: Adaptive, counts: FloatArray) -> WearRequest:
+        """The same with other steps, to the last of some counts (n,), whatever target is reached before."""
+        never = self.until and replace(self.until, value=math.inf)
+        return replace(self, steps=steps, cycles=counts, until=never)
 
 
 @packable
@@ -111,41 +179,36 @@ class WearState:
 class WearingJoint:
     """The joint of one wear history.
 
-    case: model, friction and settings. start: unworn state, which exists; its load is that of the history.
-    wear_coefficient: 1/Pa. law: part of the slip work that wears.
-    follow: what the frequency of the excitation follows, None for the frequency of the unworn state.
-    area (n_contact,): m2. wearing: wearing work of the law.
-    run: counts the iterations, limits the time, and has a factorisation from one solve to the next.
+    case: model, friction and settings, with the resolution of the start. start: unworn state, which exists; its load is
+        that of the history.
+    wearing_work: of the pairs by the wear law. area (n_contact,): m2.
+    shifts: whether the target is a shift of the resonance, which each state then reports.
+    run: counts the iterations, limits the time, and has a factorisation from one solve to the next. A fresh one lets
+        the next solve depend on the state alone.
     """
 
-    def __init__(
-        self,
-        case: Case,
-        start: StartState,
-        wear_coefficient: float,
-        law: WearLaw = ARCHARD,
-        follow: FollowedFrequency | None = None,
-    ) -> None:
+    def __init__(self, case: Case, start: StartState, request: WearRequest) -> None:
         assert start.state is not None
-        self.case, self.start, self.wear_coefficient, self.follow = case, start, wear_coefficient, follow
+        self.case, self.start, self.request, self.follow = case, start, request, request.follow
         self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude
         self.area = case.model.contact.area
-        self.wearing = wearing_work(law, case.model.contact, case.friction_coefficient)
+        self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
+        self.wearing_work = wearing_work(request.law, case.model.contact, case.friction_coefficient)
         self.run = Run(case.settings.tolerance)
-        self._last: tuple[Case, Joint] | None = None
+        self._stored: tuple[Case, Joint] | None = None
 
     def case_and_joint(self, state: WearState) -> tuple[Case, Joint]:
         """Case and joint of a state. The last ones are stored; others drop the factorisation."""
-        last = self._last
+        last = self._stored
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
             case = replace(self.case, hold=state.hold).at(state.resolution)
-            self.drop_factor()
+            self.run = self.run.fresh()
         elif state.omega != last[1].omega:
             case = last[0]
         else:
             return last
-        self._last = case, case.joint(state.omega, self.excitation_amplitude)
-        return self._last
+        self._stored = case, case.joint(state.omega, self.excitation_amplitude)
+        return self._stored
 
     def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
@@ -155,26 +218,18 @@ class WearingJoint:
         """The balance that a state solves at constant wear depth."""
         return Balance(self.joint_of(state), state.at.history, state.depth)
 
-    def drop_factor(self) -> None:
-        """Drop the factorisation, so that the next solve depends on the state alone."""
-        self.run = self.run.fresh()
-
-    def is_stable(self, state: WearState) -> bool:
-        """Whether a state is stable at constant wear depth."""
-        return self.run.is_stable_finely(self.balance_of(state), state.at)
-
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
-        return cycles * self.wear_coefficient / self.area
+        return cycles * self.request.wear_coefficient / self.area
 
-    def begin(self, of: PeriodicState | None = None) -> WearState:
-        """The unworn state, or that of the reference sweep, evaluated and not solved again."""
-        start, state = self.start, of or self.unworn
-        balance, at = evaluated(self.case.at(start.resolution).joint(state.omega, self.excitation_amplitude), state)
+    def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
+        """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
+        start, periodic = self.start, periodic or self.unworn
+        balance, at = evaluated(self.case.joint(periodic.omega, self.excitation_amplitude), periodic)
         nothing = np.zeros(self.area.size + 1)
-        begun = WearState(
+        state = WearState(
             0.0,
-            state.omega,
+            periodic.omega,
             State(at, final_history(balance, at)),
             start.resolution,
             left_out(start.resolution.orders, at),
@@ -186,9 +241,9 @@ class WearingJoint:
             # the stability of a start state has been checked
             judged_h=at.predicted_h,
         )
-        return self.with_rates(begun)
+        return self.with_rates(state)
 
-    def begin_reference(self) -> WearState:
+    def unworn_state_of_reference(self) -> WearState:
         """The unworn state of the reference solution.
 
         The state of the reference sweep has another tangential history, which may decide whether a pair goes on
@@ -196,23 +251,23 @@ class WearingJoint:
         0.106 mm3; both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep
         is taken.
         """
-        fine, reference = self.unworn, self.start.reference
-        begun = self.begin(reference)
+        own, reference = self.unworn, self.start.reference
+        state = self.unworn_state(reference)
         if reference is None:
-            return begun
-        history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
-        balance = Balance(self.joint_of(begun), history, begun.depth)
-        point = self.run.state(balance, begun.at.predicted_h, most=NEAR_ITERATIONS)
-        return begun if point is None else self.with_rates(replace(begun, point=point))
+            return state
+        history = own.start_history + 2.0 * (reference.start_history - own.start_history)
+        balance = replace(self.balance_of(state), history=history)
+        point = self.run.state(balance, state.at.predicted_h, most=NEAR_ITERATIONS)
+        return state if point is None else self.with_rates(replace(state, point=point))
 
     def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, Eqs. (7), (21), (25)."""
-        rate = self.gain(1.0) * self.wearing.work(*worn_by(state.at))
+        rate = self.gain(1.0) * self.wearing_work.work(*worn_by(state.at))
         volumes = rate * self.area
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
-        most = max(state.most_rate, self.wear_coefficient * (self.wearing.largest_factor * moved))
+        most = max(state.most_rate, self.request.wear_coefficient * (self.wearing_work.largest_factor * moved))
         rates = np.append(volumes, volumes.sum())
         largest = np.maximum(state.largest_rates, np.abs(rates))
         return replace(state, rate=rate, rates=rates, largest_rates=largest, most_rate=most)
@@ -227,35 +282,34 @@ class WearingJoint:
         case, lag = self.case_and_joint(state)[0], state.lag
         if self.follow.of == "peak":
             peak = solve_at_peak(case, balance, start, lag, self.run, most)
-            found, lag = (None, lag) if peak is None else peak
+            solved, lag = (None, lag) if peak is None else peak
         else:
-            found = solve_at_lag(case, balance, start, lag, self.run, most)
-        if found is None:
+            solved = solve_at_lag(case, balance, start, lag, self.run, most)
+        if solved is None:
             return None
-        turn = math.nan if found.reduced is None else abs(float(found.reduced[0, 0]))
+        turn = math.nan if solved.reduced is None else abs(float(solved.reduced[0, 0]))
         if math.isnan(turn) and state.half_width == 0.0:
-            turn = abs(rise_of_response(found, self.run, accepted_rise(case.settings.rtol))[1])
+            turn = abs(rise_of_response(solved, self.run, accepted_rise(case.settings.rtol))[1])
         half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
-        point = State(found.at, final_history(found.balance, found.at))
-        omega = float(found.values[0])
+        point = State(solved.at, final_history(solved.balance, solved.at))
+        omega = float(solved.values[0])
         return self.with_rates(replace(state, point=point, omega=omega, lag=lag, half_width=half_width))
 
     def at_followed(self, state: WearState) -> WearState | Failure:
-        """The state at the frequency that is followed, with its depths and its tangential history."""
+        """The state at the frequency that is followed, with its depth and its tangential history."""
         if self.follow is None:
             return state
-        found = self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS)
-        return found or self.lost(state)
+        return self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS) or self.lost(state)
 
     def lost(self, state: WearState) -> Failure:
         """The end of a history whose frequency leaves its range, or beyond whose last state none is found."""
         wanted, frequency = self.follow, state.omega / (2.0 * math.pi)
         assert wanted is not None
-        said = "ends: no state beyond is found to go on with"
+        reason = "ends: no state beyond is found to go on with"
         if not wanted.low <= frequency <= wanted.high:
-            said = f"is out of the range from {wanted.low:g} to {wanted.high:g} Hz"
+            reason = f"is out of the range from {wanted.low:g} to {wanted.high:g} Hz"
         at = f"at cycle {in_digits(state.cycle)} and {frequency:.6g} Hz"
-        return Failure(Outcome.RESONANCE_LOST, f"{at} the {wanted.of} {said}")
+        return Failure(Outcome.RESONANCE_LOST, f"{at} the {wanted.of} {reason}")
 
     def frequency_error(self, state: WearState) -> float:
         """Error of a followed frequency, Hz; 0 for a given one. The phase lag is wrong by as much as the amplitude, and

@@ -5,6 +5,7 @@ Commands that may change the model and are not acted upon are refused.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -15,7 +16,7 @@ import numpy as np
 
 from studies.fe_models.deck.contents import Deck, NodalValue
 from studies.fe_models.deck.model import deck_of_arrays
-from studies.fe_models.text import IntArray, Place, library_errors, shown
+from studies.fe_models.files import IntArray, Place, library_errors, shown, to_float
 from studies.scene_error import SceneError
 
 # which of the nodes of an element of ANSYS are those of which kind: bricks may be collapsed to wedges or tetrahedra
@@ -62,7 +63,6 @@ WITHOUT_INFLUENCE = _short(
 _BLOCKS = ("ETBL", "NBLO", "EBLO", "CMBL")  # what the library reads
 _WHERE_ZERO = _short("OMEGA DOMEGA CGOMGA DCGOMG ACEL CMOMEGA CMDOMEGA CMACEL BFUNIF TUNIF")  # CDWRITE writes them
 _WITH_LABEL = _short("CMOMEGA CMDOMEGA CMACEL BFUNIF")  # of these the first field is no number
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _DIRECTIONS = {"UX": (1, 1), "UY": (2, 2), "UZ": (3, 3), "ALL": (1, 3)}
 # key options of 1 that make other elements of some kinds than those that are read
 _OPTIONS = {
@@ -70,18 +70,13 @@ _OPTIONS = {
     "3": ((185, 186, 190), "elements of layers (key option 3)", "use homogeneous solid elements"),
 }
 _ELEMENTS = f"use solid elements: {', '.join(map(str, sorted(_TYPES)))}; delete contact elements (169 to 178: EDELE)"
+_KEYS = "rotation_speed, axis, n_sectors, material, preload or matrices"
+_REMEDY = f"delete it, and give {_KEYS} in the study where it matters"
 _FREE = "export without constraint equations: CEDELE,ALL and CPDELE,ALL"
-_LOADS = "delete it, and give `preload` in the study"
+_IN_BLOCKS = "write nodes and elements in blocks: CDWRITE,DB,file,cdb"
 _REMEDIES = {
     **dict.fromkeys(_short("CE CEINTF CERIG CP CPINTF CPLGEN CECYC RBE3"), _FREE),
-    **dict.fromkeys(_short("OMEGA DOMEGA CMOMEGA CGOMGA"), "delete it, and give `rotation_speed` and `axis`"),
-    **dict.fromkeys(_short("PSTRES SSTIF INISTATE ISFILE"), "delete it, and give `rotation_speed`, or `matrices`"),
-    **dict.fromkeys(_short("F SF SFE SFA BF BFE BFUNIF TUNIF ACEL CMACEL"), _LOADS),
-    **dict.fromkeys(_short("N EN E EMORE"), "write nodes and elements in blocks: CDWRITE,DB,file,cdb"),
-    "EBLO": "write the elements with CDWRITE,DB,file,cdb",
-    "LUMP": "delete it: the mass is consistent",
-    "CYCL": "delete it, and give `n_sectors` and `axis` in the study",
-    "TB": "delete it, and give `material` in the study: isotropic and elastic",
+    **dict.fromkeys(_short("N EN E EMORE EBLOCK"), _IN_BLOCKS),
 }
 
 
@@ -124,22 +119,19 @@ def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
         rows.setdefault(name, []).append((int(element[8]), chosen))
         materials.add(int(element[0]))
     several = f"{path.name} has materials {' and '.join(map(str, sorted(materials)))}, of which the study gives one"
-    node_sets, element_sets = (
-        {name: np.asarray(members, dtype=np.int64) for name, members in each.items()}
-        for each in (archive.node_components, archive.element_components)
-    )
     deck = deck_of_arrays(
         path.name,
         (np.asarray(archive.nnum, dtype=np.int64), np.asarray(archive.nodes, dtype=np.float64)[:, :3]),
-        {name: (np.array([n for n, _ in found]), np.stack([e for _, e in found])) for name, found in rows.items()},
-        node_sets,
-        element_sets,
+        [(name, np.array([n for n, _ in found]), np.stack([e for _, e in found])) for name, found in rows.items()],
+        archive.node_components.items(),
+        archive.element_components.items(),
     )
+    held = commands.held.items()
     return replace(
         deck,
         boundaries=tuple(
             NodalValue(f"{path.name}: D", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
-            for (label, value), nodes in commands.held.items()
+            for (label, value), nodes in held
         ),
         notes=tuple(f"Elements of type {kind} are passed over." for kind in sorted(passed)),
         unassembled=(several,) if len(materials) > 1 else (),
@@ -156,10 +148,7 @@ def _sort_out(nodes: IntArray) -> tuple[str, IntArray]:
 
 
 def _read_commands(path: Path) -> _Commands:
-    """What the commands of a file say beside its blocks of nodes, elements and components.
-
-    Raises SceneError where a command that is not acted upon may change the model.
-    """
+    """What the commands of a file say beside its blocks. Raises SceneError where one may change the model otherwise."""
     found = _Commands()
     types_left = False
     for fields, place in _lines(path):
@@ -178,8 +167,7 @@ def _read_commands(path: Path) -> _Commands:
         elif command == "D":
             _add_displacement(found, fields, place)
         elif (command == "EBLO" and "SOLID" not in fields) or not _is_skipped(command, fields):
-            text = f"{shown(fields[0])} may change the model, and is not acted upon"
-            raise place.wrong(text, _REMEDIES.get(command, "delete it if it does not"))
+            raise place.wrong(f"{shown(fields[0])} may change the model", _REMEDIES.get(command, _REMEDY))
     return found
 
 
@@ -187,14 +175,13 @@ def _add_type(found: _Commands, fields: list[str], place: Place) -> None:
     """fields: number of the type, number or name of its elements, and its key options from the first on."""
     name = re.search(r"\d+$", fields[1]) if len(fields) > 1 else None
     if name is None or not fields[0].isdigit():
-        raise place.wrong("a type of elements that is no number", "write the file with CDWRITE,DB,file,cdb")
+        raise place.wrong("a type of elements that is no number", _IN_BLOCKS)
     found.kinds[int(fields[0])] = int(name[0]), place
     for option, value in enumerate(fields[2:], 1):
         _check_option(int(name[0]), str(option), value, place)
 
 
 def _check_option(kind: int, option: str, value: str, place: Place) -> None:
-    """Raises SceneError where a key option makes other elements of a kind than those that are read."""
     kinds, what, remedy = _OPTIONS.get(option, ((), "", ""))
     if value == "1" and kind in kinds:
         raise place.wrong(what, remedy)
@@ -204,10 +191,11 @@ def _add_displacement(found: _Commands, fields: list[str], place: Place) -> None
     """A command D."""
     fields = [*fields, *[""] * 8]
     node, label, value = fields[1:4]
-    if not node.isdigit() or label not in _DIRECTIONS or any(fields[5:]) or (value and not _NUMBER.fullmatch(value)):
+    moved = to_float(value or "0")
+    if not node.isdigit() or label not in _DIRECTIONS or any(fields[5:]) or math.isnan(moved):
         what = f"D of {shown(node)}, {shown(label)} = {shown(value)}"
         raise place.wrong(what, "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read")
-    found.held.setdefault((label, float(value.replace("D", "E") or 0.0)), []).append(int(node))
+    found.held.setdefault((label, moved), []).append(int(node))
 
 
 def _lines(path: Path) -> Iterator[tuple[list[str], Place]]:
@@ -237,5 +225,4 @@ def _is_skipped(command: str, fields: list[str]) -> bool:
         return fields[-1 if fields[-1] else -2] == "-1"
     # _TINY is the number that stands for no temperature
     values = [part for part in fields[2 if command in _WITH_LABEL else 1 :] if part not in ("", "_TINY")]
-    zero = all(_NUMBER.fullmatch(value) and not float(value.replace("D", "E")) for value in values)
-    return command in _WHERE_ZERO and zero
+    return command in _WHERE_ZERO and all(to_float(value) == 0.0 for value in values)

@@ -7,6 +7,7 @@ interference. All are in the units of the model.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -15,10 +16,10 @@ import numpy as np
 import pandas as pd
 
 from studies.fe_models.cdb import read_cdb
-from studies.fe_models.deck.contents import ContactNodes, Deck
+from studies.fe_models.deck.contents import Deck
 from studies.fe_models.deck.model import deck_of_arrays
 from studies.fe_models.deck.read import read_deck
-from studies.fe_models.text import IntArray, library_errors
+from studies.fe_models.files import IntArray, library_errors
 from studies.scene_error import SceneError
 
 # meshio's names, whose order of nodes is VTK's: for these kinds that of the decks
@@ -54,10 +55,10 @@ def read_mesh_file(path: Path) -> Deck:
 def _read_gmsh(path: Path) -> Deck:
     """The mesh of a .msh file, whether all of it belongs to physical groups or not. Raises SceneError."""
     with library_errors(path, "meshio", "meshio", "model"):
-        return _gmsh_deck(path, _read_gmsh_file(path))
+        return _gmsh_deck(path, _meshio_mesh(path))
 
 
-def _read_gmsh_file(path: Path) -> Any:
+def _meshio_mesh(path: Path) -> Any:
     import meshio
     from meshio._mesh import topological_dimension
     from meshio.gmsh import _gmsh41
@@ -81,9 +82,9 @@ def _gmsh_deck(path: Path, mesh: Any) -> Deck:
     from meshio._mesh import topological_dimension
 
     points = np.asarray(mesh.points, dtype=np.float64)
-    blocks: dict[str, list[tuple[IntArray, IntArray]]] = {}
-    node_sets: dict[str, list[IntArray]] = {}
-    element_sets: dict[str, list[IntArray]] = {}
+    blocks: list[tuple[str, IntArray, IntArray]] = []
+    node_sets: list[tuple[str, IntArray]] = []
+    element_sets: list[tuple[str, IntArray]] = []
     numbered: dict[bytes, int] = {}
     for place, block in enumerate(mesh.cells):
         nodes = np.asarray(block.data, dtype=np.int64) + 1
@@ -96,23 +97,16 @@ def _gmsh_deck(path: Path, mesh: Any) -> Deck:
             before = len(numbered)
             numbers = np.array([numbered.setdefault(row.tobytes(), len(numbered) + 1) for row in nodes], dtype=np.int64)
             new, first = np.unique(numbers, return_index=True)
-            blocks.setdefault(_KINDS[block.type], []).append((new[new > before], nodes[first[new > before]]))
+            blocks.append((_KINDS[block.type], new[new > before], nodes[first[new > before]]))
         for name, members in _groups(mesh, place, len(nodes)):
-            node_sets.setdefault(name, []).append(np.unique(nodes[members]))
+            node_sets.append((name, np.unique(nodes[members])))
             if numbers is not None:
-                element_sets.setdefault(name, []).append(numbers[members])
-    return deck_of_arrays(
-        path.name,
-        (np.arange(1, len(points) + 1), points),
-        {kind: (np.concatenate([n for n, _ in b]), np.concatenate([e for _, e in b])) for kind, b in blocks.items()},
-        {name: np.unique(np.concatenate(parts)) for name, parts in node_sets.items()},
-        {name: np.concatenate(parts) for name, parts in element_sets.items()},
-    )
+                element_sets.append((name, numbers[members]))
+    return deck_of_arrays(path.name, (np.arange(1, len(points) + 1), points), blocks, node_sets, element_sets)
 
 
-def _groups(mesh: Any, place: int, n_cells: int) -> list[tuple[str, IntArray]]:
+def _groups(mesh: Any, place: int, n_cells: int) -> Iterator[tuple[str, IntArray]]:
     """Physical groups that cells of a block belong to, and which of its cells."""
-    found: list[tuple[str, IntArray]] = []
     cells = mesh.cells[place]
     for name, (tag, dimension) in mesh.field_data.items():
         if name in mesh.cell_sets:
@@ -124,8 +118,7 @@ def _groups(mesh: Any, place: int, n_cells: int) -> list[tuple[str, IntArray]]:
             continue
         members = np.asarray(members, dtype=np.int64)
         if members.size and members.max() < n_cells:
-            found.append((name, members))
-    return found
+            yield name, members
 
 
 def _read_node_table(path: Path) -> Deck:
@@ -138,7 +131,7 @@ def _read_node_table(path: Path) -> Deck:
             raise SceneError("model", f"{path.name} has no column {missing[0]}", f"give {listed}")
         table = table.sort_values("node")
         places = table[_PLACE].to_numpy(dtype=np.float64)
-        contact = table.reindex(columns=_CONTACT).to_numpy(dtype=np.float64)
+        contact = table.reindex(columns=_CONTACT).to_numpy(dtype=np.float64, copy=True)
         numbers = table["node"].to_numpy()
     whole = numbers.dtype.kind == "i" and len(np.unique(numbers)) == len(numbers)
     if not whole or not np.isfinite(places).all():
@@ -148,8 +141,7 @@ def _read_node_table(path: Path) -> Deck:
     for number, names in zip(numbers.tolist(), table["sets"].fillna("").astype(str), strict=True):
         for name in names.upper().split():
             sets.setdefault(name, []).append(number)
-    length = np.linalg.norm(contact[:, 1:4], axis=1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        nodes = ContactNodes(contact[:, 0], contact[:, 1:4] / length, contact[:, 4])
+        contact[:, 1:4] /= np.linalg.norm(contact[:, 1:4], axis=1, keepdims=True)
     node_sets = {name: np.array(members, dtype=np.int64) for name, members in sets.items()}
-    return Deck(path.name, numbers.astype(np.int64), places, (), node_sets, contact_nodes=nodes)
+    return Deck(path.name, numbers.astype(np.int64), places, (), node_sets, contact_nodes=contact)

@@ -36,24 +36,18 @@ class Constraints:
 
     steps (3 n_nodes, 3 n_nodes): the displacements that depend on others, from these. axes (3 n_nodes, 3 n_nodes): its
     columns are the directions of the motions, those of x, y, z but at nodes that are held along other directions, and
-    at nodes without elements. idle (3 n_nodes,): motions that are 0, beside held displacements. across (3 n_nodes, 3
-    n_nodes): projection on directions other than x, y, z along which nodes, oblique (n_nodes,), are held. dependent
-    (n_nodes, 3): which displacements move with others. origin (n_nodes,): what makes a node depend on others, a place
-    in `origins`; -1 for none.
+    at nodes without elements. idle (3 n_nodes,): motions that are 0, beside held displacements. oblique: projection
+    (3, 3) of nodes on other directions in which they are held; across (3 n_nodes, 3 n_nodes): all of them. dependent
+    (n_nodes, 3): which displacements move with others. origin: what makes a node depend on others.
     """
 
     steps: sparse.csr_matrix
     axes: sparse.csr_matrix
     idle: BoolArray
+    oblique: Mapping[int, FloatArray]
     across: sparse.csr_matrix
-    oblique: BoolArray
     dependent: BoolArray
-    origin: IntArray
-    origins: Sequence[str]
-
-    def held_along(self, node: int) -> FloatArray:
-        """Projection (3, 3) on the directions along which an oblique node is held."""
-        return np.asarray(self.across[3 * node : 3 * node + 3, 3 * node : 3 * node + 3].toarray())
+    origin: Mapping[int, str]
 
 
 def resolve(steps: sparse.csr_matrix) -> sparse.csr_matrix | None:
@@ -77,18 +71,16 @@ def eliminate(
 ) -> tuple[Constraints, BoolArray]:
     """Constraints, and which displacements (n_nodes, 3) are 0 or follow others.
 
-    held (n_nodes, 3): displacements that are 0. oblique: projections (3, 3) of nodes on other directions in which they
-    are held. numbers (n_nodes,): of the nodes in the file. n_with_elements: number of nodes with elements; motions of
-    the others that move none of these are 0. Raises SceneError where a displacement depends twice, on itself, or is
-    held as well.
+    held (n_nodes, 3): displacements that are 0. oblique: as in `Constraints`. numbers (n_nodes,): of the nodes in the
+    file. n_with_elements: number of nodes with elements; motions of the others that move none of these are 0. Raises
+    SceneError where a displacement depends twice, on itself, or is held as well.
     """
-    size, places = held.size, [each.place for each in entries]
-    none = np.empty(0, dtype=np.int64)
+    size, none = held.size, np.empty(0, dtype=np.int64)
     dependent = np.concatenate([none, *(each.dependent for each in entries)])
-    origin_of = np.repeat(np.arange(len(entries)), [len(each.dependent) for each in entries])
-    slanted = np.zeros(len(held), dtype=np.bool_)
-    slanted[list(oblique)] = True
-    _check_once(dependent, [places[each] for each in origin_of], held | slanted[:, None], numbers)
+    places = [each.place for each in entries for _ in each.dependent]
+    taken = held.copy()
+    taken[list(oblique)] = True
+    _check_once(dependent, places, taken, numbers)
     rows = np.concatenate([none, *(each.dependent[each.row] for each in entries)])
     columns = np.concatenate([none, *(each.column for each in entries)])
     values = np.concatenate([np.empty(0), *(each.value for each in entries)])
@@ -97,7 +89,7 @@ def eliminate(
     if total is None:
         found = f"{places[0]}: displacements depend on each other in a circle"
         raise SceneError("model", found, "let each depend on others that do not depend on it")
-    turns, projections = [], []
+    turns = []
     idle, fixed = np.zeros(size, dtype=np.bool_), held.ravel().copy()
     fixed[dependent] = True
     for node, projection in oblique.items():
@@ -105,19 +97,15 @@ def eliminate(
         sizes, directions = np.linalg.eigh(projection)
         idle[own] = sizes > 0.5
         turns.append((own, directions - np.eye(3)))
-        projections.append((own, projection))
     axes = sparse.eye(size, format="csr") + _blocks(size, turns)
     axes = axes @ _sorted_out(total @ axes, fixed, 3 * n_with_elements, idle)
     moved = total @ axes @ sparse.diags((~(fixed | idle)).astype(float), format="csr")
     moved.eliminate_zeros()
     moves = np.zeros(size, dtype=np.bool_)
     moves[dependent] = np.diff(moved.indptr)[dependent] > 0
-    origin = np.full(len(held), -1)
-    origin[dependent // 3] = origin_of
-    constraints = Constraints(
-        steps, axes, idle, _blocks(size, projections), slanted, moves.reshape(-1, 3), origin, places
-    )
-    return constraints, fixed.reshape(-1, 3)
+    across = _blocks(size, [(3 * node + np.arange(3), projection) for node, projection in oblique.items()])
+    origin = dict(zip((dependent // 3).tolist(), places, strict=True))
+    return Constraints(steps, axes, idle, oblique, across, moves.reshape(-1, 3), origin), fixed.reshape(-1, 3)
 
 
 def _check_once(dependent: IntArray, origins: Sequence[str], held: BoolArray, numbers: IntArray) -> None:

@@ -54,7 +54,7 @@ class CyclicAxis:
 
 @dataclass(frozen=True)
 class CutFaces:
-    """left, right (n,): nodes, each right one the image of the left one under the rotation `rotation` by one sector.
+    """left, right (n,): nodes, each right one the image of the left one under the rotation by one sector.
 
     `u_right = phase * rotation @ u_left` for a wave that goes round in the sense of the axis. There are none where
     sectors meet in contact alone.
@@ -63,11 +63,6 @@ class CutFaces:
     axis: CyclicAxis
     left: IntArray
     right: IntArray
-
-    @property
-    def rotation(self) -> FloatArray:
-        """Rotation (3, 3) by one sector."""
-        return self.axis.pitch()
 
     def across(self, sectors: IntArray, nodal_diameter: int) -> sparse.bsr_matrix:
         """Factors (3 n, 3 n) from displacements of points (n,) in this sector to those of their images.
@@ -116,8 +111,7 @@ def match_cut_faces(mesh: SolidMesh, axis: CyclicAxis, first: IntArray, second: 
 def find_cut_faces(mesh: SolidMesh, axis: CyclicAxis, in_contact: IntArray) -> CutFaces:
     """Cut faces from the mesh alone: all nodes with an image under rotation by one sector.
 
-    in_contact (m,): nodes that touch the next sector, and are on no cut face. Raises SceneError where there is no
-    image, and no node touches the next sector.
+    in_contact (m,): nodes that touch the next sector. Raises SceneError where there is no image and no such node.
     """
     extent = float(np.ptp(mesh.coordinates, axis=0).max())
     elsewhere = np.setdiff1d(np.arange(mesh.n_nodes), in_contact)
@@ -130,10 +124,7 @@ def find_cut_faces(mesh: SolidMesh, axis: CyclicAxis, in_contact: IntArray) -> C
 
 
 def _images(mesh: SolidMesh, axis: CyclicAxis, left: IntArray, right: IntArray, tolerance: float) -> IntArray:
-    """Of each left node (n,) the right one that it turns into, -1 where there is none within the tolerance, m.
-
-    Where nodes of two bodies coincide, the image is of the same body.
-    """
+    """Of each left node (n,) the right one of its body that it turns into, -1 where none is in the tolerance, m."""
     turned, bodies = axis.turned(mesh.coordinates[left], 1), mesh.bodies
     image = np.full(len(left), -1)
     for place, found in enumerate(cKDTree(mesh.coordinates[right]).query_ball_point(turned, tolerance)):

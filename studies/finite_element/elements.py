@@ -127,10 +127,9 @@ _HEX_FACES = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 
 class ElementKind:
     """A kind of element.
 
-    reference: nodes and shape functions. rule: integration of stiffness and mass, as in CalculiX; with fewer points
-    than nodes the mass of an element is singular. corner_faces: corners of the faces S1, S2, ... of CalculiX and
-    Abaqus, in either sense. incompatible_modes: see `ElementBatch`. assembled: whether matrices can be assembled
-    here.
+    rule: integration of stiffness and mass, as in CalculiX; with fewer points than nodes the mass of an element is
+    singular. corner_faces: corners of the faces S1, S2, ... of CalculiX and Abaqus, in either sense.
+    incompatible_modes: see `ElementBatch`. assembled: whether matrices can be assembled here.
     """
 
     reference: ReferenceElement
@@ -141,10 +140,7 @@ class ElementKind:
 
     @cached_property
     def faces(self) -> tuple[Loop, ...]:
-        """Local nodes of the faces S1, S2, ...: corners anticlockwise from outside, then the mid-side nodes.
-
-        The first mid-side node lies between the first two corners.
-        """
+        """Local nodes of the faces S1, S2, ...: corners anticlockwise from outside, then mid-side nodes behind each."""
         return tuple(self._face(loop) for loop in self.corner_faces)
 
     def _face(self, loop: Loop) -> Loop:

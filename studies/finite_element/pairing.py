@@ -10,10 +10,9 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.finite_element.closest_points import closest_points
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.solid_mesh import SolidMesh
-from studies.finite_element.surfaces import Surface
+from studies.finite_element.surfaces import Surface, closest_points
 from studies.scene_error import SceneError
 
 _TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a facet, or the root of an area
@@ -28,11 +27,11 @@ class ContactSurfaces:
     """Two surfaces in contact.
 
     The nodes of the finer surface move, those of the first one where both are alike; where one surface alone is covered
-    by the other, its nodes move. tolerance: largest distance of a node that is paired, m; None for a share of a facet.
-    friction_coefficient: None where all pairs have the same. with_gaps: whether distances in the mesh are gaps of the
-    joint, and no errors of flat facets on curved surfaces. clearance: gap of all pairs in place of the distances, m,
-    negative for an interference. label: of the pairs; the names of both surfaces if empty. sector: of the second
-    surface: 1 for the next sector in the sense of the axis, -1 for the one before.
+    by the other, its nodes move. tolerance: largest distance of a pair, m; None for a share of a facet.
+    friction_coefficient: None where all pairs have the same. with_gaps: whether distances in the mesh are gaps, and no
+    errors of flat facets on curved surfaces. clearance: gap of all pairs in place of the distances, m, negative for an
+    interference. label: of the pairs; the names of both surfaces if empty. sector: of the second surface: 1 for the
+    next sector in the sense of the axis, -1 for the one before.
     """
 
     first: Surface
@@ -53,13 +52,12 @@ class ContactSurfaces:
         """Coordinates (n_nodes, 3), m, where the second surface is; axis: of the cyclic structure."""
         if not self.sector:
             return coordinates
-        if axis is None:
-            raise ValueError("a contact between sectors needs the axis of the cyclic structure")
+        assert axis is not None, "of a sector"
         return axis.turned(coordinates, self.sector)
 
     @property
     def turned_round(self) -> ContactSurfaces:
-        """The same contact with the surfaces in the other order."""
+        """The same with the surfaces in the other order."""
         return replace(self, first=self.second, second=self.first, sector=-self.sector, label=self.name)
 
 
@@ -116,7 +114,9 @@ def build_contact_pairs(
         if len(shared):
             found = f"{contact.first.name} and {contact.second.name} share {len(shared)} nodes"
             raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
-        sizes = [each.facet_size(coordinates) for each in (contact.first, contact.second)]
+        both = contact.first, contact.second
+        # roots of the mean areas of their facets
+        sizes = [float(np.sqrt(each.areas_and_normals(coordinates)[0].sum() / len(each.facets))) for each in both]
         finer = contact.turned_round if sizes[1] < (1.0 - 1e-6) * sizes[0] else contact
         facet = max(sizes)
         limit = min(facet, _TOLERANCE * facet if contact.tolerance is None else contact.tolerance)
@@ -170,7 +170,7 @@ def _pairs_of(
     surface: tuple[FloatArray, FloatArray],
     along: FloatArray,
 ) -> ContactPairs:
-    """Pairs of the nodes of the first surface, with areas and normals; place: of the contact among all.
+    """Pairs of the nodes of the first surface. surface: their areas and normals. place: of the contact among all.
 
     there (n_nodes, 3): coordinates where the sector of the second surface is.
     """

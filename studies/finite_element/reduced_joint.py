@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
-from studies.finite_element.elimination import NotPositiveDefiniteError
 from studies.finite_element.pairing import ContactPairs
-from studies.finite_element.reduction import Reduction
+from studies.finite_element.reduction import PreparedModel
 from studies.finite_element.solid_mesh import (
-    Rotation,
     assemble_mass,
     assemble_stiffness,
     assemble_tangent_stiffness,
@@ -30,47 +27,25 @@ from studies.finite_element.structure import (
     Structure,
     build_structure,
 )
+from studies.scene import Progress, silent
 from studies.scene_error import SceneError
-
-Progress = Callable[[str], None]
-"""Takes a line on the next step."""
 
 
 @dataclass(frozen=True)
 class FeScene:
-    """A reduced model, its pairs in the order of the model, and frequencies of the glued structure.
+    """A reduced model, what it was reduced from, and frequencies of the glued structure.
 
     glued_frequencies: Hz, ascending, by nodal diameter.
     """
 
     model: ReducedModel
-    pairs: ContactPairs
+    prepared: PreparedModel
     glued_frequencies: Mapping[int, FloatArray]
-
-
-@dataclass(frozen=True)
-class PreparedModel:
-    """A model that can be reduced at any nodal diameter.
-
-    reduction: with the forms "stiffness" and "mass", "elastic" for the stiffness without prestress where that differs,
-    and "damping" where the model has one. static_load (3 n_nodes,): N. at_rest: the reduction without prestress; None
-    where that is the same. rotation: None for a model at rest. weight (n_nodes,): kg of each node.
-    """
-
-    reduction: Reduction
-    static_load: FloatArray
-    at_rest: Reduction | None
-    rotation: Rotation | None
-    weight: FloatArray
 
     @property
     def pairs(self) -> ContactPairs:
-        """Contact pairs."""
-        return self.reduction.structure.pairs
-
-
-def silent(_: str) -> None:
-    """Prints nothing."""
+        """Contact pairs in the order of the model."""
+        return self.prepared.structure.pairs
 
 
 def build_fe_scene(
@@ -79,8 +54,9 @@ def build_fe_scene(
     options: ReductionOptions,
     n_harmonics: int,
     progress: Progress = silent,
+    prepared: PreparedModel | None = None,
 ) -> FeScene:
-    """Reduced model for the harmonics 0..n_harmonics.
+    """Reduced model for the harmonics 0..n_harmonics. prepared: the model where `prepare_model` has made it before.
 
     Displacements of the reduced model: first the relative ones, pair by pair normal (positive when the pair closes),
     first and second tangent; then modal coordinates of the glued structure. The static load, that of the rotation and
@@ -94,80 +70,70 @@ def build_fe_scene(
         most = f"use at most n_sectors // 2 = {n_sectors // 2}; more is the same wave turning the other way"
         raise SceneError("nodal_diameter", str(excited), most if n_sectors else "only a cyclic sector has one: use 0")
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
-    prepared = prepare_model(model, joint, progress)
+    prepared = prepared or prepare_model(model, joint, progress)
     vectors = np.stack([prepared.static_load, joint.load, *joint.responses.values()], axis=1)
     linear: dict[int, LinearModel] = {}
-    frequencies: dict[int, FloatArray] = {}
+    found: dict[int, FloatArray] = {}
     damping = 0.0
     # The excited nodal diameter first: the damping of all of them is scaled by its first frequency.
     order = sorted({excited, *wanted}, key=lambda k: (k != excited, k))
     for number, k in enumerate(order):
         progress(f"reduction at nodal diameter {k} ({number + 1} of {len(order)})" if n_sectors else "reduction")
-        with _positive_definite(k, model.rotation):
-            reduced = prepared.reduction.reduce(k, options.n_modes, vectors)
-        frequencies[k] = reduced.frequencies / (2.0 * np.pi)
+        frequencies, forms, generalised = prepared.reduce(k, options.n_modes, vectors)
+        found[k] = frequencies / (2.0 * np.pi)
         if k == excited:
-            damping = options.loss_factor / reduced.frequencies[0]
+            damping = options.loss_factor / frequencies[0]
         if k in wanted:
-            static, load, *responses = reduced.vectors.T
-            stiffness = reduced.forms["stiffness"]
+            static, load, *responses = generalised.T
             linear[k] = LinearModel(
-                mass=reduced.forms["mass"],
-                damping=reduced.forms.get("damping", damping * reduced.forms.get("elastic", stiffness)),
-                stiffness=_retained(stiffness, prepared.pairs, joint.retainer),
+                mass=forms["mass"],
+                damping=forms.get("damping", damping * forms.get("elastic", forms["stiffness"])),
+                stiffness=_retained(forms["stiffness"], prepared.pairs, joint.retainer),
                 load_static=static.real * (k == 0),
                 load_harmonic=load.astype(complex) * (k == excited),
                 response=np.array(responses).conj(),
             )
     contact = _interface(prepared.pairs, joint)
-    reduced_model = ReducedModel({k: linear[k] for k in wanted}, contact, tuple(joint.responses), n_sectors, excited)
-    return FeScene(reduced_model, prepared.pairs, frequencies)
+    reduced = ReducedModel({k: linear[k] for k in wanted}, contact, tuple(joint.responses), n_sectors, excited)
+    return FeScene(reduced, prepared, found)
 
 
 def prepare_model(model: FeModel, joint: JointDefinition, progress: Progress = silent) -> PreparedModel:
     """Pairs and matrices of a model. Raises SceneError where the model describes no possible joint."""
     progress("pairing of the contact surfaces")
-    structure = build_structure(model, joint)
-    if model.forms is not None:
-        return _prepare(model, structure, model.forms)
-    progress("assembly of stiffness and mass")
-    check_elements(model.mesh)
-    elastic, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
-    still = _prepare(model, structure, {"stiffness": elastic, "mass": mass})
-    if not model.prestress or model.rotation is None:
-        return still
-    progress("static state of the glued structure under the centrifugal load")
-    load = centrifugal_load(mass, model.mesh.coordinates, model.rotation)
-    with _positive_definite(0, model.rotation):
-        displacements = still.reduction.solve_static(load)
-    progress("assembly of the prestressed stiffness")
-    stressed = assemble_tangent_stiffness(model.mesh, displacements)
-    stiffness = (stressed + spin_softening(mass, model.rotation)).tocsr()
-    forms = {"stiffness": stiffness, "mass": mass, "elastic": elastic}
-    return replace(still, reduction=replace(still.reduction, forms=forms), at_rest=still.reduction)
-
-
-def _prepare(model: FeModel, structure: Structure, forms: Mapping[str, sparse.csr_matrix]) -> PreparedModel:
-    """A model with the forms as they are."""
-    mass, placed = forms["mass"], ~np.isnan(model.mesh.coordinates)
+    mesh, rotation, structure, forms = model.mesh, model.rotation, build_structure(model, joint), model.forms
+    if forms is None:
+        progress("assembly of stiffness and mass")
+        check_elements(mesh)
+        forms = {"stiffness": assemble_stiffness(mesh), "mass": assemble_mass(mesh)}
+    mass, placed = forms["mass"], ~np.isnan(mesh.coordinates)
     load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
     if model.gravity is not None:
         load = load + mass @ (placed * model.gravity).ravel()
-    if model.rotation is not None:
-        load = load + centrifugal_load(mass, model.mesh.coordinates, model.rotation)
+    if rotation is not None:
+        spin = centrifugal_load(mass, mesh.coordinates, rotation)
+        load = load + spin
     along_x = placed * np.array([1.0, 0.0, 0.0])
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
-    reduction = Reduction(structure, forms, _positions(model, structure, forms.values()))
-    return PreparedModel(reduction, load, None, model.rotation, weight)
+    positions = _positions(mesh.coordinates, structure, forms.values())
+    prepared = PreparedModel(structure, forms, positions, load, weight, rotation)
+    if model.forms is not None or not model.prestress or rotation is None:
+        return prepared
+    progress("static state of the glued structure under the centrifugal load")
+    displacements = prepared.solve_static(spin)
+    progress("assembly of the prestressed stiffness")
+    stressed = assemble_tangent_stiffness(mesh, displacements)
+    stiffness = (stressed + spin_softening(mass, rotation)).tocsr()
+    return replace(prepared, forms={"stiffness": stiffness, "mass": mass, "elastic": forms["stiffness"]})
 
 
-def _positions(model: FeModel, structure: Structure, forms: Iterable[sparse.csr_matrix]) -> FloatArray:
+def _positions(coordinates: FloatArray, structure: Structure, forms: Iterable[sparse.csr_matrix]) -> FloatArray:
     """Coordinates of the nodes, and radius, angle and height of a sector, over the extent of the mesh.
 
     Nodes without a place stand among those to which forms and constraints couple them. Rounded, layers of a regular
     mesh are layers.
     """
-    positions, nowhere = model.mesh.coordinates.copy(), np.asarray(np.isnan(model.mesh.coordinates).any(axis=1))
+    positions, nowhere = coordinates.copy(), np.asarray(np.isnan(coordinates).any(axis=1))
     if nowhere.any():
         node = sparse.kron(sparse.eye(len(nowhere)), np.ones((1, 3)), format="csr")
         joins = (*forms, structure.constraints.steps.T)
@@ -180,15 +146,6 @@ def _positions(model: FeModel, structure: Structure, forms: Iterable[sparse.csr_
     if structure.cut is not None:
         directions.append(structure.cut.axis.cylinder(positions) * [1.0, extent, 1.0])
     return np.asarray(np.round(np.hstack(directions) / extent, 7))
-
-
-def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int) -> FloatArray:
-    """Lowest natural frequencies (n_modes,) of the glued structure, Hz, ascending.
-
-    Raises SceneError where the glued structure is not held, or unstable.
-    """
-    with _positive_definite(nodal_diameter, prepared.rotation):
-        return prepared.reduction.frequencies(nodal_diameter, n_modes) / (2.0 * np.pi)
 
 
 def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
@@ -215,20 +172,3 @@ def _retained(stiffness: Matrix, pairs: ContactPairs, retainer: Retainer | None)
     shares = (pairs.frames @ direction) * (pairs.area / pairs.area.sum())[:, None]
     row[: np.count_nonzero(pairs.present)] = shares[pairs.present]
     return stiffness + retainer.stiffness * np.outer(row, row)
-
-
-@contextmanager
-def _positive_definite(nodal_diameter: int, rotation: Rotation | None) -> Iterator[None]:
-    """Raises SceneError where a glued stiffness is not positive definite."""
-    try:
-        yield
-    except NotPositiveDefiniteError as error:
-        if error.unstable:
-            rpm = None if rotation is None else np.sqrt(rotation.omega_squared) * 30.0 / np.pi
-            speed = "that of the matrices" if rpm is None else f"{rpm:.6g}"
-            found = "the glued structure is unstable: spin softening exceeds its stiffness"
-            remedy = f"reduce it: at nodal diameter {nodal_diameter} {found}"
-            raise SceneError("rotation_speed", speed, remedy) from error
-        found = f"at nodal diameter {nodal_diameter} nothing holds the glued structure: its stiffness is singular"
-        remedy = "clamp nodes, so that with all contact pairs glued no body can move as a whole"
-        raise SceneError("clamp", found, remedy) from error

@@ -1,4 +1,4 @@
-"""Craig-Bampton reduction of a structure to relative displacements of its pairs and modes with the pairs glued.
+"""Craig-Bampton reduction of a model to relative displacements of its pairs and modes with the pairs glued.
 
 The static shapes of the relative displacements, and the lowest modes of the glued structure, are the coordinates: the
 stiffness couples no mode with a shape. One factorisation of the glued stiffness at a nodal diameter gives both.
@@ -14,8 +14,11 @@ from scipy import sparse
 from scipy.linalg import eigh, qr
 
 from solver.model import FloatArray, Matrix
-from studies.finite_element.elimination import Dissection, Factor, dissect, factorise
+from studies.finite_element.elimination import Dissection, Factor, NotPositiveDefiniteError, dissect, factorise
+from studies.finite_element.pairing import ContactPairs
+from studies.finite_element.solid_mesh import Rotation
 from studies.finite_element.structure import Coordinates, Structure
+from studies.scene_error import SceneError
 
 _COLUMNS = 128  # vectors solved for at a time
 _BLOCK = 8  # modes are looked for with so many vectors at a time
@@ -26,68 +29,60 @@ _SAME, _ROUND_OFF = 1e-11, 1e-14  # change of a flexibility that is none, over i
 
 
 @dataclass(frozen=True)
-class ReducedStructure:
-    """A structure in the coordinates [relative displacements | stuck modes], `n` of them, at one nodal diameter.
+class PreparedModel:
+    """A model that can be reduced at any nodal diameter in 0..n_sectors // 2.
 
-    frequencies (n_modes,): of the glued structure, rad/s, ascending; modes have unit modal mass. forms: Hermitian
-    matrices (n, n) by name, with "stiffness" and "mass". vectors (n, n_vectors): generalised forces.
-    """
+    forms: matrices (3 n_nodes, 3 n_nodes), symmetric and unconstrained, by name: "stiffness", "mass", "elastic" for the
+    stiffness without prestress where that differs, "damping" where the model has one. positions (n_nodes,
+    n_directions): of the nodes, for the order of elimination. static_load (3 n_nodes,): N. weight (n_nodes,): kg of
+    each node. rotation: None at rest. dissections: filled by the first factorisation; all others have the same order.
 
-    frequencies: FloatArray
-    forms: Mapping[str, Matrix]
-    vectors: Matrix
-
-
-@dataclass(frozen=True)
-class Reduction:
-    """Forms of a structure that can be reduced at any nodal diameter in 0..n_sectors // 2.
-
-    forms: matrices (3 n_nodes, 3 n_nodes), symmetric and unconstrained, by name, with "stiffness" and "mass".
-    positions (n_nodes, n_directions): of the nodes, for the order of elimination. dissections: filled by the first
-    factorisation, as the order is the same at all nodal diameters and for all forms of a mesh.
-
-    All methods raise NotPositiveDefiniteError where the glued structure is not held, or unstable.
+    All methods raise SceneError where the glued structure is not held, or unstable.
     """
 
     structure: Structure
     forms: Mapping[str, sparse.csr_matrix]
     positions: FloatArray
+    static_load: FloatArray
+    weight: FloatArray
+    rotation: Rotation | None
     dissections: list[Dissection] = field(default_factory=list)
+
+    @property
+    def pairs(self) -> ContactPairs:
+        """Contact pairs."""
+        return self.structure.pairs
 
     def solve_static(self, load: FloatArray) -> FloatArray:
         """Displacements (3 n_nodes,), m, of the glued structure at nodal diameter 0 under a load (3 n_nodes,), N."""
         coordinates = self.structure.coordinates(0)
-        _, factor = self._factorise(coordinates)
+        _, factor = self._factorise(coordinates, 0)
         glued = coordinates.glued
         return np.asarray(glued @ factor.solve((glued.T @ load)[:, None])[:, 0])
 
-    def frequencies(self, nodal_diameter: int, n_modes: int) -> FloatArray:
-        """Lowest natural frequencies (n_modes,) of the glued structure, rad/s, ascending."""
+    def frequencies(self, nodal_diameter: int, n_modes: int, stiffness: str = "stiffness") -> FloatArray:
+        """Lowest natural frequencies (n_modes,) of the glued structure, Hz, ascending. stiffness: name of the form."""
         coordinates = self.structure.coordinates(nodal_diameter)
-        stiffness, factor = self._factorise(coordinates)
-        return _lowest_modes(stiffness, _on(coordinates.glued, self.forms["mass"]), factor, n_modes)[0]
+        form, factor = self._factorise(coordinates, nodal_diameter, stiffness)
+        mass = _projected(coordinates.glued, self.forms["mass"])
+        return _lowest_modes(form, mass, factor, n_modes)[0] / (2.0 * np.pi)
 
-    def _factorise(self, coordinates: Coordinates) -> tuple[sparse.csr_matrix, Factor]:
-        """Stiffness with the pairs glued, and its factors."""
-        stiffness = _on(coordinates.glued, self.forms["stiffness"])
-        if not self.dissections:
-            # where phases cancel at one of these diameters they do not at the other
-            glued = sum(abs(self.structure.coordinates(diameter).glued) for diameter in (0, 1))
-            everything = _on(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
-            self.dissections.append(dissect(everything, coordinates.node, self.positions))
-        return stiffness, factorise(stiffness, self.dissections[0])
+    def reduce(
+        self, nodal_diameter: int, n_modes: int, vectors: FloatArray
+    ) -> tuple[FloatArray, dict[str, Matrix], Matrix]:
+        """The structure in the coordinates [relative displacements | stuck modes], n of them, at a nodal diameter.
 
-    def reduce(self, nodal_diameter: int, n_modes: int, vectors: FloatArray) -> ReducedStructure:
-        """The structure at a nodal diameter.
+        Frequencies (n_modes,) of the glued structure, rad/s, ascending; the forms, Hermitian matrices (n, n), modes
+        have unit modal mass; generalised forces (n, n_vectors).
 
         n_modes: stuck modes, at least 1; there are fewer where the structure has fewer. vectors (3 n_nodes, n_vectors):
         nodal forces.
         """
         coordinates = self.structure.coordinates(nodal_diameter)
         glued, relative = coordinates.glued, coordinates.relative
-        stiffness, factor = self._factorise(coordinates)
+        stiffness, factor = self._factorise(coordinates, nodal_diameter)
         shapes = _static_shapes(coordinates, self.forms["stiffness"], factor)
-        frequencies, modes = _lowest_modes(stiffness, _on(glued, self.forms["mass"]), factor, n_modes)
+        frequencies, modes = _lowest_modes(stiffness, _projected(glued, self.forms["mass"]), factor, n_modes)
         moved, forms = glued @ modes, {}
         for name, form in self.forms.items():
             if name == "stiffness":  # no force but at the pairs
@@ -99,11 +94,34 @@ class Reduction:
                 modal = np.eye(len(frequencies)) if name == "mass" else moved.conj().T @ inertia
             whole = np.block([[own, coupling], [coupling.conj().T, modal]])
             forms[name] = np.asarray(0.5 * (whole + whole.conj().T))
-        generalised = np.concatenate([shapes.conj().T @ vectors, moved.conj().T @ vectors])
-        return ReducedStructure(frequencies, forms, generalised)
+        return frequencies, forms, np.concatenate([shapes.conj().T @ vectors, moved.conj().T @ vectors])
+
+    def _factorise(
+        self, coordinates: Coordinates, nodal_diameter: int, name: str = "stiffness"
+    ) -> tuple[sparse.csr_matrix, Factor]:
+        """A stiffness with the pairs glued, and its factors."""
+        stiffness = _projected(coordinates.glued, self.forms[name])
+        if not self.dissections:
+            # where phases cancel at one of these diameters they do not at the other
+            glued = sum(abs(self.structure.coordinates(diameter).glued) for diameter in (0, 1))
+            everything = _projected(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
+            self.dissections.append(dissect(everything, coordinates.node, self.positions))
+        try:
+            return stiffness, factorise(stiffness, self.dissections[0])
+        except NotPositiveDefiniteError as error:
+            at = f"at nodal diameter {nodal_diameter}"
+            if error.unstable:
+                rpm = None if self.rotation is None else np.sqrt(self.rotation.omega_squared) * 30.0 / np.pi
+                speed = "that of the matrices" if rpm is None else f"{rpm:.6g}"
+                found = "the glued structure is unstable: spin softening exceeds its stiffness"
+                raise SceneError("rotation_speed", speed, f"reduce it: {at} {found}") from error
+            found = f"{at} nothing holds the glued structure: its stiffness is singular"
+            remedy = "clamp nodes, so that with all contact pairs glued no body can move as a whole"
+            raise SceneError("clamp", found, remedy) from error
 
 
-def _on(coordinates: sparse.csr_matrix, form: sparse.csr_matrix) -> sparse.csr_matrix:
+def _projected(coordinates: sparse.csr_matrix, form: sparse.csr_matrix) -> sparse.csr_matrix:
+    """A form in other coordinates."""
     return (coordinates.conj().T @ form @ coordinates).tocsr()
 
 
@@ -155,16 +173,14 @@ def _lowest_modes(
         adjoint = space[0].conj().T
         values, vectors = eigh(adjoint @ space[1], adjoint @ space[2])
         found = np.flatnonzero(values > _STIFF * values[-1])[::-1][:n_modes]
-        if small or block.shape[1] == 0 or (len(known) == len(found) and _agree(values[found], known)):
+        if small or block.shape[1] == 0:
+            break
+        if len(known) == len(found) and (np.abs(values[found] - known) <= _SAME * known + _ROUND_OFF * known[0]).all():
             break
         known = values[found]
     modes = (space[0] @ vectors[:, found]) / np.sqrt(values[found])
     seen = random.standard_normal(n) @ modes
     return 1.0 / np.sqrt(values[found]), modes * (seen.conj() / np.abs(seen))
-
-
-def _agree(values: FloatArray, known: FloatArray) -> bool:
-    return bool((np.abs(values - known) <= _SAME * known + _ROUND_OFF * known[0]).all())
 
 
 def _orthonormal(block: Matrix, basis: Matrix) -> Matrix:

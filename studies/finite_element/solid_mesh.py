@@ -33,10 +33,10 @@ class Material:
 
 @dataclass(frozen=True)
 class ElementGroup:
-    """Elements of one kind and one material.
+    """Elements of one kind, a key of `ELEMENT_KINDS`, and one material.
 
-    kind: a key of `ELEMENT_KINDS`. nodes (n_elements, n_local): rows of `SolidMesh.coordinates`. numbers (n_elements,):
-    in the file, for messages and surfaces. part: label for pictures.
+    nodes (n_elements, n_local): rows of `SolidMesh.coordinates`. numbers (n_elements,): in the file. part: label for
+    pictures.
     """
 
     kind: str
@@ -48,9 +48,7 @@ class ElementGroup:
 
 @dataclass(frozen=True)
 class SolidMesh:
-    """coordinates (n_nodes, 3): m, NaN for nodes without a place. numbers (n_nodes,): of the nodes in the file, for
-    messages. groups: the elements.
-    """
+    """coordinates (n_nodes, 3): m, NaN for nodes without a place. numbers (n_nodes,): of the nodes in the file."""
 
     coordinates: FloatArray
     numbers: IntArray
@@ -132,7 +130,7 @@ def spin_softening(mass: sparse.csr_matrix, rotation: Rotation) -> sparse.csr_ma
 def centrifugal_load(mass: sparse.csr_matrix, coordinates: FloatArray, rotation: Rotation) -> FloatArray:
     """Centrifugal load (3 n_nodes,), N: elements are isoparametric, so that int N rho x is mass times positions.
 
-    What has no place, NaN, has no arm: an amplitude within an element.
+    What has no place, NaN, an amplitude within an element, has no arm.
     """
     arms = np.nan_to_num(coordinates - rotation.point) @ rotation.across
     return np.asarray(rotation.omega_squared * (mass @ arms.ravel()))
@@ -176,10 +174,7 @@ def _assemble(
 
 
 def volumes_of_points(kind: ElementKind, coordinates: FloatArray) -> FloatArray:
-    """Volumes (n_elements, n_points), m3, of the integration points of elements; coordinates (n_elements, n_local, 3).
-
-    Those of an element that is turned inside out are negative.
-    """
+    """Volumes (n_elements, n_points), m3, of integration points, < 0 inside out; coordinates (n_elements, n, 3)."""
     return np.asarray(np.linalg.det(_jacobians(kind, coordinates, kind.rule.points)) * kind.rule.weights)
 
 

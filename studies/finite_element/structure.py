@@ -1,7 +1,7 @@
-"""A finite-element model of a joint and what is done with it, SI; which displacements are free, held, or follow others.
+"""A finite-element model of a joint, SI; which displacements are free, held, or follow others.
 
 Nodes of the right cut face follow those of the left one, the moving node of a contact pair or of a tie follows the
-opposite point, plus the relative displacement of the pair; constraints are the same of other displacements.
+opposite point, plus the relative displacement of the pair; constraints do the same to other displacements.
 """
 
 from __future__ import annotations
@@ -27,12 +27,11 @@ _ROUND_OFF = 1e-6  # of a direction, which decks give with few digits
 class FeModel:
     """A model, whose nodes are those of a mesh.
 
+    prestress: whether the stiffness that is assembled contains the stress and the displacements of the glued structure
+    under the centrifugal load, and spin softening. preload (3 n_nodes,): constant forces, N, and gravity (3,):
+    acceleration of all mass, m/s2; no part of the prestress, as forces on gaps act otherwise on a glued structure.
     forms: "stiffness", N/m, "mass", kg, and where there is one "damping", N s/m, of another program, with their
-    prestress and spin softening, (3 n_nodes, 3 n_nodes), symmetric and unconstrained; None where they are assembled
-    here. prestress: whether the stiffness that is assembled contains the stress and the displacements of the glued
-    structure under the centrifugal load, and spin softening. preload (3 n_nodes,): constant forces, N, and gravity
-    (3,): acceleration of all mass, m/s2; no part of the prestress, as forces on gaps and flanks act otherwise on a
-    glued structure.
+    prestress and spin softening, (3 n_nodes, 3 n_nodes), symmetric and unconstrained; None: they are assembled here.
     """
 
     mesh: SolidMesh
@@ -44,10 +43,7 @@ class FeModel:
 
 
 def mean_motion(nodes: IntArray, direction: FloatArray, n_nodes: int) -> FloatArray:
-    """Row (3 n_nodes,) that gives the mean displacement of nodes (n,) along a direction (3,) of any length.
-
-    As a load: a force of 1 N along the direction, shared evenly.
-    """
+    """Row (3 n_nodes,) of the mean displacement of nodes (n,) along a direction (3,); as a load 1 N, shared evenly."""
     row = np.zeros((n_nodes, 3))
     np.add.at(row, nodes, direction / (np.linalg.norm(direction) * len(nodes)))
     return row.ravel()
@@ -70,8 +66,7 @@ class JointDefinition:
 
     held (n_nodes, 3): displacements that are 0, or follow others by the constraints. load (3 n_nodes,): harmonic load,
     N per unit of excitation amplitude. responses: rows (3 n_nodes,) by name. cut: None where the structure is no cyclic
-    sector. ties: surfaces that are always glued. pairs: those of the contacts in another order or with other frames
-    than `build_contact_pairs` gives them.
+    sector. ties: surfaces that are always glued. pairs: in place of those that `build_contact_pairs` makes.
     """
 
     contacts: tuple[ContactSurfaces, ...]
@@ -98,8 +93,8 @@ class ReductionOptions:
 class Coordinates:
     """`u = glued @ y + relative @ u_rel`: all displacements (3 n_nodes,) from the free ones and those of the pairs.
 
-    relative (3 n_nodes, n_relative): pair by pair; normal, first, second tangent, without those that do not exist. Both
-    are complex where a wave has a phase. node (n_free,): of each y, ascending.
+    Both are complex where a wave has a phase. relative: pair by pair normal, first, second tangent, without those that
+    do not exist. node (n_free,): of each y, ascending.
     """
 
     glued: sparse.csr_matrix
@@ -184,7 +179,7 @@ def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
 def _check_followers(
     constraints: Constraints, numbers: IntArray, cut: CutFaces | None, pairs: ContactPairs, ties: ContactPairs | None
 ) -> None:
-    """Raises SceneError where a node follows others by a constraint and in another way as well, or its image cannot."""
+    """Raises SceneError where a node follows others in two ways, or images are held in other directions."""
     remedy = "take it out of one of them, or refine the other surface"
     ways = [(pairs.moving, "moves in a contact pair", remedy)]
     if ties is not None:
@@ -195,29 +190,27 @@ def _check_followers(
     for nodes, what, remedy in ways:
         wrong = nodes[constraints.dependent[nodes].any(axis=1)]
         if len(wrong):
-            origin = constraints.origins[constraints.origin[wrong[0]]]
-            raise SceneError("model", f"{origin}: node {numbers[wrong[0]]} depends on others and {what}", remedy)
+            found = f"{constraints.origin[int(wrong[0])]}: node {numbers[wrong[0]]} depends on others and {what}"
+            raise SceneError("model", found, remedy)
     if cut is None:
         return
-    slanted = constraints.oblique[cut.left] | constraints.oblique[cut.right]
-    for one, other in zip(cut.left[slanted], cut.right[slanted], strict=True):
-        image = cut.rotation @ constraints.held_along(one) @ cut.rotation.T
-        if np.abs(image - constraints.held_along(other)).max() > _ROUND_OFF:
+    turn, none, oblique = cut.axis.pitch(), np.zeros((3, 3)), constraints.oblique
+    slanted = np.isin(cut.left, list(oblique)) | np.isin(cut.right, list(oblique))
+    for one, other in zip(cut.left[slanted].tolist(), cut.right[slanted].tolist(), strict=True):
+        along, image = (oblique.get(node, none) for node in (one, other))
+        if np.abs(turn @ along @ turn.T - image).max() > _ROUND_OFF:
             found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
             raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
 
 
 def _hold_cut_faces(held: BoolArray, cut: CutFaces | None, numbers: IntArray) -> BoolArray:
-    """Held displacements (n_nodes, 3), those of nodes on one cut face as those of their images.
-
-    Raises SceneError where an image does not have the directions in which a node is held.
-    """
+    """Held displacements (n_nodes, 3), alike on both cut faces. Raises SceneError where directions are not."""
     if cut is None:
         return held
-    either = held[cut.left] | held[cut.right]
+    either, turn = held[cut.left] | held[cut.right], cut.axis.pitch()
     for place in np.flatnonzero(either.any(axis=1) & ~either.all(axis=1)):
         projection = np.diag(either[place].astype(float))
-        if np.abs(cut.rotation @ projection - projection @ cut.rotation).max() > 1e-9:
+        if np.abs(turn @ projection - projection @ turn).max() > 1e-9:
             found = f"node {numbers[cut.left[place]]} of a cut face is held in some directions"
             raise SceneError("clamp", found, "hold nodes of cut faces in all directions, or along the axis")
     held = held.copy()
@@ -239,11 +232,9 @@ def _merge_cut_pairs(pairs: ContactPairs, cut: CutFaces | None, numbers: IntArra
     left = place[image[pairs.moving[right]]]
     if (left < 0).any():
         wrong = pairs.moving[right[left < 0]]
-        found = (
-            f"{len(wrong)} nodes of {pairs.moving_name[pairs.surface[right[0]]]} lie on one cut face and their images"
-            f" are in no pair, as node {numbers[wrong[0]]}"
-        )
-        raise SceneError("contact", found, "let the surface end alike on both cut faces")
+        name = pairs.moving_name[pairs.surface[right[0]]]
+        found = f"{len(wrong)} nodes of {name} lie on one cut face and their images are in no pair, as node"
+        raise SceneError("contact", f"{found} {numbers[wrong[0]]}", "let the surface end alike on both cut faces")
     area = pairs.area.copy()
     area[left] += area[right]
     return replace(pairs, area=area).chosen(np.setdiff1d(np.arange(pairs.n_contact), right))
@@ -256,18 +247,18 @@ def _hold_pairs(
 
     Raises SceneError where a moving node is held along its normal, or the opposite point is not held as well.
     """
-    slanted = constraints.oblique
+    oblique = constraints.oblique
 
     def along(node: int) -> FloatArray:
         """Projection (3, 3) on the directions along which a node is held."""
-        return constraints.held_along(node) if slanted[node] else np.diag(held[node].astype(float))
+        return oblique[node] if node in oblique else np.diag(held[node].astype(float))
 
     frames, present = pairs.frames.copy(), pairs.present.copy()
-    for place in np.flatnonzero((held.any(axis=1) | slanted)[pairs.moving]):
+    for place in np.flatnonzero(held[pairs.moving].any(axis=1) | np.isin(pairs.moving, list(oblique))):
         node, name = int(pairs.moving[place]), pairs.moving_name[pairs.surface[place]]
-        by = " (*TRANSFORM)" if slanted[node] else ""
+        by = " (*TRANSFORM)" if node in oblique else ""
         values, vectors = np.linalg.eigh(along(node))
-        axes = vectors.T[values > 0.5] if slanted[node] else np.eye(3)[held[node]]
+        axes = vectors.T[values > 0.5] if node in oblique else np.eye(3)[held[node]]
         normal = frames[place, 0]
         if np.linalg.norm(axes @ normal) > _SLANTED:
             clamped = np.linalg.norm(held[pairs.moving] * pairs.frames[:, 0], axis=1) > _SLANTED

@@ -1,4 +1,4 @@
-"""Surfaces of a mesh in linear facets, with areas and normals of their nodes.
+"""Surfaces of a mesh in linear facets, with areas and normals of their nodes, and the points on them that are closest.
 
 Faces of quadratic elements are split at their mid-side nodes: the consistent areas of a quadratic face are negative or
 zero at its corners, those of its facets are positive at all nodes.
@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
 
 from solver.model import FloatArray, IntArray
 from studies.finite_element.elements import CORNERS, ELEMENT_KINDS, HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
@@ -18,10 +19,14 @@ from studies.finite_element.solid_mesh import SolidMesh
 from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
 
+_CHUNK = 2_000_000  # distances from nodes to facets looked at together
+_NEWTON_STEPS, _DESCENT_STEPS = 8, 24  # to a point of a facet
+_FACE_STEPS = 6  # from there to the point of a quadratic face
+
 
 @dataclass(frozen=True)
 class FaceShape:
-    """Shape functions of the face of an element at a reference coordinate zeta, the height.
+    """Shape functions of an element on a face, at the reference coordinate zeta = height.
 
     nodes: of the element on the face, corners first. facets: linear ones by these, of a triangle the last one twice.
     """
@@ -56,7 +61,6 @@ FACE_SHAPES = {
     8: FaceShape(HEX_20, (0, 1, 2, 3, 8, 9, 10, 11), -1.0, _QUADS),
 }
 """Element faces by their number of nodes."""
-
 _QUAD_POINTS = CORNERS[:4, :2] / np.sqrt(3.0)
 _GAUSS = np.polynomial.legendre.leggauss(3)
 _QUAD_RULE = np.stack(np.meshgrid(_GAUSS[0], _GAUSS[0]), axis=-1).reshape(-1, 2), np.outer(_GAUSS[1], _GAUSS[1]).ravel()
@@ -83,10 +87,9 @@ def quad_derivatives(points: FloatArray) -> FloatArray:
 class Surface:
     """A surface of one body.
 
-    facets (n_facets, 4): rows of `SolidMesh.coordinates`, anticlockwise as seen from outside, of a triangle the last
-    one twice. faces (n_facets, 8): nodes of the element face that each is of, -1 after the last. places (n_facets, 4,
-    2): reference coordinates of its corners there. depth (n_nodes,): how deep the elements are below each of `nodes`,
-    the least one, m.
+    facets (n_facets, 4): rows of `SolidMesh.coordinates`, anticlockwise from outside, of a triangle the last one twice.
+    faces (n_facets, 8): nodes of the element face of each, -1 after the last. places (n_facets, 4, 2): reference
+    coordinates of its corners there. depth (n_nodes,): least depth of the elements below each of `nodes`, m.
     """
 
     name: str
@@ -103,8 +106,7 @@ class Surface:
     def areas_and_normals(self, coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Area (n_nodes,), m2, and unit outward normal (n_nodes, 3) of each of `nodes`.
 
-        The area of a node is the integral of its shape function on the facets; the normal is the mean of those of the
-        facets, weighted alike.
+        Integrals of the shape function of the node on the facets, and of this times their normals.
         """
         area, normal = np.zeros(len(coordinates)), np.zeros((len(coordinates), 3))
         tangents = np.einsum("pna,fnj->fapj", quad_derivatives(_QUAD_POINTS), coordinates[self.facets])
@@ -117,10 +119,6 @@ class Surface:
             found = f"surface {self.name} folds back on itself"
             raise SceneError("contact", found, "give a smooth surface of one body")
         return area[self.nodes], normal[self.nodes] / sizes[:, None]
-
-    def facet_size(self, coordinates: FloatArray) -> float:
-        """Typical size of a facet, m: root of the mean area."""
-        return float(np.sqrt(self.areas_and_normals(coordinates)[0].sum() / len(self.facets)))
 
 
 class Face(NamedTuple):
@@ -135,7 +133,7 @@ class Face(NamedTuple):
 
 
 def faces_of_elements(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> list[Face]:
-    """Faces by element numbers (n_faces,) and faces (n_faces,), 1 to 6 for S1 to S6 of CalculiX and Abaqus.
+    """Faces by numbers of elements (n_faces,) and of their faces S1 to S6 (n_faces,), as CalculiX and Abaqus have them.
 
     name: for messages. Raises SceneError where there is no such element or face.
     """
@@ -176,18 +174,13 @@ def pressure_forces(coordinates: FloatArray, faces: list[Face], pressure: float)
 
 
 def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
-    """Surface of the outer faces all of whose nodes are among some nodes (n,), rows of the coordinates.
-
-    Raises SceneError where nodes belong to no such face.
-    """
+    """Surface of the outer faces whose nodes are all among these (n,). Raises SceneError where one is on no face."""
     inside = np.zeros(mesh.n_nodes, dtype=np.bool_)
     inside[nodes] = True
     surface = _surface(mesh, name, [face for face in outer_faces(mesh) if inside[face.nodes].all()])
     lonely = np.setdiff1d(nodes, surface.nodes)
     if len(lonely):
-        found = (
-            f"{len(lonely)} of {len(nodes)} nodes of {name} belong to no face whose nodes are all in the set, as node"
-        )
+        found = f"{len(lonely)} of {len(nodes)} nodes of {name} belong to no face with all nodes in the set, as node"
         remedy = "give a surface of element faces, or a set of the nodes of whole faces"
         raise SceneError("contact", f"{found} {mesh.numbers[lonely[0]]}", remedy)
     return surface
@@ -238,3 +231,115 @@ def _surface(mesh: SolidMesh, name: str, chosen: list[Face]) -> Surface:
         faces += [np.append(loop, np.full(8 - len(loop), -1))] * len(shape.facets)
         places.append(shape.places[np.array(shape.facets)])
     return Surface(name, np.concatenate(facets), np.array(faces), np.concatenate(places), depth[np.isfinite(depth)])
+
+
+def closest_points(
+    points: FloatArray, surface: Surface, coordinates: FloatArray
+) -> tuple[sparse.csr_matrix, FloatArray]:
+    """Weights (n_points, n_nodes), by the shape functions of element faces, of the points of a surface that are closest
+    to points (n_points, 3), m, and the distances (n_points,) to the linear facets, m.
+    """
+    corners = coordinates[surface.facets]
+    centre = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    triangle = surface.facets[:, 2] == surface.facets[:, 3]
+    step = max(1, _CHUNK // len(corners))
+    facet_of, within = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 4))
+    distance = np.full(len(points), np.inf)
+    for first in range(0, len(points), step):
+        own = points[first : first + step]
+        apart = np.linalg.norm(own[:, None] - centre, axis=2)
+        # no facet is closer than its sphere, and none that is farther than a whole sphere can be the closest
+        reach = (apart + radius).min(axis=1, keepdims=True)
+        point, facet = np.nonzero(apart - radius <= reach * (1.0 + 1e-12))
+        found = np.empty((len(point), 4))
+        flat = triangle[facet]
+        found[flat] = _on_triangles(own[point[flat]], corners[facet[flat], :3])
+        found[~flat] = _on_quads(own[point[~flat]], corners[facet[~flat]])
+        away = np.linalg.norm(own[point] - np.einsum("pn,pnj->pj", found, corners[facet]), axis=1)
+        # the closest of each point, the first of those that are equally close
+        order = np.lexsort((np.round(away / radius.max(), 12), point))
+        chosen = order[np.unique(point[order], return_index=True)[1]]
+        rows = first + point[chosen]
+        facet_of[rows], within[rows], distance[rows] = facet[chosen], found[chosen], away[chosen]
+    nodes = surface.faces[facet_of]
+    places = np.einsum("pn,pna->pa", within, surface.places[facet_of])
+    weights = _face_weights(points, nodes, places, coordinates)
+    point, corner = np.nonzero(weights)
+    entries = (weights[point, corner], (point, nodes[point, corner]))
+    return sparse.csr_matrix(entries, shape=(len(points), len(coordinates))), distance
+
+
+def _face_weights(points: FloatArray, nodes: IntArray, places: FloatArray, coordinates: FloatArray) -> FloatArray:
+    """Shape functions (n, 8) of element faces (n, 8) at the points closest to some points, near places (n, 2)."""
+    weights = np.zeros(nodes.shape)
+    counts = (nodes >= 0).sum(axis=1)
+    for count in np.unique(counts):
+        own = np.flatnonzero(counts == count)
+        shape, place = FACE_SHAPES[count], places[own]
+        corners = coordinates[nodes[own, :count]]
+        # On straight faces of even sides the facets have found the place; elsewhere they are close to it.
+        for _ in range(_FACE_STEPS if count > 4 else 0):
+            tangents = np.einsum("pna,pnj->paj", shape.derivatives(place), corners)
+            rest = points[own] - np.einsum("pn,pnj->pj", shape.values(place), corners)
+            metric = np.matmul(tangents, np.swapaxes(tangents, 1, 2))
+            change = np.linalg.solve(metric, np.einsum("paj,pj->pa", tangents, rest)[..., None])[..., 0]
+            place = _inside(place + np.clip(change, -0.25, 0.25), triangle=bool(count == 6))
+        weights[own, :count] = shape.values(place)
+    weights[np.abs(weights) < 1e-10] = 0.0
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def _inside(places: FloatArray, *, triangle: bool) -> FloatArray:
+    """Places (n, 2) moved back onto the face where they are outside."""
+    if not triangle:
+        return np.clip(places, -1.0, 1.0)
+    beyond = np.maximum(places.sum(axis=1, keepdims=True) - 1.0, 0.0)
+    places = np.clip(places - 0.5 * beyond, 0.0, 1.0)
+    return np.asarray(places / np.maximum(places.sum(axis=1, keepdims=True), 1.0))
+
+
+def _on_triangles(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Weights (n, 4) of the closest points of triangles (n, 3, 3), one for each point (n, 3)."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    offset = points - corners[:, 0]
+    a, b, c = (np.einsum("ij,ij->i", u, v) for u, v in ((first, first), (first, second), (second, second)))
+    d, e = (np.einsum("ij,ij->i", u, offset) for u in (first, second))
+    determinant = np.maximum(a * c - b * b, 1e-30 * (a * c))
+    eta = (a * e - b * d) / determinant
+    xi = (c * d - b * e) / determinant
+    weights = np.stack([1.0 - xi - eta, xi, eta], axis=1)
+    best = np.where((weights >= 0.0).all(axis=1), 0.0, np.inf)
+    for start, end in ((0, 1), (1, 2), (2, 0)):
+        along = corners[:, end] - corners[:, start]
+        share = np.einsum("ij,ij->i", points - corners[:, start], along) / np.einsum("ij,ij->i", along, along)
+        share = np.clip(share, 0.0, 1.0)
+        away = np.linalg.norm(points - corners[:, start] - share[:, None] * along, axis=1)
+        closer = away < best
+        best[closer] = away[closer]
+        weights[closer] = 0.0
+        weights[closer, start], weights[closer, end] = 1.0 - share[closer], share[closer]
+    return np.hstack([weights, np.zeros((len(points), 1))])
+
+
+def _on_quads(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Weights (n, 4) of the closest points of bilinear facets (n, 4, 3), one for each point (n, 3)."""
+    place = np.zeros((len(points), 2))
+    for _ in range(_NEWTON_STEPS):  # Gauss-Newton
+        tangents = np.einsum("pna,pnj->paj", quad_derivatives(place), corners)
+        rest = points - np.einsum("pn,pnj->pj", quad_values(place), corners)
+        metric = np.matmul(tangents, np.swapaxes(tangents, 1, 2))
+        metric += 1e-14 * np.trace(metric, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+        change = np.linalg.solve(metric, np.einsum("paj,pj->pa", tangents, rest)[..., None])[..., 0]
+        place = np.clip(place + np.clip(change, -2.0, 2.0), -3.0, 3.0)
+    outside = (np.abs(place) > 1.0).any(axis=1)
+    place = np.clip(place, -1.0, 1.0)
+    edge, rim, chosen = corners[outside], place[outside], points[outside]
+    for turn in range(_DESCENT_STEPS if outside.any() else 0):  # along one direction after the other, to the edge
+        axis = turn % 2
+        tangent = np.einsum("pn,pnj->pj", quad_derivatives(rim)[..., axis], edge)
+        rest = chosen - np.einsum("pn,pnj->pj", quad_values(rim), edge)
+        change = np.einsum("pj,pj->p", tangent, rest) / np.einsum("pj,pj->p", tangent, tangent)
+        rim[:, axis] = np.clip(rim[:, axis] + change, -1.0, 1.0)
+    place[outside] = rim
+    return quad_values(place)

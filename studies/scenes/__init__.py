@@ -52,7 +52,7 @@ def build_scene(model: str, parameters: BaseModel, n_harmonics: int) -> ReducedM
 
     scene = as_scene(parameters)
     key = f"{model} {n_harmonics} {scene.model_dump_json(exclude={'contact_stiffness'})}"
-    return build_compliant(key, scene.contact_stiffness, lambda: scene.build(n_harmonics))
+    return build_compliant(model, key, scene.contact_stiffness, lambda: scene.build(n_harmonics))
 
 
 def scene_help(model: str) -> str:

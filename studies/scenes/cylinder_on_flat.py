@@ -27,30 +27,6 @@ _WIDEST = 0.45
 """Of the depth that displacements refer to: half of the width of all strips has to be below a half of it."""
 
 
-def line_half_width(load: float, radius: float, modulus: float) -> float:
-    """Half-width a, m, of a line contact: `a^2 = 4 P R / (pi E*)`. load: N/m. radius: m. modulus: E*, Pa."""
-    return float(np.sqrt(4.0 * load * radius / (np.pi * modulus)))
-
-
-def line_stick_width(half_width: float, share: float) -> float:
-    """Half-width c, m, of the stick zone under a share Q / (mu P) of the force that slides: `c = a sqrt(1 - share)`."""
-    return float(half_width * np.sqrt(1.0 - share))
-
-
-def line_stick_under_stroke(
-    stroke: float, friction_coefficient: float, load: float, half_width: float, modulus: float, depth: float
-) -> float:
-    """Half-width c, m, of the stick zone of a line contact whose body moves by +- stroke, m; 0 where all of it slides.
-
-    `stroke = mu (d(P, a) - d(P_c, c))` with `P_c = P (c/a)^2` and the approach
-    `d(P, a) = 2 P / (pi E*) (ln(2 depth / a) + 1/2)`, depth, m, being what displacements refer to. load: N/m.
-    """
-    c = half_width * np.linspace(0.0, 1.0, 2001)[1:]
-    approach = 2.0 * load / (np.pi * modulus) * (c / half_width) ** 2 * (np.log(2.0 * depth / c) + 0.5)
-    motion = friction_coefficient * (approach[-1] - approach)
-    return float(np.interp(-stroke, -motion, c, left=0.0))
-
-
 def line_worn_depth(x: FloatArray, radius: float, half_width: float, stick_width: float) -> FloatArray:
     """Depth W, m, of both bodies at distances x, m, from the middle where partial slip has worn all that it can.
 
@@ -109,8 +85,8 @@ class Parameters(PressedBody):
 
     @property
     def contact(self) -> float:
-        """Half-width a of the unworn contact, m."""
-        return line_half_width(self.P, self.R, self.modulus)
+        """`a^2 = 4 P R / (pi E*)`."""
+        return float(np.sqrt(4.0 * self.P * self.R / (np.pi * self.modulus)))
 
     @property
     def patched(self) -> float:
@@ -119,7 +95,7 @@ class Parameters(PressedBody):
             return self.half_width
         if self.share >= 1.0:
             return 1.5 * self.contact
-        stick = line_stick_width(self.contact, self.share)
+        stick = self.contact * float(np.sqrt(1.0 - self.share))
         worn = worn_edge(line_worn_depth, self.contact, stick)
         # not so many that the scar reaches the last strip, as it would where there are few
         most = int(0.5 * (self.strips - 1) * stick / (1.02 * worn) + _WIDER)
@@ -127,16 +103,22 @@ class Parameters(PressedBody):
         return 0.5 * self.strips * stick / (within - _WIDER)
 
     def stick_under(self, stroke: float) -> float:
-        """Half-width of the stick zone under a stroke, m; 0 where all slides."""
-        mu, depth = self.friction_coefficient, self._reference_depth
-        return line_stick_under_stroke(stroke, mu, self.P, self.contact, self.modulus, depth)
+        """`stroke = mu (d(P, a) - d(P_c, c))` with `P_c = P (c/a)^2`.
+
+        The approach is `d(P, a) = 2 P / (pi E*) (ln(2 depth / a) + 1/2)`.
+        """
+        c = self.contact * np.linspace(0.0, 1.0, 2001)[1:]
+        logarithm = np.log(2.0 * self._reference_depth / c) + 0.5
+        approach = 2.0 * self.P / (np.pi * self.modulus) * (c / self.contact) ** 2 * logarithm
+        motion = self.friction_coefficient * (approach[-1] - approach)
+        return float(np.interp(-stroke, -motion, c, left=0.0))
 
     def room(self, worn: float) -> float:
         """The middle of the last strip is half a strip before its end."""
         return min(worn * self.strips / (self.strips - 1), _WIDEST * self._reference_depth)
 
-    def reduced_model(self) -> ReducedModel:
-        """Pairs of patches, and the motion of the body."""
+    def build(self, _: int) -> ReducedModel:
+        """Pairs of strips, and the motion of the body."""
         edges = np.linspace(0.0, self.patched, self.strips // 2 + 1)
         middle = 0.5 * (edges[1:] + edges[:-1])
         compliance = strip_compliance(edges, self.modulus, self.length, self._reference_depth)

@@ -126,15 +126,13 @@ class Parameters(SectorParameters):
         yield self.fillet_height >= self.blade_length, "fillet_height", "make it smaller than blade_length"
 
     def define_sector(self) -> tuple[FeModel, JointDefinition]:
-        """The sector as a finite-element model, and what is done with it.
+        """As `SectorParameters.define_sector`.
 
-        The retainer is a spring on the mean axial relative displacement. A prismatic slot holds the root along its axis
-        by friction alone. Once every pair slips at some time of the period, vibration carries the root along. Under a
+        The retainer is a spring on the mean axial relative displacement: the slot holds the root along its axis by
+        friction alone. Once every pair slips at some time of the period, vibration carries the root along. Under a
         travelling wave it walks, and without a retainer there is no periodic state (measured: at the resonance of nodal
         diameter 3 and 0.5 N of excitation a force of about 100 N holds it). At nodal diameter 0 nothing but unequal
-        wear drives it one way, by 1e-7 of the friction: its mean position is not determined (`solver.wear.jump`).
-
-        Raises SceneError where the parameters do not go together.
+        wear drives it, by 1e-7 of the friction: its mean position is not determined (`solver.wear.jump`).
         """
         self.check()
         m, material = self.mesh, self.material
@@ -246,12 +244,8 @@ def _blade_blocks(p: Parameters) -> list[FloatArray]:
 
 def _flat_grid(p: Parameters, x: FloatArray, y: FloatArray) -> FloatArray:
     """Prismatic grid of points (n_rows, n_columns, n_axial, 3) from x (n_rows,) and y (n_rows, n_columns)."""
-    stations = _axial_stations(p)
-    grid = np.empty((*y.shape, len(stations), 3))
-    grid[..., 0] = x[:, None, None]
-    grid[..., 1] = y[..., None]
-    grid[..., 2] = p.rim_width * stations
-    return grid
+    parts = x[:, None, None], y[..., None], p.rim_width * _axial_stations(p)
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 def _chord_directions(stagger_degrees: float) -> tuple[FloatArray, FloatArray]:
@@ -261,7 +255,7 @@ def _chord_directions(stagger_degrees: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _airfoil_section(p: Parameters, height: float, across: FloatArray) -> FloatArray:
-    """Points (n_thickness, n_axial, 3) of the section at a height above the platform, fillet included.
+    """Points (n_thickness, n_axial, 3) of the section at a height above the platform.
 
     Chord, thicknesses and stagger vary linearly from foot to tip. Over the fillet the section blends quadratically from
     the rectangle of the neck to the airfoil.

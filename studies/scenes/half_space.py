@@ -38,9 +38,9 @@ def composite_modulus(young: float, poisson: float) -> float:
 def strip_compliance(edges: FloatArray, modulus: float, length: float, depth: float) -> FloatArray:
     """Displacements at the middles of strips under unit forces spread over them, (n, n), m/N, in plane strain.
 
-    A strip stands for itself and its image in the plane x = 0, which carries half of the force. Normal displacements
-    under normal forces and tangential ones under tangential forces are the same. They refer to a depth, m, more than
-    the width of all strips: that of a line force is `2 / (pi E*) ln(depth / distance)` times the force per length.
+    Normal ones under normal forces, tangential ones under tangential forces. A strip stands for itself and its image in
+    the plane x = 0, which carries half of the force. Displacements refer to a depth, m, more than the width of all
+    strips: that of a line force is `2 / (pi E*) ln(depth / distance)` times the force per length.
     edges (n + 1,): m, ascending from 0 or above. modulus: E*, Pa. length: of the strips, m.
     """
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -59,11 +59,8 @@ def patch_compliance(position: FloatArray, width: float, young: float, poisson: 
     """Normal and tangential displacements at the middles of square patches under unit forces spread over them, m/N.
 
     A patch stands for itself and its images in the planes x = 0 and y = 0, which carry a quarter of the force each.
-    Normal tractions cause normal displacements (Love 1929); tractions along x displacements along x, for which those
-    along y are left out, as in the theory of Cattaneo and Mindlin.
-
-    position (n, 2): m, middles in the quadrant x, y > 0. width: of a patch, m. young, poisson: E, Pa, and nu of both
-    bodies.
+    Normal displacements by Love (1929); tractions along x move along x alone, as Cattaneo and Mindlin have it.
+    position (n, 2): m, middles in the quadrant x, y > 0. width: of a patch, m. young, poisson: E, Pa, and nu.
     """
     over_r, over_r3 = np.zeros((2, len(position), len(position)))
     for signs in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
@@ -85,9 +82,14 @@ def worn_edge(worn_depth: Callable[..., FloatArray], contact: float, stick: floa
     """Half-width b, m, over which the bodies touch where all has worn that can: the last depth above 0.
 
     worn_depth: of distances from the middle, radius, half-widths of the unworn contact and of the stick zone, m.
+    Raises SceneError where the bodies are so far from possible ones that numbers overflow.
     """
-    x = np.linspace(contact, _FARTHEST * contact, 10001)
-    return float(x[worn_depth(x, 1.0, contact, stick) > 0.0][-1])
+    with np.errstate(all="ignore"):
+        x = np.linspace(contact, _FARTHEST * contact, 10001)
+        touching = x[worn_depth(x, 1.0, contact, stick) > 0.0]
+    if not touching.size:
+        raise SceneError("model", "the width of the contact is no number", "give parameters of possible bodies")
+    return float(touching[-1])
 
 
 class PressedBody(Scene):
@@ -157,10 +159,7 @@ class PressedBody(Scene):
         """Half-width that pairs have to cover, m, where the worn one is given, as far as the model allows."""
 
     def scar(self, volume: float, depth: float) -> float:
-        """Half-width of what is worn, m, with a margin.
-
-        Where both volume, m3 (m2 of a cylinder), and depth, m, are at most these; inf where neither has an end.
-        """
+        """Half-width of what is worn, m, with a margin, to a volume, m3 (m2 of a cylinder), and a depth, m, at most."""
         n, form = self.SCAR
         by_volume = math.pow(self.contact**n + form * self.R * volume, 1.0 / n)
         return _MARGIN * min(by_volume, math.sqrt(self.contact**2 + 2.0 * self.R * depth))
@@ -168,7 +167,7 @@ class PressedBody(Scene):
     def with_room_for_wear(self, expected: ExpectedWear) -> Self:
         """With the half-width that a stroke needs: where it slides by what is worn, below that by what can be.
 
-        As it is where the half-width is given, wear has no end, or no more is needed than is taken without it.
+        As it is where a half-width is given, wear has no end, or no more is needed.
         """
         if self.half_width is not None or self.stroke is None:
             return self
@@ -193,14 +192,13 @@ def press_body(
 ) -> ReducedModel:
     """Reduced model; displacements are u_N of all pairs, u_T of all pairs, d, and where a force moves the body, s.
 
-    With the contact forces lambda (N, compression positive), the approach d of the body and its tangential motion s the
-    relative displacements are `u_N = d - C_N lambda_N`, `u_T = s - C_T lambda_T`: the stiffnesses are the inverse
-    compliances, between the pairs and the one displacement that moves them all. There is no mass. Under a stroke s is
-    no unknown, and `C_T^-1 s` a load on u_T.
+    With the contact forces lambda (N, compression positive), the approach d of the body and its tangential motion s,
+    `u_N = d - C_N lambda_N` and `u_T = s - C_T lambda_T`: the stiffnesses are the inverse compliances, between the
+    pairs and the one displacement that moves them all. Under a stroke s is no unknown, and `C_T^-1 s` a load on u_T.
+    The response is s, under a stroke "slip", u_T of the pair nearest to the middle.
 
     compliance: normal and tangential one, (n_contact, n_contact), m/N. position (n_contact, 3): m, from the middle.
     area (n_contact,): m2. edge (n_contact,): pairs beside which the half-spaces go on without pairs. name: of the body.
-    The response under a force is s, under a stroke u_T of the pair nearest to the middle, "slip".
     """
     n = len(area)
     normal, tangential = (np.asarray(np.linalg.inv(each), np.float64) for each in compliance)

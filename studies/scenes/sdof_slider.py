@@ -115,11 +115,10 @@ def wear_of_slider(
 ) -> tuple[FloatArray, FloatArray]:
     """Depth worn since the start, m, and normal force, N, of the only pair, each (n,).
 
-    At each sliding s (n,), 1/Pa, wear coefficient times cycle count, ascending from 0 or above. The depth W follows
+    sliding: s (n,), 1/Pa, wear coefficient times cycle count, ascending from 0 or above. The depth W follows
     `dW/ds = X(S, N / area, W) / area` with the normal force `N = load - k_N W`, the slip work of a cycle
-    `S = 4 N X_0(mu N)`, X_0 the amplitude of the motion, and the wearing work X of the law
-    (`solver.contact.wear_law`). With a spring the unknown is z = ln(N / load), `dz/ds = -(k_N / area) X / N`, which
-    stays calm however much is worn.
+    `S = 4 N X_0(mu N)`, X_0 the amplitude of the motion, and the wearing work X of the law (`solver.contact.wear_law`).
+    With a spring the unknown is z = ln(N / load), `dz/ds = -(k_N / area) X / N`, which stays calm.
 
     mu: friction coefficient. load: at the start, N. normal_stiffness: k_N, N/m; 0 for a constant force. area: m2.
     """
@@ -172,7 +171,7 @@ class Parameters(Scene):
     )
     area: float = Field(1e-4, gt=0, description="contact area, m2")
 
-    def reduced_model(self) -> ReducedModel:
+    def build(self, _: int) -> ReducedModel:
         """The response is the displacement of the mass, on which the load acts.
 
         With a spring the closing displacement of the pair comes before that of the mass: a massless degree of freedom,
@@ -210,9 +209,8 @@ class Parameters(Scene):
         """Wear and vibration by Den Hartog's closed form and the differential equation of the wear depth.
 
         The volume worn since the count 0 (n_wear, n_cycles), m3, and the amplitude of the first harmonic of the
-        response (n_wear, n_cycles, 1), m. NaN where the mass stops on its way, the frequency is one of the singular
-        ones of the form, the mount is damped, the contact compliant, or `changed`, keys of a study that differ from
-        their defaults, has one that the form does not know.
+        response (n_wear, n_cycles, 1), m. NaN where the form does not hold: the mass stops on its way, the frequency is
+        singular, the mount damped, the contact compliant, or it does not know one of the `changed` keys of a study.
 
         frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts.
         worn_depth: m, at the count 0.
@@ -224,7 +222,7 @@ class Parameters(Scene):
         known = self.damping == 0.0 and self.contact_stiffness is None and changed <= _KNOWN
         if not (known and slider.holds(mu * max(load, 0.0))):
             return np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan)
-        begun, contact = law.begun_at(np.array([worn_depth])), self.reduced_model().contact
+        begun, contact = law.begun_at(np.array([worn_depth])), self.build(1).contact
         different, places = np.unique(sliding, return_inverse=True)
         work = wearing_work(begun, contact, np.array([mu]))
         depth, force = wear_of_slider(slider, mu, load, self.normal_stiffness, self.area, work, different)

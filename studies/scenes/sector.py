@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces
-from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
+from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh
@@ -115,7 +115,7 @@ class SectorParameters(Scene):
         if self.contact_stiffness is not None:
             return super().natural_frequencies(model)
         prepared = prepare_model(*self.define_sector())
-        return {k: lowest(glued_frequencies(prepared, k, N_MODES)) for k in range(self.n_sectors // 2 + 1)}
+        return {k: lowest(prepared.frequencies(k, N_MODES)) for k in range(self.n_sectors // 2 + 1)}
 
 
 def mesh_of_bodies(

@@ -46,10 +46,7 @@ class Parameters(SectorParameters):
     shroud_thickness: float = Field(0.006, gt=0, description="radial thickness of the shroud, m")
 
     def define_sector(self) -> tuple[FeModel, JointDefinition]:
-        """The sector as a finite-element model, and what is done with it.
-
-        Raises SceneError where the parameters do not go together.
-        """
+        """As `SectorParameters.define_sector`."""
         self.check()
         m, angle = self.mesh, radians(self.shroud_angle)
         solid, (disk, _, shroud) = mesh_of_bodies([(self._blocks(), ("disk", "blade", "shroud"), self.material)])

@@ -25,28 +25,6 @@ _WIDEST = 0.5
 """Of the radius of the sphere: beyond it is no paraboloid."""
 
 
-def point_radius(load: float, radius: float, modulus: float) -> float:
-    """Radius a, m, of a point contact: `a^3 = 3 P R / (4 E*)`. load: N. radius: m. modulus: E*, Pa."""
-    return float(np.cbrt(0.75 * load * radius / modulus))
-
-
-def point_stick_radius(contact_radius: float, share: float) -> float:
-    """Radius c, m, of the stick zone under a share Q / (mu P) of the force that slides: `c = a cbrt(1 - share)`."""
-    return float(contact_radius * np.cbrt(1.0 - share))
-
-
-def point_stick_under_stroke(
-    stroke: float, friction_coefficient: float, load: float, radius: float, young: float, poisson: float
-) -> float:
-    """Radius c, m, of the stick zone of a body that moves by +- stroke, m; 0 where all of it slides.
-
-    `stroke = 3 mu P (2 - nu) / (8 a G) (1 - (c/a)^2)`. load: N. radius: a, m. young: Pa.
-    """
-    shear = young / (2.0 * (1.0 + poisson))
-    slides = 3.0 * friction_coefficient * load * (2.0 - poisson) / (8.0 * radius * shear)
-    return float(radius * np.sqrt(max(1.0 - stroke / slides, 0.0))) if slides > 0.0 else 0.0
-
-
 def point_worn_depth(r: FloatArray, radius: float, contact_radius: float, stick_radius: float) -> FloatArray:
     """Depth W, m, of both bodies at distances r, m, from the axis where partial slip has worn all that it can.
 
@@ -85,8 +63,8 @@ class Parameters(PressedBody):
 
     @property
     def contact(self) -> float:
-        """Radius a of the unworn contact, m."""
-        return point_radius(self.P, self.R, self.modulus)
+        """Radius, `a^3 = 3 P R / (4 E*)`."""
+        return float(np.cbrt(0.75 * self.P * self.R / self.modulus))
 
     @property
     def patched(self) -> float:
@@ -95,7 +73,7 @@ class Parameters(PressedBody):
             return self.half_width
         if self.share >= 1.0:
             return 1.4 * self.contact
-        stick = point_stick_radius(self.contact, self.share)
+        stick = self.contact * float(np.cbrt(1.0 - self.share))
         worn = worn_edge(point_worn_depth, self.contact, stick)
         # in widths of a patch: distances of the middles, and how many lie nearer than the next one
         along = np.arange(2 * self.patches) + 0.5
@@ -112,14 +90,16 @@ class Parameters(PressedBody):
         return float(stick / within[chosen] * self.patches)
 
     def stick_under(self, stroke: float) -> float:
-        """Radius of the stick zone under a stroke, m; 0 where all slides."""
-        return point_stick_under_stroke(stroke, self.friction_coefficient, self.P, self.contact, self.E, self.nu)
+        """`stroke = 3 mu P (2 - nu) / (8 a G) (1 - (c/a)^2)`."""
+        shear = self.E / (2.0 * (1.0 + self.nu))
+        slides = 3.0 * self.friction_coefficient * self.P * (2.0 - self.nu) / (8.0 * self.contact * shear)
+        return self.contact * float(np.sqrt(max(1.0 - stroke / slides, 0.0))) if slides > 0.0 else 0.0
 
     def room(self, worn: float) -> float:
         """Middles of the patches at the edge are half a patch from it, or less."""
         return min(worn * self.patches / (self.patches - 0.5), _WIDEST * self.R)
 
-    def reduced_model(self) -> ReducedModel:
+    def build(self, _: int) -> ReducedModel:
         """Pairs of patches, and the motion of the body."""
         width = self.patched / self.patches
         along = (np.arange(self.patches) + 0.5) * width

@@ -26,7 +26,7 @@ class Parameters(Scene):
     normal_load: float = Field(14.4, gt=0, description="constant normal force on mass 2, N")
     area: float = Field(1e-4, gt=0, description="contact area, m2")
 
-    def reduced_model(self) -> ReducedModel:
+    def build(self, _: int) -> ReducedModel:
         """In the displacements of mass 1 and mass 2, both of which are responses."""
         return build_model(
             np.diag([self.mass_1, self.mass_2]),

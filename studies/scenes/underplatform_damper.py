@@ -58,10 +58,7 @@ class Parameters(SectorParameters):
         return (self.damper_half_width - 0.5 * self.platform_gap) * tan(radians(self.roof_angle))
 
     def define_sector(self) -> tuple[FeModel, JointDefinition]:
-        """The sector as a finite-element model, and what is done with it.
-
-        Raises SceneError where the parameters do not go together.
-        """
+        """As `SectorParameters.define_sector`."""
         self.check()
         m, angle = self.mesh, radians(self.tip_angle)
         blade_body = (self._blade_body(), ("disk", "shank", "platform", "blade"), self.material)

@@ -33,7 +33,7 @@ class Parameters(Scene):
     )
     area: float = Field(1e-4, gt=0, description="contact area, m2")
 
-    def reduced_model(self) -> ReducedModel:
+    def build(self, _: int) -> ReducedModel:
         """In (closing displacement, displacement of the mass), the response."""
         wall = self.wall_stiffness
         return build_model(

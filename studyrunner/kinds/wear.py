@@ -31,7 +31,7 @@ from studyrunner.system.machine import MachineFaultError, is_machine_fault
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.results.history import StartState
-    from solver.wear.problem import WearRequest
+    from solver.wear.wearing_joint import WearRequest
 
 COST_AT_REST = 0.01
 """Estimated time of a history in which nothing wears, over the time of a history with steps."""
@@ -243,7 +243,7 @@ class History(_FromRest):
                 yield replace(build_result(self, each, history, self.results[place][1]), place=place)
 
     def _asked(self, integrated: Integrated) -> WearRequest:
-        from solver.wear.problem import WearRequest, steps_of
+        from solver.wear.wearing_joint import WearRequest, steps_of
 
         counts: NDArray[np.float64] | ToTheEnd
         if self.to_the_end is not None and not integrated.unworn:

@@ -71,7 +71,7 @@ def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[
     counted = np.array(study.output_counts, dtype=int if study.mission else float)
     along.setdefault(study.kind.counted or "cycle", counted)
     along |= {"block": [block.name for block in study.mission]} if study.mission else {}
-    along |= {"contact": range(len(facts.area)), "response": facts.response_names}
+    along |= {"contact": range(facts.contact.n_contact), "response": facts.response_names}
     if study.outputs.loops:
         along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
     for name, values in along.items():
@@ -138,7 +138,7 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneS
         yield _sample_coordinate(study, name, names, values)
     if scatters_pairs(study):
         of_parts = [of_part for _, _, of_part in drawn_pairs(study, scenes, facts)]
-        n_contact = max(len(each.area) for each in facts)
+        n_contact = max(each.contact.n_contact for each in facts)
         for name in of_parts[0]:
             values = np.full((len(of_parts), n_contact), np.nan)
             for row, of_part in zip(values, of_parts, strict=True):

@@ -62,7 +62,7 @@ def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
 
 def _summarise(study: Study, facts: SceneFacts) -> str:
     """Abstract in the sense of ACDD: quantities, scene and ranges of the study."""
-    pairs = "one contact pair" if len(facts.area) == 1 else f"{len(facts.area)} contact pairs"
+    pairs = "one contact pair" if facts.contact.n_contact == 1 else f"{facts.contact.n_contact} contact pairs"
     ranges = [
         f"{name} {min(values):.6g} to {max(values):.6g} ({len(values)} values)"
         if all(isinstance(value, float | int) for value in values)

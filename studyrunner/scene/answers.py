@@ -1,18 +1,16 @@
-"""What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, a check by eye, and
-the scene that a result keeps.
-"""
+"""What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, scene files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.scene import as_scene, stuck_frequencies
+from studies.scene import Progress, as_scene, stuck_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
 from studyrunner.scene.scene_set import SceneSet, along_axes, find_scenes
@@ -40,8 +38,8 @@ class SmallArray:
     over_axes: bool = False
 
 
-def build_scene_variables(study: Study, model: ReducedModel, progress: Callable[[str], None]) -> tuple[SmallArray, ...]:
-    """What the study asks of its scene, but exact answers. Raises UserError where the scene cannot give them."""
+def build_scene_variables(study: Study, model: ReducedModel, progress: Progress) -> tuple[SmallArray, ...]:
+    """What the study asks of its scene, but exact answers. Raises UserError."""
     found: list[SmallArray] = []
     with scene_errors(study.source, None):
         if "mesh" in study.scene_variables:
@@ -100,7 +98,7 @@ def scene_to_store(study: Study, model: ReducedModel) -> StoredScene | None:
         return StoredScene(scene_attributes(model), datasets, describe_origin(study))
 
 
-def write_study_scene(study: Study, path: Path, progress: Callable[[str], None]) -> None:
+def write_study_scene(study: Study, path: Path, progress: Progress) -> None:
     """Writes the scene of a study as a scene file, as a whole or not at all.
 
     Raises UserError where the scene is wrong, or there are several.
@@ -124,10 +122,9 @@ def write_study_scene(study: Study, path: Path, progress: Callable[[str], None])
 def join_scene_variables(
     study: Study, scenes: SceneSet, of_scenes: Sequence[Sequence[SmallArray]]
 ) -> tuple[tuple[SmallArray, ...], tuple[str, ...]]:
-    """Variables of all scenes, and notes on those that are left out.
+    """Variables of all scenes, first along the axes along which they differ, and notes on those that are left out.
 
-    A variable that differs between the scenes gets the axes along which it differs as first dimensions. Variables of
-    different sizes, e.g. meshes of different density, are left out.
+    Left out are those of different sizes, e.g. meshes of different density.
     """
     joined, left_out = [], []
     for variables in zip(*of_scenes, strict=True):
@@ -148,7 +145,13 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     """
     if "exact" not in study.outputs.variables:
         return ()
-    answers = [_answers(part.study) for part in parts_of(study)]
+    answers: list[Any] = []
+    for part in parts_of(study):
+        axes, scene = part.study.axes, part.study.scene
+        (depth,) = (0.0,) if scene.worn is None else scene.worn.depths(1)
+        rest = np.array(axes.wear_coefficient), np.array(part.study.output_counts), part.study.wear.as_law, depth
+        exact, changed = cast(Any, scene.parameters).exact_answer, _changed(part.study)
+        answers.append([[exact(f, a, *rest, changed) for a in axes.excitation_amplitude] for f in axes.frequency])
     others = (*(1,) * (len(study.own_axes) - 3), *(len(values) for values in study.axes_of_parts.values()))
     variables = []
     for place, (name, entry) in enumerate(SCENE["exact"].items()):
@@ -160,35 +163,23 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     return tuple(variables)
 
 
-_WITHOUT_INFLUENCE = ("step", "scheme", "sweep")
-"""Keys of [axes] that say how a point is computed, and not which point."""
+_NOT_ASKED = (("scene", ("model", "parameters")), ("axes", ("step", "scheme", "sweep")), ("wear", ()))
+"""Tables, and keys in them that the scene knows, or that say how a point is computed, and not which point."""
 
 
 def _changed(study: Study) -> frozenset[str]:
     """Keys of a part of a study that differ from their defaults and may change the exact answer, as "wear.law".
 
-    Without the parameters of the scene, which knows them. [slow_time], [solver] and [outputs] say how a point is
-    computed and shown. What depends on another key has a closed form that knows the key, or none.
+    What depends on such a key has a closed form that knows the key, or none.
     """
     changed = {name for name in ("scatter", "loading", "mission") if getattr(study, name)}
-    for name, without in (("scene", ("model", "parameters")), ("axes", _WITHOUT_INFLUENCE), ("wear", ())):
+    for name, without in _NOT_ASKED:
         table = getattr(study, name)
         for key, entry in type(table).model_fields.items():
             default = entry.get_default(call_default_factory=True)
             if not entry.exclude and key not in without and (entry.is_required() or getattr(table, key) != default):
                 changed.add(f"{name}.{key}")
     return frozenset(changed)
-
-
-def _answers(study: Study) -> list[list[Any]]:
-    """Exact answers of a part of a study, for all wear coefficients, by frequency and excitation amplitude."""
-    axes, changed = study.axes, _changed(study)
-    (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
-    counts, given = np.array(study.output_counts), np.array(axes.wear_coefficient)
-
-    scene: Any = study.scene.parameters
-    rest = given, counts, study.wear.as_law, depth, changed
-    return [[scene.exact_answer(one, other, *rest) for other in axes.excitation_amplitude] for one in axes.frequency]
 
 
 def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
@@ -200,8 +191,8 @@ def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
     return read_mesh_file(study.scene.files.mesh).remarks
 
 
-def check_study_model(study: Study, picture: Path, progress: Callable[[str], None]) -> str:
-    """Lines on the finite-element model of a study, for `--check`; the picture shows the contact pairs.
+def check_study_model(study: Study, picture: Path, progress: Progress) -> str:
+    """Lines on the finite-element model of a study, for `--check`. picture: of the contact pairs, is written.
 
     Raises UserError where the study has no such model, the model is wrong, or the picture cannot be written.
     """
@@ -210,9 +201,8 @@ def check_study_model(study: Study, picture: Path, progress: Callable[[str], Non
         remedy = f"give a study file of a finite-element model, which {study.scene.model} here is not"
         raise UserError("command line", "--check", study.source, remedy)
     # what reads and reduces it is loaded where there is one
-    from studies.fe_models.from_files.check import describe_model
+    from studies.fe_models.from_files.check import describe_model, draw_pairs
     from studies.fe_models.from_files.model import checked, describe_origin, load_model, reduce_model
-    from studies.fe_models.from_files.picture import draw_pairs
 
     parameters = checked(study.scene.parameters)
     with scene_errors(study.source, None), np.errstate(all="ignore"):

@@ -35,27 +35,23 @@ def edge_pairs(contact: ContactInterface) -> NDArray[np.bool_]:
     """
     if contact.edge is not None:
         return np.array(contact.edge)
-    found = np.zeros(contact.n_contact, np.bool_)
-    labels = np.array(contact.surface)
+    found, labels = np.zeros(contact.n_contact, np.bool_), np.array(contact.surface)
     for surface in np.unique(labels):
         own = np.flatnonzero(labels == surface)
         edge = _edge(np.asarray(contact.position)[own])
-        if not edge.all():
-            found[own] = edge
+        found[own] = False if edge is None or edge.all() else edge
     return found
 
 
-def _edge(position: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Of one surface, positions (n, 3), m; all of them where it cannot be told."""
-    unknown = np.ones(len(position), np.bool_)
-    if not np.isfinite(position).all():
-        return unknown
+def _edge(position: NDArray[np.float64]) -> NDArray[np.bool_] | None:
+    """Of one surface, positions (n, 3), m; None where it cannot be found."""
+    if len(position) < 3 or not np.isfinite(position).all():
+        return None
     centred = position - position.mean(axis=0)
-    _, _, axes = np.linalg.svd(centred, full_matrices=False) if len(position) > 2 else (None, None, np.eye(3))
-    along = centred @ axes.T
+    along = centred @ np.linalg.svd(centred, full_matrices=False)[2].T
     extent = np.ptp(along, axis=0)
     if extent[0] == 0.0 or extent[2] > max(_FLAT * extent[1], _SAME_PLACE * extent[0]):
-        return unknown
+        return None
     if extent[1] <= _SAME_PLACE * extent[0]:
         ends = np.abs(along[:, 0, None] - [along[:, 0].min(), along[:, 0].max()])
         return np.asarray((ends <= _SAME_PLACE * extent[0]).any(axis=1))
@@ -65,7 +61,7 @@ def _edge(position: NDArray[np.float64]) -> NDArray[np.bool_]:
     try:
         mesh = Delaunay(plane)
     except QhullError:
-        return unknown
+        return None
     first, neighbours = mesh.vertex_neighbor_vertices
     found = np.array([_is_edge(plane[neighbours[first[i] : first[i + 1]]] - plane[i]) for i in range(len(plane))])
     # of several pairs at one place a single one is a corner of the triangulation

@@ -6,13 +6,14 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.scene import Progress
 from studyrunner.scatter import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, harmonics_to_build
 from studyrunner.study.mistakes import keys_as_given
@@ -43,29 +44,25 @@ class SceneSet:
 
 
 def find_scenes(study: Study) -> SceneSet:
-    """The scenes of a study. Parts that differ only in friction share a scene, where its loads do not depend on it.
+    """The scenes of a study; parts that differ only in what no model depends on share one.
 
-    Raises UserError where a result file is to keep the scene, and there are several.
+    Raises UserError where a result file is to hold the scene, and there are several.
     """
     parts, studies, keys = parts_of(study), dict[str, Study](), list[list[str]]()
     for part in parts:
-        own = part.study.block_studies or (part.study,)
-        keys.append([_key(each) for each in own])
-        for key, each in zip(keys[-1], own, strict=True):
-            studies.setdefault(key, each)
+        keys.append([])
+        for each in part.study.block_studies or (part.study,):
+            scene, harmonics = each.scene, harmonics_to_build(each)
+            files = None if scene.files is None else [str(path) for path in scene.files.all]
+            where = None if scene.path is None else str(scene.path), scene.group, files
+            keys[-1].append(json.dumps([scene.model, scene.of_model, where, harmonics], sort_keys=True))
+            studies.setdefault(keys[-1][-1], each)
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
         raise UserError(study.source, "outputs.scene", True, remedy)
     number_of = {key: number for number, key in enumerate(studies)}
     of_blocks = tuple(tuple(number_of[key] for key in each) for each in keys)
     return SceneSet(tuple(studies.values()), parts, of_blocks)
-
-
-def _key(study: Study) -> str:
-    scene = study.scene
-    files = None if scene.files is None else [str(path) for path in scene.files.all]
-    where = None if scene.path is None else str(scene.path), scene.group, files
-    return json.dumps([scene.model, study.scene.of_model, where, harmonics_to_build(study)], sort_keys=True)
 
 
 def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
@@ -86,11 +83,10 @@ def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
     return replace(scenes, parts=tuple(parts))
 
 
-def plan_scenes(study: Study, say: Callable[[str], None]) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
+def plan_scenes(study: Study, say: Progress) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
     """The scenes of a study, facts of each, or of one that is as large, and the time, s, for building the others.
 
-    Scenes that differ only in numbers with a fraction are taken to have the same sizes, but for the blocks of a
-    mission; at most eight are built. Raises UserError where a scene is wrong.
+    Scenes that differ only in numbers with a fraction are taken to have the same sizes. Raises UserError.
     """
     scenes, built = find_scenes(study), dict[str, SceneFacts]()
     began, facts = time.monotonic(), []
@@ -111,14 +107,14 @@ def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
     """Facts of the scene with the most pairs, with the largest sizes and a digest of all scenes."""
     if len(facts) == 1:
         return facts[0]
-    largest = max(facts, key=lambda each: len(each.area))
+    largest = max(facts, key=lambda each: each.contact.n_contact)
     harmonics = [each.largest_harmonics for each in facts if each.largest_harmonics is not None]
     return replace(
         largest,
         n_displacements=max(each.n_displacements for each in facts),
         digest=hashlib.sha256("".join(each.digest for each in facts).encode()).hexdigest(),
         largest_harmonics=min(harmonics, default=None),
-        edge=largest.edge if all(len(each.area) == len(largest.area) for each in facts) else None,
+        edge=largest.edge if all(each.contact.n_contact == largest.contact.n_contact for each in facts) else None,
     )
 
 
@@ -127,8 +123,8 @@ class PairArrays:
     """Where the pairs are, for the coordinates of the result file.
 
     dimensions: axes along which the pairs differ, then "contact". position (..., n_contact, 3): m. area
-    (..., n_contact): m2. surface (..., n_contact): labels. exists (..., n_contact): whether there is a pair; None where
-    all scenes have the same pairs. Where there is none position and area are NaN, and the label is empty.
+    (..., n_contact): m2. surface (..., n_contact): labels. exists (..., n_contact): whether there is a pair, else NaN
+    and empty labels stand there; None where all scenes have the same pairs.
     """
 
     dimensions: tuple[str, ...]
@@ -141,14 +137,15 @@ class PairArrays:
 def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | None = None) -> PairArrays:
     """Positions, areas and labels of the pairs of all scenes of a study. facts: of each scene of `find_scenes`."""
     names, numbers = axes_of_difference(study, scenes or find_scenes(study), [each.pairs for each in facts])
+    contacts = [each.contact for each in facts]
     if not names:
-        one = facts[0]
+        one = contacts[0]
         return PairArrays(("contact",), one.position, one.area, np.array(one.surface), None)
-    shape = (len(facts), max(len(each.area) for each in facts))
+    shape = (len(facts), max(each.n_contact for each in contacts))
     position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
-    surface = np.full(shape, "", np.array([label for each in facts for label in each.surface]).dtype)
-    for number, each in enumerate(facts):
-        own = slice(len(each.area))
+    surface = np.full(shape, "", np.array([label for each in contacts for label in each.surface]).dtype)
+    for number, each in enumerate(contacts):
+        own = slice(each.n_contact)
         position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
     exists = np.isfinite(area[numbers])
     return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
@@ -207,7 +204,7 @@ def contact_changes(
         for variant, own, of_sample in drawn_pairs(study, scenes, facts, place):
             if variant.scene.worn is not None:
                 # wear opens a pair as a gap does, Eq. (7)
-                of_sample["gap"] = of_sample.get("gap", own.gap) + worn_depth(variant, own)
+                of_sample["gap"] = of_sample.get("gap", own.contact.gap) + worn_depth(variant, own)
             changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
         of_blocks.append(changes)
     return tuple(zip(*of_blocks, strict=True))
@@ -218,8 +215,7 @@ def drawn_pairs(
 ) -> Iterator[tuple[Study, SceneFacts, _Values]]:
     """For each part of a study its variant, its scene, and drawn values (n_contact,) of the inputs of pairs.
 
-    facts: of each scene. block: place of the block in a mission; None for the study as it is. Raises UserError where a
-    sample draws a value that is none.
+    facts: of each scene. block: place of the block in a mission. Raises UserError as `contact_changes`.
     """
     of_parts = iter(scenes.of_blocks)
     for whole in study.variants or (study,):
@@ -228,11 +224,14 @@ def drawn_pairs(
         drawn: dict[Hashable, _Values] = {}
         for sample in range(1 if study.scatter is None else study.scatter.n_rows):
             own = facts[next(of_parts)[block or 0]]
-            values = own.gap, own.friction_coefficient
-            key = own.pairs, *(None if each is None else each.tobytes() for each in values)
-            if key not in drawn:
-                drawn[key] = _pair_values(variant, own) if scatters_pairs(study) else {}
-            yield variant, own, {name: each[sample] for name, each in drawn[key].items()}
+            contact, friction = own.contact, own.contact.friction_coefficient
+            key = own.pairs, contact.gap.tobytes(), None if friction is None else friction.tobytes()
+            if key not in drawn and scatters_pairs(study):
+                of_all = np.nan if variant.friction_coefficient is None else variant.friction_coefficient
+                friction = np.full(contact.n_contact, of_all) if friction is None else friction
+                values = {"gap": contact.gap, "area": contact.area, "friction_coefficient": friction}
+                drawn[key] = draw_inputs(variant, ScatteredPairs(contact.surface, contact.position), values)
+            yield variant, own, {name: each[sample] for name, each in drawn.get(key, {}).items()}
 
 
 def scatters_pairs(study: Study) -> bool:
@@ -241,19 +240,10 @@ def scatters_pairs(study: Study) -> bool:
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
-    """Wear depths (n_contact,), m, with which the history of a study of one scene begins. Raises UserError."""
+    """Wear depths (n_contact,), m, with which a study of one scene begins. Raises UserError where pairs differ."""
     if study.scene.worn is None:
-        return np.zeros(len(facts.area))
+        return np.zeros(facts.contact.n_contact)
     try:
-        return np.array(study.scene.worn.depths(len(facts.area)))
+        return np.array(study.scene.worn.depths(facts.contact.n_contact))
     except WrongValueError as error:
-        raise UserError(study.source, "scene.worn.depth", error.value, error.remedy) from None
-
-
-def _pair_values(study: Study, facts: SceneFacts) -> _Values:
-    """Values (n_samples, n_contact) of the inputs that belong to pairs. study: with one scene. Raises UserError."""
-    friction, of_all = facts.friction_coefficient, study.friction_coefficient
-    if friction is None:
-        friction = np.full(len(facts.area), np.nan if of_all is None else of_all)
-    own = {"gap": facts.gap, "area": facts.area, "friction_coefficient": friction}
-    return draw_inputs(study, ScatteredPairs(facts.surface, facts.position), own)
+        raise UserError(study.source, f"scene.worn.{error.key}", error.value, error.remedy) from None

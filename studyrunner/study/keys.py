@@ -76,13 +76,16 @@ def write_new_study(name: str, deck: Path | None = None) -> Path:
 
 
 def _tables_of_deck(path: Path) -> dict[str, Given]:
-    """[scene] and [axes] for a deck: the load acts on the free set of nodes that is farthest from what is held."""
-    from studies.fe_models.deck.read import read_deck  # where it is used: it takes a while to load
+    """[scene] and [axes] for a deck or mesh: the load acts on the free set of nodes that is farthest from what is held.
+
+    A name that only the user knows is "?", for which the study asks when it is run.
+    """
+    from studies.fe_models.meshes import read_mesh_file  # where it is used: it takes a while to load
 
     with scene_errors("command line", path):
-        deck = read_deck(path)
-    held = np.unique(np.concatenate([each.nodes for each in deck.boundaries] or [deck.node_numbers[:1]]))
-    centre = deck.coordinates[np.isin(deck.node_numbers, held)].mean(axis=0)
+        deck = read_mesh_file(path)
+    held = np.unique(np.concatenate([np.empty(0), *(each.nodes for each in deck.boundaries)]))
+    centre = deck.coordinates[np.isin(deck.node_numbers, held) | (len(held) == 0)].mean(axis=0)
     free = {name: nodes for name, nodes in deck.node_sets.items() if len(nodes) and not np.isin(nodes, held).any()}
     away = {
         name: float(np.linalg.norm(deck.coordinates[np.isin(deck.node_numbers, nodes)] - centre, axis=1).mean())
@@ -101,6 +104,13 @@ def _tables_of_deck(path: Path) -> dict[str, Given]:
     }
     if any(pair.friction_coefficient is None for pair in deck.contact_pairs) or not deck.contact_pairs:
         scene["friction_coefficient"] = (0.3, "")
+    if not deck.contact_pairs and not deck.ties:
+        scene["contact"] = ([["?", "?"]], "surfaces or sets that touch: the deck has no contact pair")
+    if not len(held):
+        scene["clamp"] = (["?"], "sets that are held: the deck holds none; or leave this line out")
+    if not deck.sections:
+        steel = {"young_modulus": 210e9, "poisson_ratio": 0.3, "density": 7800.0}
+        scene["material"] = (steel, "steel: the deck has no material")
     ratios = ([0.99, 1.0], "over the first natural frequency with all contact pairs stuck; or frequency, Hz")
     return {"scene": scene, "axes": {"frequency_ratio": ratios, "excitation_amplitude": (1.0, "N")}}
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
 
-from studies.fe_models.model_files import ModelFiles
-from studies.fe_models.text import check_there
+from studies.fe_models.files import ModelFiles, check_there
 from studies.scene import ContactStiffness, as_scene
 from studies.scene_error import SceneError
 from studies.scenes import scene_parameters
@@ -82,12 +81,18 @@ class Worn(Section):
         return tuple(self.model_copy(update={"depth": (each,), "cycle": ()}) for each in self.depth)
 
     def depths(self, n_contact: int) -> tuple[float, ...]:
-        """Depths (n_contact,), m, of the only state. Raises WrongValueError where there are others than pairs."""
+        """Depths (n_contact,), m, of the only state.
+
+        Raises WrongValueError where there are others than pairs; one depth is of all pairs, but not one of a result.
+        """
         (depth,) = self.depth
-        if len(depth) not in (1, n_contact):
-            remedy = f"give one depth, or one for each pair: the scene has {counted(n_contact, 'contact pair')}"
-            raise WrongValueError(Verbatim(f"there are {counted(len(depth), 'depth')}"), remedy)
-        return depth * n_contact if len(depth) == 1 else depth
+        if len(depth) == n_contact:
+            return depth
+        if len(depth) == 1 and not self.result:
+            return depth * n_contact
+        key, given = ("result", "a result with the same pairs") if self.result else ("depth", "one depth for each pair")
+        remedy = f"give {given}: the scene has {counted(n_contact, 'contact pair')}"
+        raise WrongValueError(Verbatim(f"there are {counted(len(depth), 'depth')}"), remedy, key)
 
 
 class SceneSection(Section):
@@ -251,20 +256,24 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
     remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
     raise_wrong(source, (Wrong(f"scene.worn.{name}", point[name], remedy) for name in point.keys() - set(axes)))
 
-    def place(name: str, wanted: Any) -> int:
-        values = dataset[name].values.tolist()
+    def place(name: str, wanted: Any, values: list[Any]) -> int:
         if wanted is None and len(values) == 1:
             return 0
         is_number = isinstance(wanted, float | int) and not isinstance(values[0], str)
         for number, value in enumerate(values):
             if value == wanted or (is_number and math.isclose(value, wanted, rel_tol=1e-12)):
                 return number
-        near = sorted(values, key=lambda value: abs(value - wanted)) if is_number else values
+        near = sorted(filter(math.isfinite, values), key=lambda value: abs(value - wanted)) if is_number else values
         remedy = f"give a value of the result: {', '.join(map(str, near[:10]))}"
         raise UserError(source, f"scene.worn.{name}", wanted, remedy)
 
-    places: dict[str, Any] = {name: place(name, point.get(name)) for name in axes}
-    chosen = depths.isel(places | {"cycle": [place("cycle", count) for count in cycle]}).values.astype(np.float64)
+    places = {name: place(name, point.get(name), dataset[name].values.tolist()) for name in axes}
+    # the coordinate of a study to the end numbers its outputs
+    counts = dataset.get("cycle_count", dataset["cycle"]).isel(places, missing_dims="ignore").values.tolist()
+    states = [place("cycle", count, counts) for count in cycle]
+    chosen = depths.isel({**places, "cycle": states}).values.astype(np.float64)
+    if "contact_exists" in dataset:  # its scenes differ in their pairs
+        chosen = chosen[:, dataset["contact_exists"].isel(places, missing_dims="ignore").values != 0]
     for count, row in zip(cycle, chosen, strict=True):
         if not np.isfinite(row).all():
             remedy = "give an earlier cycle count: the result does not hold the depths of this one"

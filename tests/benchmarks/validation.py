@@ -15,9 +15,9 @@ from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from studies import build_scene
-from studies.scenes.cylinder_on_flat import line_half_width, line_stick_width, line_worn_depth
+from studies.scenes.cylinder_on_flat import line_worn_depth
 from studies.scenes.half_space import composite_modulus
-from studies.scenes.sphere_on_flat import point_radius, point_stick_radius, point_worn_depth
+from studies.scenes.sphere_on_flat import point_worn_depth
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.studies.half_space_twin import limit_depth, pressed
 
@@ -34,8 +34,8 @@ Continuum = tuple[float, float]
 
 def cylinder(strips: int) -> tuple[ReducedModel, Continuum]:
     """120 N/mm, half of the force that slides."""
-    a = line_half_width(1.2e5, 6e-3, MODULUS)
-    c = line_stick_width(a, SHARE)
+    a = float(np.sqrt(4.0 * 1.2e5 * 6e-3 / (np.pi * MODULUS)))
+    c = a * np.sqrt(1.0 - SHARE)
     x = np.linspace(c, 2.0 * a, 40001)
     depth = line_worn_depth(x, 6e-3, a, c)
     model = build_scene("cylinder_on_flat", strips=strips)
@@ -44,8 +44,8 @@ def cylinder(strips: int) -> tuple[ReducedModel, Continuum]:
 
 def sphere(patches: int) -> tuple[ReducedModel, Continuum]:
     """100 N, half of the force that slides; patches along each side of the square around the whole contact."""
-    a = point_radius(100.0, 10e-3, MODULUS)
-    c = point_stick_radius(a, SHARE)
+    a = float(np.cbrt(0.75 * 100.0 * 10e-3 / MODULUS))
+    c = a * np.cbrt(1.0 - SHARE)
     r = np.linspace(c, 2.0 * a, 40001)
     depth = point_worn_depth(r, 10e-3, a, c)
     model = build_scene("sphere_on_flat", patches=patches // 2)

@@ -19,7 +19,7 @@ from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import Case, build_case
 from solver.wear.history import integrate_together
-from solver.wear.problem import WearRequest, steps_of
+from solver.wear.wearing_joint import WearRequest, steps_of
 from studies.scenes import build_scene, scene_parameters
 from tests.random_scenes import COMPONENTS
 

@@ -8,10 +8,12 @@ from scipy.optimize import brentq
 
 from solver import march_wear as march_model
 from solver.contact.wear_law import ARCHARDS_WORK
+from solver.harmonic_balance.state import Failure
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
+from solver.wear import problem
 from studies import build_scene
 from studies.scenes.sdof_slider import DenHartogSlider, wear_of_slider
 from tests.solver.models import assert_same, march_wear
@@ -39,6 +41,13 @@ def test_the_count_is_that_at_which_the_history_has_the_wear(scheme):
     assert found.last_cycle >= found.cycles_to_target
     assert np.array_equal(found.wear_depth[reached], whole.wear_depth[reached])
     assert found.newton_iterations < whole.newton_iterations
+
+
+def test_the_error_of_a_life_is_not_known_where_the_reference_solution_has_no_state(monkeypatch):
+    monkeypatch.setattr(problem, "report_only", lambda *_, **__: Failure(Outcome.MARCH_FAILED))
+    found = march(4000.0, "adaptive", until=WearTarget("wear_depth", 2.3e-5))
+    assert found.cycles_to_target > 0.0
+    assert found.cycles_to_target_error == np.inf
 
 
 def exact_count(frequency, depth):

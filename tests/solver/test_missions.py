@@ -128,7 +128,7 @@ def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
     mission, pairs = MissionRequest((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
     first, own = (run_block(BlockInput(mission, 0, at * pairs)) for at in (0.0, depth))
-    return own, run_block(BlockInput(mission, 0, depth * pairs, begun=first.begun))
+    return own, run_block(BlockInput(mission, 0, depth * pairs, earlier=first.sweep))
 
 
 @pytest.mark.slow
@@ -139,7 +139,7 @@ def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
     np.testing.assert_allclose(again.growth, own.growth, rtol=1e-6)
     np.testing.assert_allclose(again.response, own.response, rtol=1e-6)
     assert again.iterations < 20 < own.iterations
-    assert again.begun is not None
+    assert again.sweep is not None
     own, again = begun_again(slipping, 6e-5)
     assert again.iterations >= own.iterations
     np.testing.assert_array_equal(again.growth, own.growth)
@@ -288,6 +288,21 @@ def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
     assert re.fullmatch(r"in mission \d+, block [12]: lost", history.message)
     assert 2 < history.last_mission < 60
     assert np.isnan(history.worn_volume[-1])
+
+
+def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
+    def run(case):
+        lost = case.guide is not None and case.depth.max() > 0.5 * float(whole.wear_depth[-1].max())
+        return Failure(Outcome.MARCH_FAILED) if lost else exact_run(case)
+
+    monkeypatch.setattr(integrating, "run_block", exact_run)
+    whole = exactly_known((0, 10, 60))
+    monkeypatch.setattr(integrating, "run_block", run)
+    history = exactly_known((0, 10, 60))
+    assert np.array_equal(history.worn_volume, whole.worn_volume)
+    assert history.worn_volume_error[1] == whole.worn_volume_error[1] < SETTINGS.rtol
+    assert history.worn_volume_error[2] == history.error_estimate == np.inf
+    assert history.outcome is Outcome.SENSITIVE
 
 
 # --- what users may get wrong ---

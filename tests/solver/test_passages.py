@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from solver import Block, Outcome, Passage, SolverSettings
-from solver.missions.block_run import Begun, BlockInput
+from solver.missions.block_run import BlockInput, EarlierSweep
 from solver.missions.mission import MissionRequest
 from solver.missions.passage import (
     FIRST_FREQUENCIES,
@@ -99,8 +99,8 @@ def swept_with(monkeypatch, density, depth, near=()):
     monkeypatch.setattr("solver.missions.passage.states_at", states)
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, FRICTION, begin="up")
-    mission, begun = MissionRequest((block,), WEAR, (0, 1), SETTINGS), Begun(near) if near else None
-    swept = find_states(BlockInput(mission, 0, np.array([depth]), begun=begun))
+    mission, earlier = MissionRequest((block,), WEAR, (0, 1), SETTINGS), EarlierSweep(near) if near else None
+    swept = find_states(BlockInput(mission, 0, np.array([depth]), earlier=earlier))
     assert isinstance(swept, Swept)
     return swept
 

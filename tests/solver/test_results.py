@@ -16,9 +16,7 @@ from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from solver.structure.joint import build_case
 from studies import build_scene
-from studies.scenes.cylinder_on_flat import line_half_width
 from studies.scenes.half_space import composite_modulus
-from studies.scenes.sphere_on_flat import point_radius
 from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
 from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
 from tests.studyrunner.faked_runs import history
@@ -167,8 +165,8 @@ def test_the_outcome_is_that_of_the_counts_that_are_judged(rows, changed, outcom
 # --- contacts that reach an edge where the bodies go on ---
 
 EDGE = SolverSettings(harmonics=3, samples=32)
-A_LINE = line_half_width(1.2e5, 6e-3, composite_modulus(200e9, 0.3))
-A_POINT = point_radius(100.0, 10e-3, composite_modulus(200e9, 0.3))
+A_LINE = np.sqrt(4.0 * 1.2e5 * 6e-3 / (np.pi * composite_modulus(200e9, 0.3)))
+A_POINT = np.cbrt(0.75 * 100.0 * 10e-3 / composite_modulus(200e9, 0.3))
 
 
 def test_load_or_wear_at_the_edge_is_found_at_its_first_count():

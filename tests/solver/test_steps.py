@@ -17,9 +17,8 @@ from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear import problem as control
 from solver.wear.check import choose_anew
-from solver.wear.problem import Adaptive, Given
 from solver.wear.step import moved_fraction, rate_slope
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.wearing_joint import Adaptive, Given, WearingJoint, WearRequest, WearState
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import AREA, problem
 
@@ -27,7 +26,7 @@ from tests.solver.worn_slider import AREA, problem
 def states_of(steps, n_steps):
     """The unworn state and those behind each of the first steps."""
     of = problem(steps)
-    states = [of.begin(of.setup.begin())]
+    states = [of.with_first_length(of.unworn_state())]
     for _ in range(n_steps):
         states.append(of.step(states[-1]))
         assert isinstance(states[-1], WearState)
@@ -73,9 +72,9 @@ def failing(monkeypatch, fails):
     """Attempts at steps, of which some fail: schemes and lengths of all."""
     own, tried = control.attempt_step, list[tuple[str, float]]()
 
-    def attempt(work, state, length, scheme):
+    def attempt(work, state, length, scheme, parts):
         tried.append((scheme, length))
-        return None if fails(tried) else own(work, state, length, scheme)
+        return None if fails(tried) else own(work, state, length, scheme, parts)
 
     monkeypatch.setattr(control, "attempt_step", attempt)
     return tried
@@ -97,7 +96,7 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
 @pytest.mark.parametrize(("found_from", "end", "doublings"), [(3.0, np.inf, 2), (3.0, 3.5, None), (40.0, np.inf, None)])
 def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeypatch, found_from, end, doublings):
     of = problem(Adaptive(1e-2))
-    first = of.begin(of.setup.begin())
+    first = of.with_first_length(of.unworn_state())
     shortest = control.SHORTEST_SLOW_STEP * first.length
 
     def fails(tried):
@@ -138,9 +137,9 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
 
 
 def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
-    work = problem(Adaptive(1e-2)).setup
+    work = problem(Adaptive(1e-2))
     work.case = replace(work.case, settings=SolverSettings("auto", 64, rtol=1e-2))
-    state = work.begin()
+    state = work.unworn_state()
     chosen = choose_anew(work, state)
     assert chosen.resolution != state.resolution
     assert chosen.rate == pytest.approx(work.gain(1.0) * chosen.at.slip_work, rel=1e-12, abs=0.0)
@@ -187,8 +186,8 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
     model = scene("cylinder_on_flat", 3, strips=24)
     (start,) = branch_states(model, 0.6, 1.0, [2.0 * np.pi * 20.0], COARSE_BLADE, "ramp")
     case = build_case(model, 0.6, start.penalty_omega, COARSE_BLADE, start.resolution)
-    work = WearingJoint(case, start, 1e-4)
-    state = work.begin()
+    work = WearingJoint(case, start, WearRequest(1e-4, Given(1.0), np.array([0.0, 1.0])))
+    state = work.unworn_state()
     work.run = Run(1e-13)
     joint, at = work.joint_of(state), state.at
     gain, slips = work.gain(1.0), at.slip_work > 0.0

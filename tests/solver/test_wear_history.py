@@ -14,8 +14,9 @@ from solver.results.state_report import LOOP_PHASES
 from solver.settings import Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import build_case
 from solver.wear import slow_time
-from solver.wear.problem import Adaptive, WearProblem, WearRequest
+from solver.wear.problem import WearProblem
 from solver.wear.slow_time import CERTIFIED, Course, Integrator, Node
+from solver.wear.wearing_joint import Adaptive, WearRequest
 from tests.solver.models import branch_states, march_wear, random_model, scene
 from tests.solver.worn_slider import (
     AREA,

@@ -14,7 +14,8 @@ from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.problem import Adaptive, Given, WearProblem, WearRequest
+from solver.wear.problem import WearProblem
+from solver.wear.wearing_joint import Adaptive, Given, WearRequest
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, march_wear, scene
 

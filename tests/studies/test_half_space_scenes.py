@@ -12,9 +12,9 @@ from solver.settings import SolverSettings
 from studies import build_scene
 from studies.scene import ExpectedWear
 from studies.scenes import scene_parameters
-from studies.scenes.cylinder_on_flat import line_half_width, line_stick_under_stroke, line_stick_width, line_worn_depth
+from studies.scenes.cylinder_on_flat import line_worn_depth
 from studies.scenes.half_space import composite_modulus, patch_compliance, round_up, strip_compliance, worn_edge
-from studies.scenes.sphere_on_flat import point_radius, point_stick_radius, point_stick_under_stroke, point_worn_depth
+from studies.scenes.sphere_on_flat import point_worn_depth
 from tests.studies.half_space_twin import compliances, limit_depth, pressed, solve_pressed
 
 MU, E, NU = 0.6, 200e9, 0.3
@@ -22,8 +22,9 @@ SHEAR = E / (2.0 * (1.0 + NU))
 MODULUS = composite_modulus(E, NU)
 LINE = {"R": 6e-3, "P": 1.2e5}
 POINT = {"R": 10e-3, "P": 100.0}
-A_LINE = line_half_width(LINE["P"], LINE["R"], MODULUS)
-A_POINT = point_radius(POINT["P"], POINT["R"], MODULUS)
+A_LINE = float(np.sqrt(4.0 * LINE["P"] * LINE["R"] / (np.pi * MODULUS)))
+A_POINT = float(np.cbrt(0.75 * POINT["P"] * POINT["R"] / MODULUS))
+CYLINDER, SPHERE = (scene_parameters(name)() for name in ("cylinder_on_flat", "sphere_on_flat"))
 
 
 def test_strips_move_as_the_integral_over_their_traction_says():
@@ -113,7 +114,7 @@ def worn(name, cycles, rtol, **values):
 @pytest.mark.slow
 def test_the_stick_zone_of_the_cylinder_is_that_of_cattaneo():
     model, history, slips = worn("cylinder_on_flat", [0.0], 1e-2, strips=40)
-    x, c = np.abs(model.contact.position[:, 0]), line_stick_width(A_LINE, 0.5)
+    x, c = np.abs(model.contact.position[:, 0]), A_LINE * np.sqrt(0.5)
     force, _ = pressed(model, LINE["P"] * 0.01)
     assert history.mean_pressure[0] == pytest.approx(force / model.contact.area, rel=1e-6, abs=1.0)
     assert (x[slips] > c).all()
@@ -133,7 +134,7 @@ def mindlin_amplitude(share):
 @pytest.mark.slow
 def test_the_sphere_moves_as_mindlin_says():
     model, history, slips = worn("sphere_on_flat", [0.0, 1e6], 1e-3, patches=8)
-    radius, c = np.linalg.norm(model.contact.position, axis=1), point_stick_radius(A_POINT, 0.5)
+    radius, c = np.linalg.norm(model.contact.position, axis=1), A_POINT * np.cbrt(0.5)
     width = float(np.sqrt(model.contact.area[0])) / 2.0
     assert radius[~slips].max() < c + 0.5 * width
     assert radius[slips].min() > c - 0.5 * width
@@ -148,7 +149,7 @@ def test_the_sphere_moves_as_mindlin_says():
 
 def test_the_limit_state_of_strips_is_that_of_the_half_plane():
     for share in (0.5, 0.75, 0.91):
-        c, errors = line_stick_width(A_LINE, share), []
+        c, errors = A_LINE * np.sqrt(1.0 - share), []
         fine = np.linspace(c, 2.5 * A_LINE, 40001)
         exact = line_worn_depth(fine, LINE["R"], A_LINE, c)
         area = 2.0 * float(np.trapezoid(exact, fine))
@@ -223,16 +224,16 @@ def test_a_stroke_slides_where_the_approach_under_the_load_says():
     # the strips move under tangential forces as under normal ones: all slide from mu times the approach on
     model = build_scene("cylinder_on_flat", strips=200, half_width=1.2 * A_LINE)
     _, approach = pressed(model, 1200.0)
-    half = line_stick_under_stroke(0.3 * approach, MU, 1.2e5, A_LINE, MODULUS, 6e-3)
+    half = CYLINDER.stick_under(0.3 * approach)
     _, without = pressed(model, 1200.0 * (half / A_LINE) ** 2)
     assert MU * (approach - without) == pytest.approx(0.3 * approach, rel=2e-3)
     for factor, slides in ((0.99, False), (1.01, True)):
-        stick = line_stick_under_stroke(factor * MU * approach, MU, 1.2e5, A_LINE, MODULUS, 6e-3)
+        stick = CYLINDER.stick_under(factor * MU * approach)
         assert (stick == 0.0) == slides
-    found = point_stick_under_stroke(mindlin_amplitude(0.5), MU, 100.0, A_POINT, E, NU)
+    found = SPHERE.stick_under(mindlin_amplitude(0.5))
     assert found == pytest.approx(A_POINT * 0.5 ** (1.0 / 3.0), rel=1e-12)
-    assert point_stick_under_stroke(1e-3, MU, 100.0, A_POINT, E, NU) == 0.0
-    assert point_stick_under_stroke(1e-9, 0.0, 100.0, A_POINT, E, NU) == 0.0
+    assert SPHERE.stick_under(1e-3) == 0.0
+    assert scene_parameters("sphere_on_flat")(friction_coefficient=0.0).stick_under(1e-9) == 0.0
 
 
 def room(name, expected, **values):
@@ -242,7 +243,7 @@ def room(name, expected, **values):
 
 def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears():
     stroke = 2.15e-6
-    stick = line_stick_under_stroke(stroke, MU, 1.2e5, A_LINE, MODULUS, 6e-3)
+    stick = CYLINDER.stick_under(stroke)
     assert 0.0 < stick < 0.3 * A_LINE
     found = room("cylinder_on_flat", ExpectedWear(1.0, 1e-3), stroke=stroke)
     assert found == round_up(1.1 * worn_edge(line_worn_depth, A_LINE, stick) * 100 / 99)

@@ -14,7 +14,7 @@ from solver.model import needed_nodal_diameters
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import build_case
 from solver.structure.penalty import Penalty
-from studies.finite_element.reduced_joint import glued_frequencies, prepare_model
+from studies.finite_element.reduced_joint import prepare_model
 from studies.scene_error import SceneError
 from studies.scenes import underplatform_damper
 from tests.studies.shrouded_ring import reduced_ring, stubby, whole_ring
@@ -35,14 +35,14 @@ def apart(model, joint):
 
 def frequencies_of_sector(model, joint):
     prepared = prepare_model(replace(model, rotation=None), joint)
-    return [glued_frequencies(prepared, k, 4) for k in range(N // 2 + 1)]
+    return [prepared.frequencies(k, 4) for k in range(N // 2 + 1)]
 
 
 @pytest.mark.parametrize("sector", [*SECTORS, apart(*SECTORS[0])], ids=["shroud", "damper", "disks apart"])
 def test_stuck_frequencies_of_all_waves_are_those_of_the_ring(sector):
     found = frequencies_of_sector(*sector)
     twice = [each for k, each in enumerate(found) for _ in range(1 if k in (0, N // 2) else 2)]
-    ring = glued_frequencies(prepare_model(*whole_ring(*sector)), 0, 10)
+    ring = prepare_model(*whole_ring(*sector)).frequencies(0, 10)
     np.testing.assert_allclose(np.sort(np.concatenate(twice))[:10], ring, rtol=1e-9)
 
 

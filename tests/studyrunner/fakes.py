@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from solver.model import ContactInterface
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import Store
@@ -18,22 +19,22 @@ from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, OF_A_HISTORY
 
-FACTS = SceneFacts(
-    n_displacements=6,
-    position=np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]),
+PAIRS = ContactInterface(
+    dofs=np.arange(6).reshape(2, 3),
     area=np.array([1e-4, 2e-4]),
-    surface=("intrados", "extrados"),
-    response_names=("tip",),
-    digest="0" * 64,
     gap=np.zeros(2),
+    normal_load=np.zeros(2),
+    position=np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]),
+    surface=("intrados", "extrados"),
 )
+FACTS = SceneFacts(n_displacements=6, contact=PAIRS, response_names=("tip",), digest="0" * 64)
 
 
 def plan_of(study: Study, n_displacements: int = 2, n_pairs: int = 1) -> TaskPlan:
     """The tasks of a study, all of whose scenes are of this size."""
-    scenes = find_scenes(study)
-    pairs = {"position": np.zeros((n_pairs, 3)), "area": np.ones(n_pairs), "surface": ("",) * n_pairs}
-    facts = replace(FACTS, n_displacements=n_displacements, gap=np.zeros(n_pairs), **pairs)
+    scenes, zero = find_scenes(study), np.zeros(n_pairs)
+    contact = replace(PAIRS, position=np.zeros((n_pairs, 3)), area=zero + 1.0, gap=zero, surface=("",) * n_pairs)
+    facts = replace(FACTS, n_displacements=n_displacements, contact=contact)
     return build_tasks(study, scenes, [facts] * len(scenes.studies))
 
 
@@ -64,7 +65,7 @@ def fake_history(task: History, facts: SceneFacts = FACTS, seconds: float = 0.0,
     fingerprint += 0.5 * (integrated.scheme == "implicit")
     pause = seconds * (fingerprint * 7.7 % 1.0) ** 2
     time.sleep(pause)
-    sizes = {"contact": len(facts.area), "response": len(facts.response_names)}
+    sizes = {"contact": facts.contact.n_contact, "response": len(facts.response_names)}
     values: dict[str, np.ndarray] = {}
     for name in task.variables:
         if name in LOOPS:

@@ -130,9 +130,18 @@ def same_values(one: xr.Dataset, other: xr.Dataset) -> None:
         np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=str(name), strict=True)
 
 
-def write_depths(path: Path | str, frequency: float, cycles: list[float], n_contact: int) -> None:
-    """A file that holds as much of a result as a study needs that begins with a worn joint."""
+def write_depths(
+    path: Path | str, frequency: float, cycles: list[float], n_contact: int, counts: list[float] | None = None
+) -> None:
+    """A file that holds as much of a result as a study needs that begins with a worn joint.
+
+    counts: cycle counts of a result to the end, whose coordinate numbers its outputs.
+    """
     depth = np.outer(cycles, np.ones(n_contact))[None, None] * 1e-9
     dims = ("frequency", "scheme", "cycle", "contact")
     coordinates = {"frequency": [frequency], "scheme": ["adaptive"], "cycle": cycles}
-    xr.Dataset({"wear_depth": (dims, depth)}, coordinates).to_netcdf(path)
+    variables = {"wear_depth": (dims, depth)}
+    if counts is not None:
+        variables["cycle_count"] = (dims[:3], np.reshape(counts, (1, 1, -1)))
+        coordinates["cycle"] = range(len(cycles))
+    xr.Dataset(variables, coordinates).to_netcdf(path)

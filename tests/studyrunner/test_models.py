@@ -143,6 +143,13 @@ def test_gmsh():
     for wrong, said in ((by_volume, "2 elements of lap.msh have none"), ("scene.load.set=TIPS", "give TIP")):
         with pytest.raises(UserError, match=said):
             scene_of("lap.toml", "scene.model=lap.msh", wrong)
+    # a new study of the mesh asks for what only the user knows
+    assert main(["--new", "own", "--from", "lap.msh"]) == 0
+    known = ['scene.contact=[["UNDER","OVER"]]', 'scene.clamp=["GROUND"]']
+    for wrong, said in ((known[1:], 'contact.*"\\?" in lap.msh: give'), (known[:1], 'clamp.*"\\?" in lap.msh: give')):
+        with pytest.raises(UserError, match=said):
+            scene_of("own.toml", *wrong)
+    assert scene_of("own.toml", *known).contact.n_contact == 4
 
 
 @pytest.mark.parametrize(

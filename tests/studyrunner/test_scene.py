@@ -60,7 +60,7 @@ def test_a_model_is_built_once(case, monkeypatch):
     assert memory(again) == memory(model)
     assert list(again.linear) == list(model.linear)
     assert type(again.contact.surface) is type(model.contact.surface)
-    monkeypatch.setattr(scene_room, "_build_here", pytest.fail)
+    monkeypatch.setattr(scene_room, "_built", pytest.fail)
     second = build(study, first.model)
     assert second.model is None
     assert second.facts.digest == first.facts.digest == describe_scene(model).digest

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studies.finite_element.elimination import NotPositiveDefiniteError
-from studies.finite_element.reduction import Reduction
+from studies.finite_element import reduction
+from studies.finite_element.elimination import NotPositiveDefiniteError, factorise
 from studyrunner import compute_worn_joint
 from studyrunner.cli import main
 from studyrunner.result.opening import open_known
@@ -17,7 +17,7 @@ from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import plan_of
-from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
+from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values, write_depths
 
 pytestmark = pytest.mark.usefixtures("folder")
 THREE = ("slow_time.outputs=3", "axes.scheme=adaptive")
@@ -114,6 +114,24 @@ def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended()
     assert results("worn_joint_loops.nc").worn_depth.values.ravel()[-1] == pytest.approx(depth, rel=1e-12)
 
 
+def test_a_result_to_the_end_gives_its_depths_by_cycle_count(folder):
+    write_depths("ended.nc", 150.0, [0.0, 5.0, 7.0], 1, counts=[0.0, 1234.5, math.inf])
+    worn = f"scene.worn={{result='{folder / 'ended.nc'}', cycle=[1234.5]}}"
+    study = read_study("sdof_slider", (*CHEAP, worn))
+    assert study.dimensions["worn_cycle"] == (1234.5,)
+    assert study.variants[0].scene.worn.depths(1) == (5e-9,)
+
+
+def test_depths_are_those_of_the_pairs_of_the_chosen_scene(folder):
+    write_depths("both.nc", 150.0, [0.0, 1.0], 2)
+    with xr.open_dataset("both.nc") as both:
+        depth = both.wear_depth.copy()
+        depth[..., 1] = np.nan
+        both.assign(wear_depth=depth, contact_exists=("contact", [1, 0])).to_netcdf("one.nc")
+    study = read_study("sdof_slider", (*CHEAP, f"scene.worn={{result='{folder / 'one.nc'}', cycle=[1]}}"))
+    assert study.variants[0].scene.worn.depths(1) == (1e-9,)
+
+
 # --- variables of the scene itself ---
 
 
@@ -171,10 +189,16 @@ def test_the_exact_answer_is_that_of_the_wear_law_and_of_the_worn_start(changes,
 def test_a_sector_that_spins_too_fast_is_bad_input(folder, monkeypatch, capsys):
     """The nodal diameters of the study are fine, another one is not: known before anything is computed."""
 
-    def unstable(*_):
-        raise NotPositiveDefiniteError(unstable=True)
+    factorised = []
 
-    monkeypatch.setattr(Reduction, "frequencies", unstable)
+    def unstable(*given):
+        factorised.append(given)
+        # the scene: under its own load, and at the excited nodal diameter
+        if len(factorised) > 2:
+            raise NotPositiveDefiniteError(unstable=True)
+        return factorise(*given)
+
+    monkeypatch.setattr(reduction, "factorise", unstable)
     coarse = ("scene.mesh=1", "axes.frequency=212", "slow_time.cycles=0", "axes.scheme=implicit")
     assert main(["dovetail", "-o", "out.nc", *options(*coarse, "outputs.variables=['natural_frequency']")]) == 2
     assert "scene.rotation_speed = 3000: reduce it" in capsys.readouterr().err.splitlines()[-1]

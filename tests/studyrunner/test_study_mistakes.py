@@ -91,6 +91,7 @@ WRONG = {
         scene.worn={{result='worn.nc', cycle=[0], scheme='explicit'}} -> scene.worn.scheme
         scene.worn={{result='none.nc', cycle=[0]}} -> none.nc: the file
         scene.worn={{result='missions.nc', cycle=[0]}} -> scene.worn.result
+        scene.worn={{result='ended.nc', cycle=[1]}} -> scene.worn.cycle = 1.0
         axes.scheme=final ; solver.samples=8 -> solver.samples, axes.scheme
     """,
     SLIDER.replace("[study]\nname", "[other]\nname"): "-> other",
@@ -170,6 +171,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         scene.friction_coefficient=0.3
         axes.friction_coefficient=[0.3, 0.4] -> axes.friction_coefficient = 0.3
         scene.model=plain.h5 -> scene.friction_coefficient
+        scene.worn={result='worn.nc', cycle=[0]} -> scene.worn.result
         scene.model=wave.h5 ; scene.friction_coefficient=0.3 ; solver.harmonics=4 -> wave.h5: nd/16
         scene.model=wave.h5 ; scene.friction_coefficient=0.3 ; axes.harmonics=['auto', 4] -> wave.h5: nd/16
     """,
@@ -260,6 +262,7 @@ def files(tmp_path_factory):
     write_depths(folder / "worn.nc", 150.0, [0.0, 1000.0], 1)
     with xr.open_dataset(folder / "worn.nc") as worn:
         worn.rename(cycle="mission").to_netcdf(folder / "missions.nc")
+    write_depths(folder / "ended.nc", 150.0, [0.0, 1000.0], 1, counts=[0.0, 1234.5])
     (folder / "part.nc").write_bytes((folder / "worn.nc").read_bytes()[:1000])
     for number, content in enumerate(NO_TOML):
         (folder / f"{number}.toml").write_bytes(content)

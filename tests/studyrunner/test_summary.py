@@ -77,13 +77,12 @@ def test_what_is_not_known_is_no_result(name, value, known):
 
 
 DEPTHS = np.array([3e-6, 1e-6, 2e-6, 0.0, 5e-6, 0.0])
-BY_SIX = replace(
-    FACTS,
-    position=np.arange(18.0).reshape(6, 3),
-    area=np.array([1.0, 2.0, 1.0, 1.0, 2.0, 1.0]) * 1e-4,
-    surface=("left",) * 3 + ("right",) * 3,
-    edge=np.array([True, False, True] * 2),
-)
+SIX = {
+    "position": np.arange(18.0).reshape(6, 3),
+    "area": np.array([1.0, 2.0, 1.0, 1.0, 2.0, 1.0]) * 1e-4,
+    "surface": ("left",) * 3 + ("right",) * 3,
+}
+BY_SIX = replace(FACTS, contact=replace(FACTS.contact, **SIX), edge=np.array([True, False, True] * 2))
 
 
 @pytest.mark.parametrize("name", ["wear_depth", "wear_depth_last"])
@@ -96,7 +95,7 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
         deepest = summary(made).values["deepest"]
         assert deepest["wear_depth"] == 5e-6
         assert (deepest["contact"], deepest["surface"]) == (pair, "right" if pair else "left")
-        np.testing.assert_allclose(deepest["position"], BY_SIX.position[pair])
+        np.testing.assert_allclose(deepest["position"], SIX["position"][pair])
         assert deepest["edge_share"] == pytest.approx(edge)
         text = "\n".join(summary(made).lines)
         assert ("edge pairs" in text) is (edge > 0.5)

@@ -1,8 +1,7 @@
-"""The contents of a deck: frozen dataclasses of arrays, in the units of the file. Nothing is read here.
+"""The contents of a deck: frozen dataclasses of arrays, in the units of the file.
 
-Node and element numbers are those of the file, not indices of an array. Names of sets, surfaces, materials and
-interactions are in capitals, as the programs ignore case. A `place` is where something stands, for messages, as
-"deck.inp, line 7: *KEYWORD".
+Node and element numbers are those of the file, not indices of an array. Names are in capitals, as the programs ignore
+case. A `place` is where something stands, for messages, as "deck.inp, line 7: *KEYWORD".
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from studies.fe_models.text import FloatArray, IntArray
+from studies.fe_models.files import FloatArray, IntArray
 from studies.finite_element.elements import ELEMENT_KINDS
 
 NODES_OF_KIND: Mapping[str, int] = {kind: len(each.reference.nodes) for kind, each in ELEMENT_KINDS.items()}
@@ -43,10 +42,10 @@ class Surface:
 class SurfacePair:
     """Two surfaces by name, the dependent one first, that are glued (*TIE) or touch (*CONTACT PAIR).
 
-    tolerance: largest distance of a tied node; None where the deck gives none. friction_coefficient: None where the
-    deck gives none. clearance: distance of the surfaces, negative for an interference; None for the distances in the
-    mesh. Places, "" where there is nothing of the kind: problem of a law of friction that is not read, glued where
-    surfaces in contact do not part, fitted of a clearance or interference, adjusted where nodes are moved.
+    tolerance: largest distance of a tied node. clearance: distance of the surfaces, negative for an interference; None
+    for the distances in the mesh. Places, "" where there is nothing of the kind: problem of a law of friction that is
+    not read, glued where surfaces in contact do not part, fitted of a clearance or interference, adjusted where nodes
+    are moved. None where the deck gives none.
     """
 
     dependent: str
@@ -77,8 +76,7 @@ class CyclicSymmetry:
 class NodalValue:
     """A displacement, 0 where it is held, or a force of each of some nodes (p,) along the dofs from first to last.
 
-    Dofs 1 to 3 are along x, y and z, or along the directions of a `Transform`; 4 to 6 are rotations of reference
-    points; larger numbers are possible.
+    Dofs 1 to 3 are along x, y and z, or the directions of a `Transform`; 4 to 6 are rotations of reference points.
     """
 
     place: str
@@ -92,8 +90,8 @@ class NodalValue:
 class Transform:
     """Directions of the displacements 1 to 3 of nodes (p,).
 
-    points (2, 3): cylindrical: on the axis; directions are radial, tangential and axial. Else one vector along the
-    first direction, and another in the plane of the first two.
+    points (2, 3): cylindrical: on the axis, directions are radial, tangential, axial. Else vectors: the first
+    direction, and another one in the plane of the first two.
     """
 
     place: str
@@ -114,10 +112,10 @@ class Equation:
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """Nodes (p,) that follow a reference node: `u = u_reference + theta x (x - x_reference)`.
+    """Nodes (p,) of which the dofs, 1 to 3, follow a reference node: `u = u_reference + theta x (x - x_reference)`.
 
-    dofs: 1 to 3, those that follow. rotation: the node whose displacements are theta; 0 where the reference node has
-    dofs 4 to 6 of its own. turns: whether there is theta.
+    rotation: the node whose displacements are theta; 0 for dofs 4 to 6 of the reference node. turns: whether there is
+    theta.
     """
 
     place: str
@@ -169,25 +167,16 @@ class CentrifugalLoad:
 
 
 @dataclass(frozen=True)
-class ContactNodes:
-    """Nodes of a table: area (n,), unit normal (n, 3) out of the body, initial gap (n,); NaN where none is given."""
-
-    area: FloatArray
-    normals: FloatArray
-    gap: FloatArray
-
-
-@dataclass(frozen=True)
 class Deck:
     """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
 
-    path: name of the file. node_numbers (n,), coordinates (n, 3): numbers ascending. No element number is in two
-    blocks; all numbers in sets exist, and nothing names elements that are taken away. cut_faces: names of surfaces that
-    are images of each other. centrifugal: loads of the last step that has some. gravity (3,): acceleration of all
-    elements in static steps. unassembled: places of what only matrices of another program hold. n_instances: where
-    there are several, numbers are not those of the file. skipped: places of keywords that cannot change the model.
-    notes: what was read in a way that may be asked for, a sentence each. included: files relative to the deck's folder.
-    contact_nodes: of a table of nodes, which has no elements; None of a mesh.
+    path: name of the file. node_numbers (n,), ascending, coordinates (n, 3). All numbers in sets exist, each element is
+    once in one block. cut_faces: names of surfaces that are images of each other. centrifugal: loads of the last step
+    that has some. gravity (3,): acceleration of all elements in static steps. unassembled: places of what only matrices
+    of another program hold. n_instances: where there are several, numbers are not those of the file. skipped: places of
+    keywords that cannot change the model. notes: what was read in one of two ways, a sentence each. included: files
+    relative to the deck's folder. contact_nodes (n, 5): of a table of nodes, which has no elements: area, unit normal
+    out of the body, initial gap, NaN where none is given; None of a mesh.
     """
 
     path: str
@@ -216,7 +205,7 @@ class Deck:
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     included: tuple[str, ...] = ()
-    contact_nodes: ContactNodes | None = None
+    contact_nodes: FloatArray | None = None
 
     @property
     def remarks(self) -> tuple[tuple[str, str], ...]:

@@ -1,4 +1,4 @@
-"""The table of keywords: what reads each, with which parameters; keywords that are skipped, and those that are refused.
+"""Keywords of a deck: what a keyword and its data lines say, and the table of what reads each of them.
 
 A keyword, and each of its parameters, is read, or stands in a list of those that cannot change the model, or is
 refused: it may change the model.
@@ -6,12 +6,203 @@ refused: it may change the model.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from array import array
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
-from studies.fe_models.deck.blocks import Block
-from studies.fe_models.text import shown
+import numpy as np
+
+from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, read_float, read_integer, shown
+
+_Thing = TypeVar("_Thing")
+
+
+def read_name(text: str) -> str:
+    """A name in capitals: without blanks, or as it stands between quotation marks."""
+    text = text.strip()
+    if len(text) >= 2 and text[0] == text[-1] == '"':
+        return text[1:-1].upper()
+    return "".join(text.split()).upper()
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a line points to: the name of a set or surface in capitals, or a number, perhaps with "INSTANCE." before it.
+
+    scope: name of the instance in which it stands, "" outside of instances. of_elements: in a set of nodes, the nodes
+    of a set of elements.
+    """
+
+    scope: str
+    target: str
+    place: Place
+    of_elements: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """A data line: its fields, without the empty ones at its end."""
+
+    fields: list[str]
+    place: Place
+    scope: str
+
+    def text(self, n: int) -> str:
+        """A field, counted from 0; "" where it is missing."""
+        return self.fields[n] if n < len(self.fields) else ""
+
+    def real(self, n: int) -> float:
+        """A field as a finite number, 0 where it is missing. Raises SceneError."""
+        return read_float(self.text(n), self.place)
+
+    def reals(self, first: int, least: int, what: str) -> list[float]:
+        """The numbers from a field on, at least so many. Raises SceneError, which asks for `what`."""
+        values = [read_float(part, self.place) for part in self.fields[first:]]
+        if len(values) < least:
+            raise self.place.wrong(f"{len(values)} numbers", f"give {what}")
+        return values
+
+    def whole(self, n: int, what: str) -> int:
+        """A field as a whole number from 1 to LARGEST_NUMBER. Raises SceneError, about `what`."""
+        return read_integer(self.text(n), self.place, what)
+
+    def reference(self, n: int) -> Reference:
+        """What a field points to. Raises SceneError where it is missing."""
+        name = read_name(self.text(n))
+        if not name:
+            raise self.place.wrong("a name is missing", "give the name of a set or surface")
+        return Reference(self.scope, name, self.place)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A keyword and the data lines below it.
+
+    keyword: in capitals, without its star and without blanks: "SOLIDSECTION". parameters: values by names in capitals
+    without blanks; "" for a name without value. place: of the keyword, as it is written. lines: data lines, without
+    comments and empty lines. places: of the data lines. scope: name of the instance to which it belongs, else "".
+    """
+
+    keyword: str
+    parameters: dict[str, str]
+    place: Place
+    lines: list[str] = field(default_factory=list)
+    places: list[tuple[str, int]] = field(default_factory=list)
+    scope: str = ""
+
+    def row(self, line: int) -> Row:
+        """A data line, counted from 0."""
+        fields = [part.strip() for part in self.lines[line].split(",")]
+        while fields and not fields[-1]:
+            fields.pop()
+        return Row(fields, Place(*self.places[line], self.place.keyword), self.scope)
+
+    def rows(self, least: int = 0, what: str = "") -> Iterator[Row]:
+        """The data lines, each with at least so many fields; at least one, unless none is asked for.
+
+        what: the fields. Raises SceneError.
+        """
+        if least and not self.lines:
+            raise self.place.wrong("no data lines", f"give {what} below it")
+        for line in range(len(self.lines)):
+            row = self.row(line)
+            if len(row.fields) < least:
+                raise row.place.wrong(f"{len(row.fields)} entries", f"give {what}")
+            yield row
+
+    def reals(self, line: int, least: int) -> list[float]:
+        """The numbers of a data line that must be there, at least so many. Raises SceneError."""
+        if line >= len(self.lines):
+            raise self.place.wrong("the data line is missing", "give the numbers below it")
+        return self.row(line).reals(0, least, f"{least}")
+
+    def points(self, line: int = 0) -> FloatArray:
+        """Two points or vectors (2, 3) in a data line. Raises SceneError."""
+        return np.array(self.reals(line, 6)[:6]).reshape(2, 3)
+
+    def below(self, thing: _Thing | None, keyword: str) -> _Thing:
+        """What a keyword above this one has begun. Raises SceneError where it has not."""
+        if thing is None:
+            raise self.place.wrong(f"no *{keyword} to which it belongs", f"write *{keyword} above it")
+        return thing
+
+    def name(self, parameter: str) -> str:
+        """The value of a parameter that is a name, in capitals. Raises SceneError where it is missing."""
+        value = read_name(self.parameters.get(parameter, ""))
+        if not value:
+            raise self.place.wrong(f"no {parameter}", f"write {parameter}=... behind the keyword")
+        return value
+
+    def reference(self, parameter: str) -> Reference:
+        """What the name in a parameter points to. Raises SceneError where it is missing."""
+        return Reference(self.scope, self.name(parameter), self.place)
+
+    def value(self, parameter: str) -> str:
+        """Value of a parameter, in capitals without blanks; "" where it is not given."""
+        return "".join(self.parameters.get(parameter, "").split()).upper()
+
+    def chosen(self, parameter: str, known: Iterable[str], default: str) -> str:
+        """The same of a parameter that must be one of the known ones. Raises SceneError."""
+        value = self.value(parameter) or default
+        if value not in known:
+            raise self.place.wrong(f"{parameter}={shown(value)} is not read", f"write {' or '.join(known)}")
+        return value
+
+
+def read_points(block: Block) -> tuple[IntArray, FloatArray]:
+    """Numbers (n,) and coordinates (n, 3) of data lines "number, x, y, z"; coordinates that are missing are 0."""
+    numbers = np.zeros(len(block.lines), dtype=np.int64)
+    coordinates = np.full((len(block.lines), 3), np.nan)
+    for line, text in enumerate(block.lines):
+        try:
+            number, x, y, z = text.split(",")
+            numbers[line], coordinates[line] = int(number), (float(x), float(y), float(z))
+        except (ValueError, OverflowError):
+            pass
+    plain = np.isfinite(coordinates).all(axis=1) & (numbers > 0) & (numbers <= LARGEST_NUMBER)
+    for line in np.flatnonzero(~plain).tolist():
+        row = block.row(line)  # Abaqus: direction of a normal behind the position
+        numbers[line], coordinates[line] = row.whole(0, "a node number"), [row.real(n) for n in (1, 2, 3)]
+    return numbers, coordinates
+
+
+def read_records(block: Block, length: int, what: str) -> IntArray:
+    """Records (n, length) of whole numbers, each from the beginning of a line over one or more lines.
+
+    what: of the record, for the message. Raises SceneError.
+    """
+    values = array("q")
+    started = 0  # numbers of records before the present one
+    for line, text in enumerate(block.lines):
+        try:
+            values.extend(list(map(int, text.rstrip(", \t").split(","))))
+        except (ValueError, OverflowError):
+            _check_whole(block, line)
+        have = len(values) - started
+        if have > length or (line == len(block.lines) - 1 and have < length):
+            raise block.row(line).place.wrong(f"{have} numbers for {what}", f"give {length}")
+        if have == length:
+            started = len(values)
+    records = np.array(values, dtype=np.int64).reshape(-1, length)
+    if records.size and not 0 < records.min() <= records.max() <= LARGEST_NUMBER:
+        for line in range(len(block.lines)):
+            _check_whole(block, line)
+    return records
+
+
+def _check_whole(block: Block, line: int) -> None:
+    for part in block.row(line).fields:
+        read_integer(part, block.row(line).place, "a node or element number")
+
+
+def unit(vector: FloatArray, place: Place, remedy: str) -> FloatArray:
+    """A vector (3,) of unit length. Raises SceneError, which asks for what gives one, where it has none."""
+    length = float(np.linalg.norm(vector))
+    if not 0 < length < np.inf:
+        raise place.wrong("a direction without a length", f"give {remedy}")
+    return np.asarray(vector / length)
+
 
 _OUTPUT = """
 OUTPUT NODEOUTPUT ELEMENTOUTPUT CONTACTOUTPUT ENERGYOUTPUT MODALOUTPUT INTEGRATEDOUTPUT RADIATIONOUTPUT NODEPRINT
@@ -84,6 +275,6 @@ def find_keyword(block: Block, *, any_parameters: bool = False) -> Keyword:
         raise block.place.wrong("this keyword is not read, and may change the model", remedy)
     for name in block.parameters:
         if not (any_parameters or {name, "*"} & known.parameters or name in known.harmless):
-            found = f"{shown(name)} is not read, and may change the model"
-            raise block.place.wrong(found, f"leave {shown(name)} out if the model is right without it")
+            remedy = "leave it out if the model is right without it"
+            raise block.place.wrong(f"{shown(name)} is not read, and may change the model", remedy)
     return known

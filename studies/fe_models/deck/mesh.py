@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block, Reference
 from studies.fe_models.deck.contents import NODES_OF_KIND, ElementBlock, Surface
-from studies.fe_models.deck.sets import NONE, Key, Resolver, SetDefinitions, find_key
-from studies.fe_models.text import LARGEST_NUMBER, FloatArray, IntArray, Place, shown
+from studies.fe_models.deck.keywords import Block, Reference
+from studies.fe_models.deck.sets import NONE, Key, Resolver, Sets, exist, find_key
+from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, shown
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.scene_error import SceneError
 
@@ -40,8 +40,8 @@ class Draft:
     name: str
     nodes: list[Records] = field(default_factory=list)
     elements: list[Records] = field(default_factory=list)
-    node_sets: SetDefinitions = field(default_factory=lambda: SetDefinitions("nodes"))
-    element_sets: SetDefinitions = field(default_factory=lambda: SetDefinitions("elements"))
+    node_sets: Sets = field(default_factory=lambda: Sets("nodes"))
+    element_sets: Sets = field(default_factory=lambda: Sets("elements"))
     surfaces: dict[Key, list[tuple[Reference, int]]] = field(default_factory=dict)
     system: tuple[FloatArray, FloatArray] | None = None
     parts: dict[str, list[Block]] = field(default_factory=dict)
@@ -56,8 +56,8 @@ class Mesh:
     """Nodes, elements, sets and surfaces of a draft under the numbers that they have in the deck.
 
     offsets: what is added to the numbers of every scope. numbers (n,), coordinates (n, 3): of the nodes. blocks: by
-    kind. all_elements, kinds, solid (m,): numbers of all elements, their kinds, and whether these are read. Raises
-    SceneError where numbers or names are missing or do not fit.
+    kind. solid_blocks: those that are read. nodes, elements: of a set or number. Raises SceneError where numbers or
+    names are missing or do not fit.
     """
 
     def __init__(self, draft: Draft) -> None:
@@ -65,15 +65,15 @@ class Mesh:
         self.offsets = _find_offsets(draft)
         self.numbers, self.coordinates = _build_nodes(draft, self.offsets)
         self.blocks = _build_blocks(draft, self.offsets, self.numbers)
-        order = np.concatenate([block.numbers for block in self.blocks] or [NONE])
+        self.solid_blocks = [block for block in self.blocks if block.kind in NODES_OF_KIND]
+        elements = np.concatenate([NONE, *(block.numbers for block in self.blocks)])
         kinds = np.repeat([block.kind for block in self.blocks], [block.numbers.size for block in self.blocks])
-        rows = np.argsort(order)
-        self.all_elements, self.kinds = order[rows], kinds[rows]
-        self.solid = np.isin(self.kinds, list(NODES_OF_KIND))
-        self._elements = Resolver(draft.element_sets, self.all_elements, self.offsets, "EALL")
-        self._nodes = Resolver(draft.node_sets, self.numbers, self.offsets, "NALL", self.nodes_of)
+        order = np.argsort(elements)
+        self._kinds = kinds[order]
+        self.elements = Resolver(draft.element_sets, elements[order], self.offsets, "EALL")
+        self.nodes = Resolver(draft.node_sets, self.numbers, self.offsets, "NALL", self.nodes_of)
         # sets first: their errors are about the lines where they are defined
-        self.element_sets, self.node_sets = self._sets(self._elements), self._sets(self._nodes)
+        self.element_sets, self.node_sets = self._sets(self.elements), self._sets(self.nodes)
         self._faces_left = _MOST_FACES
         self.surfaces: dict[str, Surface] = {}
         for key in draft.surfaces:
@@ -84,37 +84,27 @@ class Mesh:
         """What sets name that does not exist, and which numbers the nodes of later instances have."""
         later = [(name, offset) for name, offset in self.offsets.items() if offset]
         numbering = (f"Node 1 of {name or 'the assembly'} is node {offset + 1}." for name, offset in later)
-        return (*self._nodes.notes, *self._elements.notes, *numbering)
-
-    def nodes(self, reference: Reference) -> IntArray:
-        """The nodes of a set or number, ascending."""
-        return self._nodes.find(reference)
-
-    def elements(self, reference: Reference) -> IntArray:
-        """The elements of a set or number, ascending."""
-        return self._elements.find(reference)
+        return (*self.nodes.notes, *self.elements.notes, *numbering)
 
     def name_of_elements(self, reference: Reference) -> str:
         """Name that a set of elements has in the deck; the number of a single one."""
-        sets = self.draft.element_sets.items
-        key = find_key(sets, self.offsets, reference)
-        return reference.target if key is None else self._names(key, sets)[0]
+        key = self.elements.key(reference)
+        return reference.target if key is None else self._names(key, self.draft.element_sets.items)[0]
 
     def node(self, reference: Reference) -> int:
         """A node, or the only one of a set."""
-        found = self._nodes.find(reference)
+        found = self.nodes(reference)
         if found.size != 1:
-            what = f"{shown(reference.target)} has {found.size} nodes"
-            raise reference.place.wrong(what, "give one reference node that exists")
+            raise reference.place.wrong(f"{shown(reference.target)} has {found.size} nodes", "give one that exists")
         return int(found[0])
 
     def ordered(self, reference: Reference) -> IntArray:
         """Nodes of a set or number in the order that counts in equations."""
-        found, sets = self._nodes.find(reference), self.draft.node_sets
-        unsorted = found.size > 1 and find_key(sets.items, self.offsets, reference) in sets.unsorted
+        found = self.nodes(reference)
+        unsorted = found.size > 1 and self.nodes.key(reference) in self.draft.node_sets.unsorted
         if unsorted or not found.size:
-            found_wrong = f"the set {shown(reference.target)} " + ("is UNSORTED" if unsorted else "has no node")
-            raise reference.place.wrong(found_wrong, "give nodes that exist, one by one")
+            what = f"the set {shown(reference.target)} is UNSORTED, or has no node"
+            raise reference.place.wrong(what, "give nodes that exist, one by one")
         return found
 
     def surface(self, reference: Reference) -> str:
@@ -128,22 +118,22 @@ class Mesh:
         """Nodes of a surface."""
         surface = self.surfaces[name]
         found = [surface.nodes]
-        for block in self.blocks:
-            if block.kind in NODES_OF_KIND:
-                for face, local in enumerate(ELEMENT_KINDS[block.kind].faces, 1):
-                    own = surface.elements[surface.faces == face]
-                    found.append(block.nodes[np.isin(block.numbers, own)][:, local].ravel())
+        for block in self.solid_blocks:
+            for face, local in enumerate(ELEMENT_KINDS[block.kind].faces, 1):
+                own = surface.elements[surface.faces == face]
+                found.append(block.nodes[np.isin(block.numbers, own)][:, local].ravel())
         return np.unique(np.concatenate(found))
 
     def nodes_of(self, reference: Reference) -> IntArray:
         """Nodes of a set of elements."""
-        elements = self._elements.find(reference)
+        elements = self.elements(reference)
         found = [block.nodes[np.isin(block.numbers, elements)].ravel() for block in self.blocks]
         return np.unique(np.concatenate([NONE, *found]))
 
     def other_kinds(self, elements: IntArray) -> list[str]:
         """Kinds of those elements (m,) that are not read."""
-        return sorted(set(self.kinds[np.isin(self.all_elements, elements) & ~self.solid].tolist()))
+        others = [block for block in self.blocks if block.kind not in NODES_OF_KIND]
+        return sorted(block.kind for block in others if np.isin(elements, block.numbers).any())
 
     def placed(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
         """Points or vectors (n, 3) of an instance where the instance stands."""
@@ -164,20 +154,18 @@ class Mesh:
     def _surface(self, key: Key) -> Surface:
         parts = self.draft.surfaces[key]
         if not parts or parts[0][1] == 0:
-            nodes = np.concatenate([NONE, *(self._nodes.find(reference) for reference, _ in parts)])
+            nodes = np.concatenate([NONE, *(self.nodes(reference) for reference, _ in parts)])
             return Surface(NONE, NONE, np.unique(nodes))
-        n_faces = {kind: len(each.corner_faces) for kind, each in ELEMENT_KINDS.items()}
         found: list[IntArray] = []
         for reference, face in parts:
-            members = self._elements.find(reference)
+            members = self.elements(reference)
             self._faces_left -= members.size
             if self._faces_left < 0:
                 raise reference.place.wrong(f"more than {_MOST_FACES} faces", "remove surfaces that are not used")
-            kinds = self.kinds[np.searchsorted(self.all_elements, members)]
-            for kind in set(kinds.tolist()):
-                if n_faces.get(kind, 0) < face:
-                    what = f"elements of {shown(reference.target)} have no face S{face}: they are {kind}"
-                    raise reference.place.wrong(what, "give another, of a solid element")
+            for kind in set(self._kinds[np.searchsorted(self.elements.existing, members)].tolist()):
+                if kind not in ELEMENT_KINDS or len(ELEMENT_KINDS[kind].corner_faces) < face:
+                    what = f"elements of {shown(reference.target)} have no face S{face}"
+                    raise reference.place.wrong(what, f"give one of a solid element, not of {kind}")
             found.append(np.stack((members, np.full(members.size, face)), axis=1))
         both = np.unique(np.concatenate(found), axis=0)
         return Surface(both[:, 0].copy(), both[:, 1].copy(), NONE)
@@ -228,7 +216,7 @@ def _build_blocks(draft: Draft, offsets: Mapping[str, int], nodes: IntArray) -> 
     kinds: dict[str, list[tuple[IntArray, IntArray]]] = {}
     for each in draft.elements:
         used = each.values.astype(np.int64) + offsets[each.scope]
-        missing = nodes[np.minimum(np.searchsorted(nodes, used), nodes.size - 1)] != used
+        missing = ~exist(used, nodes)
         if missing.any():
             row, column = np.argwhere(missing)[0]
             found = f"element {each.numbers[row]} has the node {each.values[row, column]}, which does not exist"
@@ -239,7 +227,7 @@ def _build_blocks(draft: Draft, offsets: Mapping[str, int], nodes: IntArray) -> 
         numbers, used = (np.concatenate(each) for each in zip(*parts, strict=True))
         order = np.argsort(numbers, kind="stable")
         blocks.append(ElementBlock(kind, numbers[order], used[order]))
-    numbers = np.sort(np.concatenate([block.numbers for block in blocks] or [NONE]))
+    numbers = np.sort(np.concatenate([NONE, *(block.numbers for block in blocks)]))
     again = numbers[1:][numbers[1:] == numbers[:-1]]
     if again.size:
         place = _place_of(draft.elements, offsets, again[0])

@@ -7,21 +7,21 @@ from itertools import product
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block, Reference, Row, read_points, read_records
 from studies.fe_models.deck.contents import NODES_OF_KIND
-from studies.fe_models.deck.keywords import KEYWORDS, find_keyword, keyword
-from studies.fe_models.deck.mesh import Draft, Records
-from studies.fe_models.deck.sets import NONE, NodesOf, Numbers, Resolver, SetDefinitions
-from studies.fe_models.text import (
-    LARGEST_NUMBER,
-    FloatArray,
-    IntArray,
-    Place,
-    is_integer,
-    read_integer,
-    shown,
+from studies.fe_models.deck.keywords import (
+    KEYWORDS,
+    Block,
+    Reference,
+    Row,
+    find_keyword,
+    keyword,
+    read_points,
+    read_records,
     unit,
 )
+from studies.fe_models.deck.mesh import Draft, Records
+from studies.fe_models.deck.sets import NONE, Numbers, Resolver
+from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, is_integer, read_integer, shown
 from studies.finite_element.cut_faces import turn_about
 
 OTHER_KINDS = {
@@ -56,14 +56,9 @@ def _part(draft: Draft, block: Block) -> None:
     draft.part, draft.parts[name] = name, []
 
 
-@keyword("ENDPART", of_mesh=True)
-def _end_part(draft: Draft, _block: Block) -> None:
-    draft.part = ""
-
-
-@keyword("ENDINSTANCE", of_mesh=True)
-def _end_instance(draft: Draft, _block: Block) -> None:
-    draft.scope, draft.system = "", None
+@keyword("ENDPART ENDINSTANCE", of_mesh=True)
+def _end(draft: Draft, _block: Block) -> None:
+    draft.part, draft.scope, draft.system = "", "", None
 
 
 @keyword("INSTANCE", "NAME PART NSET ELSET", of_mesh=True)
@@ -71,8 +66,8 @@ def _instance(draft: Draft, block: Block) -> None:
     """The mesh of a part, shifted and turned; sets of the assembly with all of the instance."""
     name, part = block.name("NAME"), block.name("PART")
     if part not in draft.parts or draft.part or draft.scope or name in draft.placed:
-        found = f"{shown(name)} of {shown(part)}, which is no part, or again"
-        raise block.place.wrong(found, "give *PART above it, and each instance once")
+        what = f"{shown(name)} of {shown(part)}, which is no part, or again"
+        raise block.place.wrong(what, "give *PART above it, and each instance once")
     draft.placed[name] = _placement(block)
     draft.scope, draft.system = name, None
     for each in draft.parts[part]:
@@ -85,13 +80,13 @@ def _instance(draft: Draft, block: Block) -> None:
 @keyword("NODE", "NSET SYSTEM INPUT", of_mesh=True)
 def _node(draft: Draft, block: Block) -> None:
     """Number, x, y, z, in the coordinates of *SYSTEM."""
-    if block.chosen("SYSTEM", ("R", "C", "S"), "R") != "R":
+    if block.value("SYSTEM") not in ("", "R"):
         raise block.place.wrong("nodes in cylindrical or spherical coordinates", "give them in Cartesian ones")
     numbers, coordinates = read_points(block)
     if draft.system is not None:
         origin, axes = draft.system
         coordinates = coordinates @ axes + origin
-    _add(draft, block, Records(block.scope, numbers, coordinates, block.place), "NSET")
+    _add(draft, block, numbers, coordinates)
 
 
 @keyword("SYSTEM", of_mesh=True)
@@ -117,29 +112,21 @@ def _element(draft: Draft, block: Block) -> None:
     kind = block.name("TYPE")
     length = NODES_OF_KIND.get(kind) or OTHER_KINDS.get(kind)
     if length is None:
-        remedy = f"mesh the model with {', '.join(NODES_OF_KIND)}, and remove elements that carry nothing"
+        remedy = f"mesh with {', '.join(NODES_OF_KIND)}, and remove elements that carry nothing"
         raise block.place.wrong(f"elements of type {shown(kind)}", remedy)
     records = read_records(block, length + 1, f"a {kind} of {length} nodes with its number")
-    _add(draft, block, Records(block.scope, records[:, 0], records[:, 1:], block.place, kind), "ELSET")
+    _add(draft, block, records[:, 0], records[:, 1:], kind=kind)
 
 
 @keyword("NSET", "NSET ELSET GENERATE INSTANCE INPUT UNSORTED", "INTERNAL", of_mesh=True)
-def _nset(draft: Draft, block: Block) -> None:
-    """Numbers, ranges, other sets, or the nodes of a set of elements."""
-    _read_set(draft, draft.node_sets, block, "NSET")
-    if "ELSET" in block.parameters:
-        draft.node_sets.add((block.scope, block.name("NSET")), NodesOf(block.reference("ELSET")))
-
-
 @keyword("ELSET", "ELSET GENERATE INSTANCE INPUT UNSORTED", "INTERNAL", of_mesh=True)
-def _elset(draft: Draft, block: Block) -> None:
-    _read_set(draft, draft.element_sets, block, "ELSET")
-
-
-def _read_set(draft: Draft, sets: SetDefinitions, block: Block, parameter: str) -> None:
-    """Members of a set; INSTANCE may say whose numbers they are."""
-    key = block.scope, block.name(parameter)
+def _set(draft: Draft, block: Block) -> None:
+    """Numbers, ranges, other sets, or the nodes of a set of elements; INSTANCE may say whose numbers they are."""
+    sets = draft.node_sets if block.keyword == "NSET" else draft.element_sets
+    key = block.scope, block.name(block.keyword)
     sets.add(key)
+    if block.keyword == "NSET" and "ELSET" in block.parameters:
+        sets.add(key, replace(block.reference("ELSET"), of_elements=True))
     if "UNSORTED" in block.parameters:
         sets.unsorted.add(key)
     if "INSTANCE" in block.parameters:
@@ -168,8 +155,7 @@ def _range(row: Row) -> Numbers:
     step = row.text(2) or ("-1" if last < first else "1")
     size = read_integer(step.lstrip("-"), row.place)
     if first != last and step.startswith("-") != (last < first):
-        found = f"from {first} to {last} in steps of {step} below GENERATE"
-        raise row.place.wrong(found, "give a step that leads from the first to the last number")
+        raise row.place.wrong(f"from {first} to {last} in steps of {step}", "give a step that leads to the last number")
     return Numbers(row.scope, np.array([first, last]), size)
 
 
@@ -214,13 +200,13 @@ def _fill(
     """Nodes between those of two sets, at equal distances on straight lines."""
     first, last = ends
     if len(first) != len(last) or n_intervals < 1 or n_intervals * len(first) > _MOST_MADE:
-        found = f"{n_intervals} intervals between {len(first)} and {len(last)} nodes"
-        raise place.wrong(found, f"give as many nodes at both ends, and at most {_MOST_MADE} between them")
+        what = f"{n_intervals} intervals between {len(first)} and {len(last)} nodes"
+        raise place.wrong(what, f"give as many nodes at both ends, and at most {_MOST_MADE} between them")
     numbers = (first[:, None] + step * np.arange(1, n_intervals)).ravel()
     start, end = _coordinates(draft, block, first), _coordinates(draft, block, last)
     share = np.linspace(0.0, 1.0, n_intervals + 1)[1:-1, None]
     points = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3)
-    _add(draft, block, Records(block.scope, numbers, points, block.place), "NSET", np.concatenate(ends))
+    _add(draft, block, numbers, points, more=np.concatenate(ends))
 
 
 @keyword("NCOPY", "CHANGENUMBER OLDSET NEWSET SHIFT", of_mesh=True)
@@ -231,7 +217,7 @@ def _ncopy(draft: Draft, block: Block) -> None:
     (change,) = _whole_numbers([block.parameters.get("CHANGENUMBER", "")], block.place, (0,))
     numbers, (shift, turn) = _members(draft, block.reference("OLDSET")), _placement(block)
     points = _coordinates(draft, block, numbers) @ turn.T + shift
-    _add(draft, block, Records(block.scope, numbers + change, points, block.place), "NEWSET")
+    _add(draft, block, numbers + change, points)
 
 
 @keyword("ELGEN", "ELSET", of_mesh=True)
@@ -243,7 +229,7 @@ def _elgen(draft: Draft, block: Block) -> None:
         if np.prod([float(n) for n in counts]) > _MOST_MADE:
             raise row.place.wrong(f"more than {_MOST_MADE} elements", "give smaller numbers")
         steps = np.array(list(product(*(range(n) for n in counts))), dtype=np.int64).reshape(-1, 3)[1:]
-        _copy_elements(draft, block, np.array([master]), steps @ of_elements, steps @ of_nodes, "ELSET")
+        _copy_elements(draft, block, np.array([master]), steps @ of_elements, steps @ of_nodes)
 
 
 @keyword("ELCOPY", "ELEMENTSHIFT SHIFTNODES OLDSET NEWSET", of_mesh=True)
@@ -251,8 +237,8 @@ def _elcopy(draft: Draft, block: Block) -> None:
     """The elements of a set again, with larger numbers of elements and nodes."""
     given = [block.parameters.get(name, "") for name in ("ELEMENTSHIFT", "SHIFTNODES")]
     by_element, by_node = (np.array(_whole_numbers([text], block.place, (0,))) for text in given)
-    own = _find(draft.elements, draft.element_sets, block.reference("OLDSET"), "EALL")
-    _copy_elements(draft, block, own, by_element, by_node, "NEWSET")
+    own = _members(draft, block.reference("OLDSET"), of_elements=True)
+    _copy_elements(draft, block, own, by_element, by_node)
 
 
 def _placement(block: Block) -> tuple[FloatArray, FloatArray]:
@@ -273,23 +259,18 @@ def _whole_numbers(fields: list[str], place: Place, default: tuple[int, ...]) ->
     values = list(default)
     for at, text in enumerate(fields):
         if at >= len(values) or (text and not (is_integer(text) and 0 < abs(int(text)) <= LARGEST_NUMBER)):
-            remedy = f"give at most {len(values)} whole numbers, none of them 0"
-            raise place.wrong(f"{shown(text)!r} in place of a number", remedy)
+            raise place.wrong(f"{shown(text)!r} in place of a number", f"give {len(values)} whole ones, none of them 0")
         values[at] = int(text) if text else values[at]
     return values
 
 
-def _find(records: list[Records], sets: SetDefinitions, reference: Reference, everything: str) -> IntArray:
-    """Numbers (m,) of a set of the same scope, as far as the deck is read. Raises SceneError."""
-    known = np.concatenate([NONE, *(each.numbers for each in records if each.scope == reference.scope)])
-    return Resolver(sets, np.unique(known), {reference.scope: 0}, everything).find(reference)
-
-
-def _members(draft: Draft, reference: Reference) -> IntArray:
-    """Nodes (m,) of a set, by number. Raises SceneError."""
-    if (reference.scope, reference.target) in draft.node_sets.unsorted:
+def _members(draft: Draft, reference: Reference, *, of_elements: bool = False) -> IntArray:
+    """Nodes, or elements, (m,) of a set of the same scope by number, as far as the deck is read. Raises SceneError."""
+    records, sets = (draft.elements, draft.element_sets) if of_elements else (draft.nodes, draft.node_sets)
+    if (reference.scope, reference.target) in sets.unsorted and not of_elements:
         raise reference.place.wrong(f"the set {reference.target} is UNSORTED", "give sets by ascending numbers here")
-    return _find(draft.nodes, draft.node_sets, reference, "NALL")
+    known = np.concatenate([NONE, *(each.numbers for each in records if each.scope == reference.scope)])
+    return Resolver(sets, np.unique(known), {reference.scope: 0}, "EALL" if of_elements else "NALL")(reference)
 
 
 def _coordinates(draft: Draft, block: Block, wanted: IntArray) -> FloatArray:
@@ -303,21 +284,20 @@ def _coordinates(draft: Draft, block: Block, wanted: IntArray) -> FloatArray:
     return np.concatenate([each.values for each in own])[order[np.searchsorted(numbers[order], wanted)]]
 
 
-def _add(draft: Draft, block: Block, made: Records, parameter: str, more: IntArray = NONE) -> None:
+def _add(
+    draft: Draft, block: Block, numbers: IntArray, values: FloatArray | IntArray, kind: str = "", more: IntArray = NONE
+) -> None:
     """Nodes, or elements, which have a kind; the set that a parameter names has them, and `more`."""
-    whole = np.append(made.numbers, made.values) if made.kind else made.numbers
+    whole = np.append(numbers, values) if kind else numbers
     if whole.size and not 0 < whole.min() <= whole.max() <= LARGEST_NUMBER:
         raise block.place.wrong(f"numbers beyond 1 to {LARGEST_NUMBER}", "give smaller steps")
-    records, sets = (draft.elements, draft.element_sets) if made.kind else (draft.nodes, draft.node_sets)
-    records.append(made)
-    if parameter in block.parameters:
-        members = Numbers(block.scope, np.concatenate([made.numbers, more]))
-        sets.add((block.scope, block.name(parameter)), members)
+    records, sets = (draft.elements, draft.element_sets) if kind else (draft.nodes, draft.node_sets)
+    records.append(Records(block.scope, numbers, values, block.place, kind))
+    for parameter in block.parameters.keys() & {"NSET", "ELSET", "NEWSET"}:
+        sets.add((block.scope, block.name(parameter)), Numbers(block.scope, np.concatenate([numbers, more])))
 
 
-def _copy_elements(
-    draft: Draft, block: Block, own: IntArray, by_element: IntArray, by_node: IntArray, parameter: str
-) -> None:
+def _copy_elements(draft: Draft, block: Block, own: IntArray, by_element: IntArray, by_node: IntArray) -> None:
     """Elements with numbers and nodes shifted by steps (m,), (m,), once for each step."""
     if own.size * by_element.size > _MOST_MADE:
         raise block.place.wrong(f"more than {_MOST_MADE} elements", "give smaller numbers")
@@ -326,8 +306,7 @@ def _copy_elements(
         rows = np.flatnonzero(np.isin(each.numbers, own))
         numbers = (each.numbers[rows] + by_element[:, None]).ravel()
         nodes = (each.values[rows] + by_node[:, None, None]).reshape(-1, each.values.shape[1]).astype(np.int64)
-        made = Records(block.scope, numbers, nodes, block.place, each.kind)
-        _add(draft, block, made, parameter, each.numbers[rows])
+        _add(draft, block, numbers, nodes, each.kind, each.numbers[rows])
         done += rows.size
     if done < own.size or not own.size:
         raise block.place.wrong("an element that does not exist", "define it above this line")

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block
 from studies.fe_models.deck.contents import (
     NODES_OF_KIND,
     CyclicSymmetry,
     Deck,
     ElementBlock,
     Material,
-    Section,
     Surface,
     SurfacePair,
 )
+from studies.fe_models.deck.keywords import Block
 from studies.fe_models.deck.mesh import Draft, Mesh, Records
 from studies.fe_models.deck.sets import NONE, Numbers
-from studies.fe_models.text import FloatArray, IntArray, Place, shown
+from studies.fe_models.files import FloatArray, IntArray, Place, shown
 from studies.scene_error import SceneError
 
 _SAME_AXIS = 1e-6  # distance of two axes over the distance of the points that give them
@@ -90,6 +89,11 @@ class Model:
         """Entries of a field."""
         return [item for items in self.fields.get(name, {}).values() for item in items]
 
+    def check_coupling(self) -> None:
+        """Raises SceneError where a coupling does not say what it couples."""
+        if self.coupling is not None:
+            raise self.coupling.place.wrong("no *KINEMATIC below it", "write it there, or remove the coupling")
+
     def end_step(self) -> None:
         """Of a step that writes matrices nothing stays, of one that is not static no load."""
         step, self.step = self.step, None
@@ -105,17 +109,20 @@ class Model:
 
     def deck(self) -> Deck:
         """The deck. Raises SceneError where names are missing or do not fit."""
-        mesh = self.mesh
-        gone = NONE
+        self.check_coupling()
+        mesh, gone = self.mesh, NONE
         for removed, elements, _ in self.get("removed"):
             gone = np.union1d(gone, elements) if removed else np.setdiff1d(gone, elements)
-        solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.blocks if block.kind in NODES_OF_KIND]
+        solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.solid_blocks]
         faces = {name: (surface, ~np.isin(surface.elements, gone)) for name, surface in mesh.surfaces.items()}
-        kept = np.setdiff1d(mesh.all_elements[mesh.solid], gone)
+        kept = np.setdiff1d(np.concatenate([NONE, *(block.numbers for block in mesh.solid_blocks)]), gone)
         names = ("boundaries", "transforms", "equations", "rigid_motions", "forces", "pressures")
         fields: dict[str, Any] = {name: tuple(self.get(name)) for name in names}
         loads = [load for load in self.get("centrifugal") if np.isin(load.elements, kept).any() or not kept.size]
         changes = [text for taken, _, text in (*self.get("removed"), *self.get("apart")) if taken]
+        for section, place in self.get("sections"):
+            if section.material not in self.materials:
+                raise place.wrong(f"there is no material {shown(section.material)}", "define it with *MATERIAL")
         ties, named = self.get("ties"), [name for _, name, *_ in self.get("cyclic") if name]
         cut = [pair for name, cyclic, pair in ties if cyclic and (not named or name in named)]
         return Deck(
@@ -135,7 +142,7 @@ class Model:
             cyclic=self._cyclic(),
             cut_faces=tuple((pair.dependent, pair.independent) for pair in cut),
             materials={name: self._material(each) for name, each in self.materials.items()},
-            sections=tuple(self._sections()),
+            sections=tuple(section for section, _ in self.get("sections")),
             centrifugal=tuple(loads),
             gravity=self._gravity(kept),
             n_instances=len(mesh.draft.placed),
@@ -154,12 +161,6 @@ class Model:
             if each.kind not in NODES_OF_KIND and not np.isin(own, carry).all():
                 yield f"{each.place} of type {each.kind} without a section"
 
-    def _sections(self) -> Iterator[Section]:
-        for section, place in self.get("sections"):
-            if section.material not in self.materials:
-                raise place.wrong(f"there is no material {shown(section.material)}", "define it with *MATERIAL")
-            yield section
-
     def _gravity(self, kept: IntArray) -> FloatArray | None:
         total = None
         for elements, acceleration, place in self.get("gravity"):
@@ -173,9 +174,8 @@ class Model:
         given, thermal = self.get("temperatures"), self.thermal
         if thermal.keys() >= {"TEMPERATURE", "EXPANSION"}:
             raise thermal["TEMPERATURE"].wrong("it strains materials with *EXPANSION", "remove one of them")
-        solid = [each.nodes.ravel() for each in self.mesh.blocks if each.kind in NODES_OF_KIND]
         warm = np.concatenate([NONE, *(nodes for nodes, _ in given)])
-        everywhere = np.isin(np.concatenate([NONE, *solid]), warm).all() and "TEMPERATURE" not in thermal
+        everywhere = "TEMPERATURE" not in thermal and all(np.isin(b.nodes, warm).all() for b in self.mesh.solid_blocks)
         values = {value for _, value in given} if everywhere else set()
         problem, found = material.problem, list[float | None]()
         for name, column, n_values in (("ELASTIC", 0, 2), ("ELASTIC", 1, 2), ("DENSITY", 0, 1)):
@@ -197,13 +197,11 @@ class Model:
         fits: dict[frozenset[str], tuple[str, float | None]] = {}
         for names, value, place in self.get("fits"):
             if frozenset(names) not in {frozenset(each) for each, *_ in pairs}:
-                found = f"there is no contact pair of {names[0]} and {names[1]}"
-                raise place.wrong(found, "give the surfaces of a *CONTACT PAIR")
+                raise place.wrong(f"no contact pair of {names[0]} and {names[1]}", "give those of a *CONTACT PAIR")
             fits[frozenset(names)] = str(place) + ("" if value is None else f" of {value:g}"), value
         for names, interaction, glued, adjusted, place in pairs:
             if interaction and interaction not in self.interactions:
-                found = f"there is no interaction {shown(interaction)}"
-                raise place.wrong(found, "define it with *SURFACE INTERACTION")
+                raise place.wrong(f"there is no interaction {shown(interaction)}", "define *SURFACE INTERACTION")
             law = self.interactions.get(interaction, Interaction())
             if frozenset(names) not in apart:
                 (one, other), (fitted, clearance) = names, fits.get(frozenset(names), ("", None))
@@ -221,29 +219,28 @@ class Model:
             own = (first.axis[1] - first.axis[0]) / np.linalg.norm(first.axis[1] - first.axis[0])
             apart = np.cross(axis - first.axis[0], own) / np.linalg.norm(axis[1] - axis[0])
             if number != first.n_sectors or np.abs(apart).max() > _SAME_AXIS or (axis[1] - axis[0]) @ own < 0:
-                found = f"{number} sectors, another one has {first.n_sectors}, or about other axes"
-                raise place.wrong(found, "give all of them one N and one axis: several stages are not supported")
+                what = f"{number} sectors, another one has {first.n_sectors}, or about other axes"
+                raise place.wrong(what, "give all of them one N and one axis: several stages are not supported")
         return first
 
 
 def deck_of_arrays(
     name: str,
     nodes: tuple[IntArray, FloatArray],
-    blocks: Mapping[str, tuple[IntArray, IntArray]],
-    node_sets: Mapping[str, IntArray],
-    element_sets: Mapping[str, IntArray],
+    blocks: Sequence[tuple[str, IntArray, IntArray]],
+    node_sets: Iterable[tuple[str, IntArray]],
+    element_sets: Iterable[tuple[str, IntArray]],
 ) -> Deck:
-    """A deck of node numbers (n,) with coordinates (n, 3), and numbers and nodes of elements by kind.
+    """A deck of node numbers (n,) with coordinates (n, 3), kind, numbers and nodes of elements, and parts of sets.
 
     Raises SceneError where numbers do not fit, or there are no elements.
     """
     place = Place(name, 1)
     if not blocks or not np.isfinite(nodes[1]).all():
-        found = f"{name}: a coordinate is not a finite number" if blocks else f"{name} has no solid elements"
-        raise SceneError("model", found, "write the volumes of the mesh again")
+        raise SceneError("model", f"{name} has no solid elements, or coordinates that are infinite", "write it again")
     draft = Draft(name, [Records("", *nodes, place)])
-    draft.elements += [Records("", numbers, own, place, kind) for kind, (numbers, own) in blocks.items()]
+    draft.elements += [Records("", numbers, own, place, kind) for kind, numbers, own in blocks]
     for sets, given in ((draft.node_sets, node_sets), (draft.element_sets, element_sets)):
-        for key, members in given.items():
-            sets.add(("", key.strip().upper()), Numbers("", members))
+        for key, members in given:
+            sets.add(("", key.strip().upper()), Numbers("", np.asarray(members, dtype=np.int64)))
     return Model(Mesh(draft)).deck()

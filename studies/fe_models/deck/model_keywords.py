@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block, Row
 from studies.fe_models.deck.contents import Equation, RigidMotion, Section, Transform
-from studies.fe_models.deck.keywords import keyword
+from studies.fe_models.deck.keywords import Block, Row, keyword, unit
 from studies.fe_models.deck.model import MaterialRows, Model
-from studies.fe_models.text import IntArray, Place, is_integer, shown
+from studies.fe_models.files import IntArray, Place, is_integer, shown
 
 _ALL = (1, 2, 3)
 
@@ -22,16 +21,12 @@ def _material(model: Model, block: Block) -> None:
 
 
 def _of_material(model: Model, block: Block) -> MaterialRows:
-    """The material of a keyword, which is given once: programs differ in which of two they take.
-
-    The same lines serve several instances.
-    """
-    if model.material is None:
-        raise block.place.wrong("no material", "write *MATERIAL, NAME=... above it")
-    before = model.material.places.setdefault(block.keyword, block.place)
-    if before != block.place:
+    """The material of a keyword, which is given once: programs differ in which of two they take."""
+    material = block.below(model.material, "MATERIAL, NAME=...")
+    before = material.places.setdefault(block.keyword, block.place)
+    if before != block.place:  # the same lines serve several instances
         raise block.place.wrong(f"one material again (before: {before})", "give each material once")
-    return model.material
+    return material
 
 
 @keyword("ELASTIC", "TYPE DEPENDENCIES", "MODULI")
@@ -45,8 +40,8 @@ def _elastic(model: Model, block: Block) -> None:
     material.rows["ELASTIC"] = [block.reals(line, 2) for line in range(max(len(block.lines), 1))]
     for young, poisson, *_ in material.rows["ELASTIC"]:
         if not young > 0 or not -1 < poisson < 0.5:
-            found = f"Young's modulus {young:g} and Poisson's ratio {poisson:g}"
-            raise block.place.wrong(found, "give a positive modulus, and a ratio between -1 and 0.5")
+            what = f"Young's modulus {young:g} and Poisson's ratio {poisson:g}"
+            raise block.place.wrong(what, "give a positive modulus, and a ratio between -1 and 0.5")
 
 
 @keyword("DENSITY")
@@ -88,8 +83,7 @@ def _initial_conditions(model: Model, block: Block) -> None:
         model.skip(block)
         return
     if kind != "TEMPERATURE":
-        remedy = "remove it: the prestress is that of the rotation"
-        raise block.place.wrong(f"TYPE={shown(kind)} is not read", remedy)
+        raise block.place.wrong(f"TYPE={shown(kind)} is not read", "remove it: the prestress is that of the rotation")
     for row in block.rows(2, "set of nodes and temperature"):
         model.add("temperatures", (model.mesh.nodes(row.reference(0)), row.real(1)))
 
@@ -106,10 +100,9 @@ def _thermal(model: Model, block: Block) -> None:
 def _transform(model: Model, block: Block) -> None:
     """Directions of the displacements of nodes."""
     kind = block.chosen("TYPE", ("R", "C"), "R")
-    points = np.array(block.reals(0, 6)[:6]).reshape(2, 3)
+    points = block.points()
     spans = points[1] - points[0] if kind == "C" else np.cross(points[0], points[1])
-    if not 0 < np.linalg.norm(spans) < np.inf:
-        raise block.place.wrong("points on one line", "give points that are apart")
+    unit(spans, block.place, "points that are apart")
     placed = model.mesh.placed(block.scope, points, vectors=kind == "R")
     nodes = model.mesh.nodes(block.reference("NSET"))
     model.add("transforms", Transform(str(block.place), nodes, kind == "C", placed))
@@ -119,23 +112,18 @@ def _transform(model: Model, block: Block) -> None:
 def _equation(model: Model, block: Block) -> None:
     """The number of terms, then node or set, dof and coefficient of each; or REMOVE ALL in a step."""
     if "REMOVEALL" in block.parameters or "REMOVE" in block.parameters:
-        if model.step is None or "REMOVE" in block.parameters:
-            remedy = "write REMOVE ALL in the step that writes matrices"
-            raise block.place.wrong("REMOVE of some equations is not read", remedy)
-        model.step.writes = True
+        if "REMOVE" in block.parameters:
+            raise block.place.wrong("REMOVE of some equations is not read", "write REMOVE ALL, in a step with matrices")
+        block.below(model.step, "STEP").writes = True
         return
-    line = 0
-    while line < len(block.lines):
-        head = block.row(line)
-        n_terms, line = head.whole(0, "the number of terms"), line + 1
-        fields: list[str] = []
-        while len(fields) < 3 * n_terms and line < len(block.lines):
-            more = block.row(line).fields
-            fields += more + [""] * (-len(more) % 3)
-            line += 1
+    rows = block.rows()
+    for head in rows:
+        n_terms, fields = head.whole(0, "the number of terms"), list[str]()
+        while len(fields) < 3 * n_terms and (more := next(rows, None)) is not None:
+            fields += more.fields + [""] * (-len(more.fields) % 3)
         if len(fields) != 3 * n_terms:
-            found = f"{len(fields)} entries for {n_terms} terms"
-            raise head.place.wrong(found, "give node, dof and coefficient of each")
+            what = f"{len(fields)} entries for {n_terms} terms"
+            raise head.place.wrong(what, "give node, dof and coefficient of each")
         terms = [Row(fields[at : at + 3], head.place, block.scope) for at in range(0, len(fields), 3)]
         model.add("equations", *_equations(model, terms, head.place))
 
@@ -148,8 +136,7 @@ def _equations(model: Model, terms: list[Row], place: Place) -> Iterator[Equatio
         raise place.wrong("the first coefficient is 0", "give a first term that depends on the others")
     count = max(map(len, nodes))
     if len(nodes[0]) != count or any(len(each) not in (1, count) for each in nodes):
-        found = f"sets of {' and '.join(str(len(each)) for each in nodes)} nodes"
-        raise place.wrong(found, "give sets of as many nodes as the first one, or one node")
+        raise place.wrong("sets of different sizes", "give sets of as many nodes as the first one, or one node")
     for row in range(count):
         own = np.array([each[min(row, len(each) - 1)] for each in nodes])
         yield Equation(str(place), own, dofs, values)
@@ -171,14 +158,13 @@ def _mpc(model: Model, block: Block) -> None:
     for row in block.rows(1, "type and nodes"):
         kind = row.text(0).upper()
         if kind not in ("TIE", "PIN", "BEAM") or len(row.fields) != 3:
-            remedy = "write TIE, PIN or BEAM and two nodes or sets, or *EQUATION"
-            raise row.place.wrong(f"{shown(kind)} of {len(row.fields) - 1} nodes is not read", remedy)
+            what = f"{shown(kind)} of {len(row.fields) - 1} nodes is not read"
+            raise row.place.wrong(what, "write TIE, PIN or BEAM and two nodes or sets, or *EQUATION")
         if kind == "BEAM":
             model.notes.append(f"{row.place} BEAM is rigid, as in Abaqus.")
         first, second = (model.mesh.ordered(row.reference(n)) for n in (1, 2))
         if len(second) not in (1, len(first)):
-            found = f"{len(first)} and {len(second)} nodes"
-            raise row.place.wrong(found, "give sets of as many nodes, or one node for all")
+            raise row.place.wrong(f"{len(first)} and {len(second)} nodes", "give as many nodes, or one node for all")
         # a node or set that follows a node, or the nodes of a set in their order
         parts = [first] if len(second) == 1 else np.split(first, len(first))
         for nodes, reference in zip(parts, second, strict=True):
@@ -199,15 +185,14 @@ def _rigid_body(model: Model, block: Block) -> None:
 @keyword("COUPLING", "REFNODE SURFACE", "CONSTRAINTNAME")
 def _coupling(model: Model, block: Block) -> None:
     """A reference node and a surface; *KINEMATIC below it says what is coupled."""
+    model.check_coupling()
     model.coupling = block
 
 
 @keyword("KINEMATIC")
 def _kinematic(model: Model, block: Block) -> None:
     """Dofs of the surface of *COUPLING that follow its reference node; all of them without data."""
-    head, model.coupling = model.coupling, None
-    if head is None:
-        raise block.place.wrong("no *COUPLING above it", "write it below its *COUPLING")
+    head, model.coupling = block.below(model.coupling, "COUPLING"), None
     lines = [_dofs(row.fields, row.place) for row in block.rows()]
     following = tuple(dof for dof in _ALL if not lines or any(dof in dofs for dofs in lines))
     nodes = model.mesh.surface_nodes(model.mesh.surface(head.reference("SURFACE")))

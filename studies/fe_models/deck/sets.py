@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Reference
-from studies.fe_models.text import IntArray, Place, is_integer, read_integer, shown
+from studies.fe_models.deck.keywords import Reference
+from studies.fe_models.files import BoolArray, IntArray, Place, is_integer, read_integer, shown
 
-_DEEPEST = 100
 NONE = np.empty(0, dtype=np.int64)
 """No numbers."""
+
+_DEEPEST = 100  # sets within sets
 
 Key = tuple[str, str]
 """Scope and name of a set or surface. The scope is the name of an instance, "" outside of instances."""
@@ -27,30 +28,23 @@ class Numbers:
     step: int = 0
 
 
-@dataclass(frozen=True)
-class NodesOf:
-    """The nodes of a set of elements."""
-
-    elements: Reference
-
-
 @dataclass
-class SetDefinitions:
+class Sets:
     """Sets as they are written. what: "nodes" or "elements". items: of every set what it consists of.
 
     unsorted: sets of several numbers whose order matters.
     """
 
     what: str
-    items: dict[Key, list[Numbers | Reference | NodesOf]] = field(default_factory=dict)
+    items: dict[Key, list[Numbers | Reference]] = field(default_factory=dict)
     unsorted: set[Key] = field(default_factory=set)
 
-    def add(self, key: Key, *items: Numbers | Reference | NodesOf) -> None:
+    def add(self, key: Key, *items: Numbers | Reference) -> None:
         """Adds members to a set, which may be new."""
         self.items.setdefault(key, []).extend(items)
 
 
-def key_of(reference: Reference, instances: Container[str]) -> Key:
+def _key_of(reference: Reference, instances: Container[str]) -> Key:
     """Scope and name, or number, that a reference means: those of an instance where it names one."""
     target = reference.target
     # names may have dots
@@ -65,7 +59,7 @@ def find_key(items: Container[Key], instances: Mapping[str, object], reference: 
 
     Raises SceneError where several instances have one of this name.
     """
-    key = key_of(reference, instances)
+    key = _key_of(reference, instances)
     if key in items:
         return key
     found = [scope for scope in instances if (scope, key[1]) in items]
@@ -73,6 +67,11 @@ def find_key(items: Container[Key], instances: Mapping[str, object], reference: 
         remedy = f"write {found[0]}.{shown(key[1])} or {found[1]}.{shown(key[1])}"
         raise reference.place.wrong(f"{len(found)} instances have {shown(key[1])}", remedy)
     return (found[0], key[1]) if found else None
+
+
+def exist(numbers: IntArray, existing: IntArray) -> BoolArray:
+    """Whether numbers, of any shape, are among others (n,), ascending, at least one."""
+    return np.asarray(existing[np.minimum(np.searchsorted(existing, numbers), existing.size - 1)] == numbers)
 
 
 @dataclass
@@ -84,7 +83,7 @@ class Resolver:
     nodes_of: the nodes of a set of elements. notes: what is named and does not exist.
     """
 
-    sets: SetDefinitions
+    sets: Sets
     existing: IntArray
     offsets: Mapping[str, int]
     everything: str
@@ -93,19 +92,23 @@ class Resolver:
     _done: dict[Key, IntArray] = field(default_factory=dict)
     _open: list[Key] = field(default_factory=list)
 
-    def find(self, reference: Reference) -> IntArray:
+    def __call__(self, reference: Reference) -> IntArray:
         """Numbers (m,) that a reference stands for, ascending. Raises SceneError where there is no such set."""
-        scope, target = key_of(reference, self.offsets)
+        scope, target = _key_of(reference, self.offsets)
         if is_integer(target):
             number = np.array([read_integer(target, reference.place)])
             return self._existing(Numbers(scope, number), str(reference.place))
-        key = find_key(self.sets.items, self.offsets, reference)
+        key = self.key(reference)
         if key is not None:
             return self.members(key, reference.place)
         if target == self.everything:
             return self.existing
-        found = f"there is no set of {self.sets.what} {shown(target)}"
-        raise reference.place.wrong(found, "define it, or remove it here")
+        what = f"there is no set of {self.sets.what} {shown(target)}"
+        raise reference.place.wrong(what, "define it, or remove it here")
+
+    def key(self, reference: Reference) -> Key | None:
+        """Of the named set; None of a number, or a set that is not defined."""
+        return find_key(self.sets.items, self.offsets, reference)
 
     def members(self, key: Key, place: Place) -> IntArray:
         """Numbers (m,) of a set, ascending. Raises SceneError where it contains itself."""
@@ -117,12 +120,10 @@ class Resolver:
         self._open.append(key)
         parts = [NONE]
         for item in self.sets.items[key]:
-            if isinstance(item, NodesOf):
-                parts.append(self.nodes_of(item.elements))
-            elif isinstance(item, Reference):
-                parts.append(self.find(item))
-            else:
+            if isinstance(item, Numbers):
                 parts.append(self._existing(item, f"set {shown(key[1])}"))
+            else:
+                parts.append(self.nodes_of(item) if item.of_elements else self(item))
         self._open.pop()
         self._done[key] = np.unique(np.concatenate(parts)).astype(np.int64)
         return self._done[key]
@@ -139,10 +140,8 @@ class Resolver:
             first, last = np.searchsorted(self.existing, (numbers.min(), min(numbers.max(), last_of_scope) + 1))
             within = self.existing[first:last]
             return np.asarray(within[(within - numbers[0]) % abs(members.step) == 0])
-        at = np.minimum(np.searchsorted(self.existing, numbers), self.existing.size - 1)
-        there = (self.existing[at] == numbers) & (numbers <= last_of_scope)
+        there = exist(numbers, self.existing) & (numbers <= last_of_scope)
         if not there.all():
-            missing = members.numbers[~there]
-            what = self.sets.what
+            missing, what = members.numbers[~there], self.sets.what
             self.notes.append(f"{where}: {missing.size} of its {what} do not exist, the first is {missing[0]}.")
         return np.asarray(numbers[there])

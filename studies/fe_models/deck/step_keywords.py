@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.blocks import Block, Row
 from studies.fe_models.deck.contents import CentrifugalLoad, NodalValue, Pressure, SurfacePair
-from studies.fe_models.deck.keywords import keyword
+from studies.fe_models.deck.keywords import Block, Row, keyword, read_name, unit
 from studies.fe_models.deck.model import Interaction, Model, Step
-from studies.fe_models.text import is_integer, read_float, read_name, shown, unit
+from studies.fe_models.files import is_integer, read_float, shown
 
 PROCEDURES = (
     "STATIC FREQUENCY DYNAMIC BUCKLE COMPLEXFREQUENCY GREEN HEATTRANSFER MATRIXGENERATE MODALDYNAMIC"
@@ -57,9 +56,8 @@ def _cyclic_symmetry(model: Model, block: Block) -> None:
     number = block.parameters.get("N", "")
     if not is_integer(number) or not 1 <= int(number) <= _MOST_SECTORS:
         raise block.place.wrong(f"N={shown(number)}", f"give a number of sectors from 1 to {_MOST_SECTORS}")
-    axis = np.array(block.reals(0, 6)[:6]).reshape(2, 3)
-    if not 0 < np.linalg.norm(axis[1] - axis[0]) < np.inf:
-        raise block.place.wrong("two equal points on the axis", "give two points that are apart")
+    axis = block.points()
+    unit(axis[1] - axis[0], block.place, "two points on the axis that are apart")
     name = read_name(block.parameters.get("TIE", ""))
     model.add("cyclic", (int(number), name, model.mesh.placed(block.scope, axis), block.place))
 
@@ -80,12 +78,6 @@ def _interaction(model: Model, block: Block) -> None:
     model.interaction = model.interactions.setdefault(block.name("NAME"), Interaction())
 
 
-def _interaction_of(model: Model, block: Block) -> Interaction:
-    if model.interaction is None:
-        raise block.place.wrong("no interaction", "write *SURFACE INTERACTION above it")
-    return model.interaction
-
-
 @keyword("SURFACEBEHAVIOR", "PRESSURE-OVERCLOSURE", "PENALTY AUGMENTEDLAGRANGE DIRECT STIFFNESS")
 def _behavior(model: Model, block: Block) -> None:
     """Hard contact, of which LINEAR is the penalty; TIED glues. The study may say that surfaces are soft."""
@@ -93,13 +85,13 @@ def _behavior(model: Model, block: Block) -> None:
     if law == "LINEAR":
         model.notes.append(f"{block.place}, LINEAR is read as hard contact (see contact_stiffness).")
     glued = f"{block.place}, PRESSURE-OVERCLOSURE=TIED" if law == "TIED" else ""
-    _interaction_of(model, block).glued = glued
+    block.below(model.interaction, "SURFACE INTERACTION").glued = glued
 
 
 @keyword("FRICTION", _ONE_COEFFICIENT, "SLIPTOLERANCE ELASTICSLIP LAGRANGE SHEARTRACTIONSLOPE")
 def _friction(model: Model, block: Block) -> None:
     """One coefficient; a law that is not read matters where the study gives no coefficient."""
-    interaction = _interaction_of(model, block)
+    interaction = block.below(model.interaction, "SURFACE INTERACTION")
     laws = [name for name in _ONE_COEFFICIENT.split() if block.parameters.get(name, "0") != "0"]
     n_lines = 0 if "ROUGH" in laws else max(len(block.lines), 0 if laws else 1)
     values = [block.reals(line, 1)[0] for line in range(n_lines)]
@@ -143,8 +135,7 @@ def _model_change(model: Model, block: Block) -> None:
         return
     for row in block.rows(1, "sets of elements"):
         for n in range(len(row.fields)):
-            elements = model.mesh.elements(row.reference(n))
-            model.add("removed", (removed, elements, f"{row.place} takes elements away."))
+            model.add("removed", (removed, model.mesh.elements(row.reference(n)), f"{row.place} takes elements away."))
 
 
 @keyword("ASSEMBLY", "", "NAME")
@@ -169,7 +160,7 @@ def _end_step(model: Model, _block: Block) -> None:
 @keyword(PROCEDURES, "*")
 def _procedure(model: Model, block: Block) -> None:
     """What the step computes."""
-    step = _step_of(model, block)
+    step = block.below(model.step, "STEP")
     step.kind = block.keyword
     if block.value("SOLVER") == "MATRIXSTORAGE" or block.keyword in ("MATRIXGENERATE", "SUBSTRUCTUREGENERATE"):
         step.writes = True
@@ -196,20 +187,21 @@ def _boundary(model: Model, block: Block) -> None:
         model.add("boundaries", *(NodalValue(str(row.place), nodes, *dofs, value) for dofs in held))
 
 
-def _step_of(model: Model, block: Block) -> Step:
-    if model.step is None:
-        raise block.place.wrong("it is outside of a step", "write *STEP above it")
-    return model.step
-
-
 def _step_of_load(model: Model, block: Block, *names: str) -> Step:
-    """The step of a load. With OP=NEW earlier ones of these fields are gone."""
-    step = _step_of(model, block)
+    """The step of a load. With OP=NEW earlier ones of these fields are gone, centrifugal ones in static steps alone."""
+    step = block.below(model.step, "STEP")
     if block.value("OP") == "NEW":
-        model.fields.update((name, {}) for name in names)
+        model.fields.update((name, {}) for name in names if name != "centrifugal" or step.loads_count)
     if "AMPLITUDE" in block.parameters and step.loads_count:
         raise block.place.wrong("a load with AMPLITUDE is not read", "give its last value without AMPLITUDE")
     return step
+
+
+def _refuse_load(row: Row, step: Step) -> None:
+    """Raises SceneError where a load that is not read counts."""
+    if step.loads_count:
+        remedy = "give a pressure P, forces with *CLOAD, or `preload` in the study"
+        raise row.place.wrong(f"a load of type {shown(row.text(1))} is not read", remedy)
 
 
 @keyword("CLOAD", "OP AMPLITUDE")
@@ -227,9 +219,7 @@ def _cload(model: Model, block: Block) -> None:
 @keyword("DLOAD", "OP AMPLITUDE")
 def _dload(model: Model, block: Block) -> None:
     """CENTRIF in any step, P1 to P6 and GRAV in static ones; other loads are refused there."""
-    static = model.step is not None and model.step.loads_count
-    step = _step_of_load(model, block, "gravity", *(("centrifugal", "pressures") if static else ()))
-    fresh = step.fresh
+    step = _step_of_load(model, block, "gravity", "centrifugal", "pressures")
     for row in block.rows(2, "set, type and size"):
         kind = row.text(1).upper()
         if kind not in ("CENTRIF", "GRAV", "P1", "P2", "P3", "P4", "P5", "P6"):
@@ -245,9 +235,9 @@ def _dload(model: Model, block: Block) -> None:
             values = row.reals(2, 6, "omega^2, a point and the axis")
             axis = np.array((values + [0.0])[4:7]) if values[0] >= 0 else np.zeros(3)
             axis = unit(axis, row.place, "omega^2 of at least 0, a point and the axis")
-            if fresh:
+            if step.fresh:
                 model.fields["centrifugal"] = {}  # the last step that has some
-            fresh = step.fresh = False
+            step.fresh = False
             load = elements, values[0], np.array(values[1:4]), axis
             model.add("centrifugal", CentrifugalLoad(str(row.place), *load))
         else:
@@ -268,10 +258,3 @@ def _dsload(model: Model, block: Block) -> None:
             raise row.place.wrong("a pressure on a surface of nodes", "give a surface of element faces")
         load = Pressure(str(row.place), surface.elements, surface.faces, row.real(2))
         model.add("pressures", load, key=("surface", block.scope, row.text(0)))
-
-
-def _refuse_load(row: Row, step: Step) -> None:
-    """Raises SceneError where a load that is not read counts."""
-    if step.loads_count:
-        remedy = "give a pressure P, forces with *CLOAD, or `preload` in the study"
-        raise row.place.wrong(f"a load of type {shown(row.text(1))} is not read", remedy)

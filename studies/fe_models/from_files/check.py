@@ -1,18 +1,22 @@
-"""What a user checks of a finite-element model before it is computed with, in lines."""
+"""What a user checks of a finite-element model before it is computed with: lines, and a picture of the pairs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.linalg import eigh
 
 from solver import SolverSettings, march_wear
-from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
+from solver.model import BoolArray, FloatArray, IntArray, LinearModel, ReducedModel
 from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.finite_element.reduced_joint import FeScene, Progress, glued_frequencies, prepare_model, silent
-from studies.scene import make_compliant
+from studies.finite_element.pairing import ContactPairs
+from studies.finite_element.reduced_joint import FeScene
+from studies.scene import Progress, make_compliant, silent
 
 N_FREQUENCIES = 4
 """Natural frequencies that are shown."""
@@ -21,6 +25,10 @@ _RPM = 30.0 / np.pi
 _NEIGHBOURS = {0: "", 1: " of the next sector", -1: " of the sector before"}
 _ROUND_OFF = 1e-9  # of the size of a facet, or of the largest force: a distance or a force that is none
 _FREE = 1e-9  # stiffness over the largest one of the relative displacements, below which nothing holds a motion
+_MOST_NUMBERS = 150
+_COLOURS = ("tab:red", "tab:green", "tab:blue")  # normal, first and second tangent
+_SHADES = ("tab:orange", "0.5")  # of the facets with the moving nodes, and of those opposite
+_ASIDE = (1.0, 0.5, 0.4)  # from where a surface is looked at, in its mean frame: neither on edge nor normals on end
 
 
 def describe_model(
@@ -28,14 +36,14 @@ def describe_model(
 ) -> list[tuple[str, str]]:
     """Label and text of each line. scene: the reduced model. Raises SceneError."""
     deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.mesh.coordinates
-    prepared = prepare_model(loaded.model, joint)
-    free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
+    prepared = scene.prepared
+    free: BoolArray = np.asarray(~prepared.structure.held.all(axis=1))
     if joint.cut is not None:
         free[joint.cut.right] = False
     mass, placed = prepared.weight.sum(), ~np.isnan(coordinates[:, 0])
     rows = [
         ("mass", f"{mass:.6g} kg, {3 * np.count_nonzero(free)} displacements that are not held"),
-        ("extent", f"{_vector(np.ptp(coordinates[placed], axis=0))} m; given in {loaded.units.name}"),
+        ("extent", f"{_vector(np.ptp(coordinates[placed], axis=0))} m; given in {parameters.units}"),
         ("centre", f"{_vector(prepared.weight[placed] @ coordinates[placed] / mass)} m"),
     ]
     rotation, speed = loaded.model.rotation, "none"
@@ -49,13 +57,13 @@ def describe_model(
     rows += [("glued", f"{tie.name} stay glued") for tie in joint.ties]
     progress("natural frequencies of the glued model")
     k = parameters.nodal_diameter
-    turning = glued_frequencies(prepared, k, N_FREQUENCIES)
+    turning = prepared.frequencies(k, N_FREQUENCIES)
     where = f"nodal diameter {k}: " if joint.cut is not None else ""
     glued = f"{where}{_frequencies(turning)} Hz without prestress"
     if loaded.model.forms is not None:
         glued = f"{where}{_frequencies(turning)} Hz, with what the matrices hold"
-    elif prepared.at_rest is not None:
-        still = prepared.at_rest.frequencies(k, N_FREQUENCIES) / (2.0 * np.pi)
+    elif "elastic" in prepared.forms:
+        still = prepared.frequencies(k, N_FREQUENCIES, "elastic")
         glued = f"{where}{_frequencies(still)} Hz at rest, {_frequencies(turning)} Hz with prestress"
     rows.append(("glued", glued))
     first = dict(sorted((k, found[0]) for k, found in scene.glued_frequencies.items()))
@@ -63,9 +71,9 @@ def describe_model(
         listed = ", ".join(map(str, first))
         rows.append(("glued", f"first at nodal diameters {listed}: {_frequencies(np.array([*first.values()]))} Hz"))
     progress("reduction with twice the modes")
-    rows.append(("reduction", _reduction_error(loaded, scene.model, parameters)))
-    rows.append(("rigid", f"{count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
-    held = count_free_motions(scene.model)
+    rows.append(("reduction", _reduction_error(loaded, scene, parameters)))
+    rows.append(("rigid", f"{_count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
+    held = _count_free_motions(scene.model)
     if held:
         verb = "motion is" if held == 1 else "motions are"
         rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
@@ -79,39 +87,43 @@ def describe_model(
     return rows
 
 
-def count_free_motions(model: ReducedModel, *, open_pairs: bool = False) -> int:
+def _free(model: ReducedModel, linear: LinearModel) -> IntArray:
+    """Displacements that are free where all pairs stay closed and slide freely."""
+    closing = model.contact.dofs[:, 0]
+    return np.setdiff1d(np.arange(len(linear.stiffness)), closing[closing >= 0])
+
+
+def _count_free_motions(model: ReducedModel, *, open_pairs: bool = False) -> int:
     """Motions without stiffness where all pairs stay closed and slide freely, or where they are open."""
-    linear, dofs = model.linear[0], model.contact.dofs
-    closing = np.empty(0, dtype=np.int64) if open_pairs else dofs[:, 0][dofs[:, 0] >= 0]
-    free = np.setdiff1d(np.arange(len(linear.stiffness)), closing)
+    linear = model.linear[0]
+    free = np.arange(len(linear.stiffness)) if open_pairs else _free(model, linear)
     stiffness = linear.stiffness.real[np.ix_(free, free)]
     # modal coordinates have another unit: each displacement is scaled by its own stiffness
     scale = 1.0 / np.sqrt(np.maximum(np.diag(stiffness), np.finfo(np.float64).tiny))
     return int(np.count_nonzero(np.linalg.eigvalsh(stiffness * scale * scale[:, None]) < _FREE))
 
 
-def sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray:
+def _sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray:
     """Natural frequencies, Hz, ascending, with all pairs closed and sliding freely; 0 of what nothing holds."""
-    dofs = model.contact.dofs
-    free = np.setdiff1d(np.arange(len(linear.stiffness)), dofs[:, 0][dofs[:, 0] >= 0])
+    free = _free(model, linear)
     stiffness, mass = (part[np.ix_(free, free)] for part in (linear.stiffness, linear.mass))
     # A mass may be singular, and spin softening alone acts on what slides as a whole: M x = (K + s M) x / (w^2 + s),
     # s from the lowest glued mode, the first of those behind the relative displacements.
-    shift = float(np.diag(linear.stiffness)[np.count_nonzero(dofs >= 0)].real)
+    shift = float(np.diag(linear.stiffness)[np.count_nonzero(model.contact.dofs >= 0)].real)
     inverse = eigh(mass, stiffness + shift * mass, eigvals_only=True)[::-1]
     squares = 1.0 / inverse[inverse > 0.0] - shift
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
 
 
-def _reduction_error(loaded: LoadedModel, model: ReducedModel, parameters: Parameters) -> str:
+def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters) -> str:
     """How far frequencies change with twice the modes, where the pairs slide freely and the joint moves most."""
-    k = parameters.nodal_diameter
+    k, model = parameters.nodal_diameter, scene.model
     n_modes = len(model.linear[k].stiffness) - np.count_nonzero(model.contact.dofs >= 0)
     if n_modes < parameters.stuck_modes:
         return f"none: there are no more than {n_modes} modes with the pairs glued"
     more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
-    finer = reduce_model(loaded, more, 1).model
-    own, other = (sliding_frequencies(each.linear[k], each)[: 2 * N_FREQUENCIES] for each in (model, finer))
+    finer = reduce_model(loaded, more, 1, prepared=scene.prepared).model
+    own, other = (_sliding_frequencies(each.linear[k], each)[: 2 * N_FREQUENCIES] for each in (model, finer))
     n = min(len(own), len(other))
     elastic = other[:n] > 1e-3 * other[:n].max()
     own, other = own[:n][elastic][:N_FREQUENCIES], other[:n][elastic][:N_FREQUENCIES]
@@ -180,3 +192,49 @@ def _vector(values: FloatArray) -> str:
 
 def _frequencies(values: FloatArray) -> str:
     return ", ".join(f"{value:.2f}" for value in values)
+
+
+def draw_pairs(loaded: LoadedModel, scene: FeScene, path: Path) -> None:
+    """Writes a PNG with one part for each pair of surfaces. Raises OSError."""
+    n = len(scene.pairs.moving_name)
+    rows, columns = -(-n // 3), min(n, 3)
+    figure = Figure(figsize=(7.0 * columns, 6.5 * rows), layout="constrained")
+    for place in range(n):
+        _draw_surface(figure, (rows, columns, place + 1), loaded, scene.pairs, place)
+    figure.suptitle("contact pairs: normal (red), first tangent (green), second tangent (blue)")
+    figure.savefig(path, format="png")
+
+
+def _draw_surface(
+    figure: Figure, where: tuple[int, int, int], loaded: LoadedModel, pairs: ContactPairs, place: int
+) -> None:
+    own = np.flatnonzero(pairs.surface == place)
+    position = pairs.position[own]
+    axes = figure.add_subplot(*where, projection="3d", computed_zorder=False)
+    contact = loaded.joint.contacts[place]
+    moving, opposite = pairs.moving_name[place], pairs.opposite_name[place]
+    both = {each.name: each for each in (contact.first, contact.second)}
+    for name, colour in zip((opposite, moving), _SHADES[::-1], strict=True):
+        facets = loaded.model.mesh.coordinates[both[name].facets]
+        drawn = Poly3DCollection(facets, facecolors=colour, edgecolors=colour, alpha=0.15, label=f"facets of {name}")
+        axes.add_collection3d(drawn)
+    points = position + pairs.distance[own, None] * pairs.frames[own, 0]
+    axes.scatter(*points.T, s=12, marker="x", color="0.5", label=f"point of {opposite}")
+    axes.scatter(*position.T, s=8, color="black", label=f"node of {moving}")
+    length = 0.6 * np.sqrt(np.median(pairs.area[own]))
+    for direction, colour in enumerate(_COLOURS):
+        axes.quiver(*position.T, *pairs.frames[own, direction].T, length=length, color=colour, linewidth=0.8)
+    for number in own[:_MOST_NUMBERS]:
+        axes.text(*pairs.position[number], str(number), fontsize=7)
+    axes.set(xlabel="x, m", ylabel="y, m", zlabel="z, m")
+    axes.set_title(f"{moving} on {opposite}: {len(own)} pairs")
+    # a cube: one scale for all directions
+    middle = (position.min(axis=0) + position.max(axis=0)) / 2.0
+    half = 0.5 * np.ptp(position, axis=0).max() + length
+    limits = {f"{name}lim": (at - half, at + half) for name, at in zip("xyz", middle, strict=True)}
+    axes.set(**limits, box_aspect=(1, 1, 1))
+    aside = _ASIDE @ np.average(pairs.frames[own], axis=0, weights=pairs.area[own])
+    if np.linalg.norm(aside) > 0.1:  # a closed surface has no mean normal
+        x, y, z = aside / np.linalg.norm(aside)
+        axes.view_init(elev=np.degrees(np.arcsin(z)), azim=np.degrees(np.arctan2(y, x)))
+    axes.legend(fontsize=7, loc="upper right")

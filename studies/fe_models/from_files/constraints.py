@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.fe_models.deck.contents import Deck, Equation, RigidMotion
-from studies.fe_models.model_files import Units
+from studies.fe_models.files import Units
 from studies.finite_element.constraints import Constraints, Dependence, eliminate
 from studies.scene_error import SceneError
 
@@ -32,36 +32,33 @@ class Supported:
     references: Mapping[int, int]
 
 
-def find_constraints(
-    deck: Deck, numbers: IntArray, clamped: BoolArray | None, units: Units, cut: IntArray
-) -> Supported:
+def find_constraints(deck: Deck, numbers: IntArray, clamped: IntArray | None, units: Units, cut: IntArray) -> Supported:
     """Held displacements, constraints and nodal forces of a deck.
 
-    numbers (n_nodes,): nodes of the model, in any order. clamped (n_nodes, 3): displacements that the study holds in
-    place of the deck's boundary conditions; None of none. cut: rows of nodes on cut faces. Raises SceneError where a
-    displacement depends on others and is held, depends twice, or nodes are missing.
+    numbers (n_nodes,): nodes of the model, in any order. clamped: rows of nodes that the study holds in place of the
+    deck's boundary conditions; None of none. cut: rows of nodes on cut faces. Raises SceneError where a displacement
+    depends on others and is held, depends twice, or nodes are missing.
     """
-    rows = {number: row for row, number in enumerate(numbers.tolist())}
+    rows = {("", number): row for row, number in enumerate(numbers.tolist())}
     return _Builder(deck, numbers, units, set(cut.tolist()), rows).build(clamped)
 
 
 @dataclass
 class _Builder:
-    """rows: of the nodes of the model and of reference nodes. others: of rotations of reference nodes, and of nodes in
-    their own directions. extra: numbers of all that is not in the model.
+    """rows: of nodes, kind "", of the "turn" of reference nodes, and of displacements in "own" directions of a node, by
+    kind and number. extra: numbers of all that is not in the model.
     """
 
     deck: Deck
     numbers: IntArray
     units: Units
     cut: set[int]
-    rows: dict[int, int]
-    others: dict[tuple[str, int], int] = field(default_factory=dict)
+    rows: dict[tuple[str, int], int]
     extra: list[int] = field(default_factory=list)
     oblique: dict[int, FloatArray] = field(default_factory=dict)
     entries: list[Dependence] = field(default_factory=list)
 
-    def build(self, clamped: BoolArray | None) -> Supported:
+    def build(self, clamped: IntArray | None) -> Supported:
         deck = self.deck
         self.first_terms = {int(equation.nodes[0]) for equation in deck.equations}
         self.frames = {int(node): each for each in deck.transforms for node in each.nodes}
@@ -70,11 +67,7 @@ class _Builder:
         for equation in deck.equations:
             for node in equation.nodes:
                 self._row(int(node), equation.place)
-        held: set[int] = set()
-        if clamped is not None:
-            held = set(np.flatnonzero(clamped.ravel()).tolist())
-        else:
-            self._hold(held)
+        held = self._held_by_deck() if clamped is None else {3 * row + k for row in clamped.tolist() for k in range(3)}
         for equation in deck.equations:
             self._equation(equation)
         forces = np.zeros(3 * (len(self.numbers) + len(self.extra)))
@@ -82,35 +75,26 @@ class _Builder:
             forces[dof] += value
         own: BoolArray = np.isin(np.arange(len(forces)), list(held)).reshape(-1, 3)
         extra = np.array(self.extra, dtype=np.int64)
-        references = {number: row for number, row in self.rows.items() if row >= len(self.numbers)}
+        references = {node: row for (kind, node), row in self.rows.items() if not kind and row >= len(self.numbers)}
         constraints, fixed = None, own.copy()
         if self.entries or self.oblique:
             everything = np.concatenate([self.numbers, extra])
             constraints, fixed = eliminate(self.entries, own, self.oblique, everything, len(self.numbers))
         return Supported(fixed, extra, constraints, own, forces, references)
 
-    def _new(self, number: int) -> int:
-        self.extra.append(number)
-        return len(self.numbers) + len(self.extra) - 1
-
-    def _row(self, number: int, place: str) -> int:
-        """Row of a node; one without elements is added. Raises SceneError where it does not exist."""
-        if number not in self.rows:
+    def _row(self, number: int, place: str, kind: str = "") -> int:
+        """Row of a node, or of what else it has; what is not there is added. Raises SceneError where it is no node."""
+        if (kind, number) not in self.rows:
             if not np.isin(number, self.deck.node_numbers):
                 raise SceneError("model", f"{place}: there is no node {number}", "define it with *NODE")
-            self.rows[number] = self._new(number)
-        return self.rows[number]
-
-    def _other(self, kind: str, number: int) -> int:
-        if (kind, number) not in self.others:
-            self.others[kind, number] = self._new(number)
-        return self.others[kind, number]
+            self.rows[kind, number] = len(self.numbers) + len(self.extra)
+            self.extra.append(number)
+        return self.rows[kind, number]
 
     def _turn(self, motion: RigidMotion) -> int:
         """Row of the rotations of a reference node."""
-        if motion.rotation:
-            return self._row(motion.rotation, motion.place)
-        return self._other("turn", motion.reference)
+        kind = "" if motion.rotation else "turn"
+        return self._row(motion.rotation or motion.reference, motion.place, kind)
 
     def _rigid(self, motion: RigidMotion) -> None:
         """`u = u_reference + theta x arm` for each node."""
@@ -125,19 +109,18 @@ class _Builder:
         rows = np.arange(len(dependent))
         parts = [(rows, 3 * reference + np.tile(directions, len(nodes)), np.ones(len(rows)))]
         if motion.turns:
-            turn = self._turn(motion)
-            deck = self.deck
+            turn, deck = self._turn(motion), self.deck
             places = deck.coordinates[deck.rows_of_nodes(np.append(motion.nodes, motion.reference))]
             arms = (places[:-1] - places[-1]) * self.units.length
-            for k in range(3):  # theta_k e_k x arm
-                parts.append(
-                    (rows, np.full(len(rows), 3 * turn + k), np.cross(np.eye(3)[k], arms)[:, directions].ravel())
-                )
+            for k in range(3):
+                moved = np.cross(np.eye(3)[k], arms)[:, directions]  # theta_k e_k x arm
+                parts.append((rows, np.full(len(rows), 3 * turn + k), moved.ravel()))
         row, column, value = (np.concatenate(each) for each in zip(*parts, strict=True))
         self.entries.append(Dependence(dependent, row, column, value, motion.place))
 
-    def _hold(self, held: set[int]) -> None:
-        """Boundary conditions, those of nodes with directions of their own in these. Raises SceneError."""
+    def _held_by_deck(self) -> set[int]:
+        """Displacements that boundary conditions hold, of nodes with directions of their own in these."""
+        held: set[int] = set()
         wanted: dict[int, set[int]] = {}
         for boundary in self.deck.boundaries:
             first, last = max(boundary.first_dof, 1), min(boundary.last_dof, 6)
@@ -148,14 +131,15 @@ class _Builder:
                 wanted.setdefault(int(node), set()).update(range(first, last + 1))
         turns = {motion.reference: self._turn(motion) for motion in self.deck.rigid_motions if motion.turns}
         for node, dofs in wanted.items():
-            if node in self.rows:
+            if ("", node) in self.rows:
                 held.update(self._held(node, sorted(dof - 1 for dof in dofs if dof <= 3)))
             if node in turns:
                 held.update(3 * turns[node] + dof - 4 for dof in dofs if dof > 3)
+        return held
 
     def _held(self, node: int, local: list[int]) -> list[int]:
         """Displacements that are 0 where those along some directions of a node are."""
-        row = self.rows[node]
+        row = self.rows["", node]
         if node not in self.frames:
             return [3 * row + k for k in local]
         frame = self._frame(node)
@@ -164,18 +148,17 @@ class _Builder:
         if straight and not (row in self.cut and 0 < len(local) < 3):
             return [3 * row + int(k) for k in np.flatnonzero(np.round(np.diag(across)))]
         if node in self.first_terms:
-            return [3 * self._localised(node) + k for k in local]
+            return [3 * self._own_directions(node) + k for k in local]
         self.oblique[row] = across
         return []
 
-    def _localised(self, node: int) -> int:
+    def _own_directions(self, node: int) -> int:
         """Row of a node in its own directions, on which the node of the model depends."""
-        new = ("local", node) not in self.others
-        row, own = self._other("local", node), self.rows[node]
+        place, new, own = self.frames[node].place, ("own", node) not in self.rows, self.rows["", node]
+        row = self._row(node, place, "own")
         if new:
             frame = self._frame(node)
             rows, columns = np.divmod(np.arange(9), 3)
-            place = self.frames[node].place
             self.entries.append(Dependence(3 * own + np.arange(3), rows, 3 * row + columns, frame.T.ravel(), place))
         return row
 
@@ -193,8 +176,7 @@ class _Builder:
             axis = (end - start) / np.linalg.norm(end - start)
             radial = arm - (arm @ axis) * axis
             if not np.linalg.norm(radial) > _ROUND_OFF * np.linalg.norm(end - start):
-                found = f"{transform.place}: node {node} is on the axis"
-                raise SceneError("model", found, "take it out of the set: it has no radial direction")
+                raise SceneError("model", f"{transform.place}: node {node} is on the axis", "take it out of the set")
             frame = np.stack([radial, np.cross(axis, radial), axis])
         return np.asarray(frame / np.linalg.norm(frame, axis=1, keepdims=True))
 
@@ -204,7 +186,7 @@ class _Builder:
         for at, (node, dof, value) in enumerate(zip(equation.nodes, equation.dofs, equation.coefficients, strict=True)):
             row, number = self._row(int(node), equation.place), int(node)
             if dof > 3:
-                row = self.others.get(("turn", number), -1)
+                row = self.rows.get(("turn", number), -1)
                 if row < 0 or dof > 6:
                     found = f"{equation.place}: node {number} has no dof {dof}"
                     raise SceneError("model", found, "give displacements 1 to 3, or the rotation of a reference node")
@@ -212,10 +194,10 @@ class _Builder:
                 continue
             direction = self._frame(number)[dof - 1]
             axis = int(np.argmax(np.abs(direction)))
-            if abs(direction[axis]) > 1.0 - _ROUND_OFF and ("local", number) not in self.others:
+            if abs(direction[axis]) > 1.0 - _ROUND_OFF and ("own", number) not in self.rows:
                 terms.append((3 * row + axis, value * float(np.sign(direction[axis]))))
-            elif at == 0 or ("local", number) in self.others:
-                terms.append((3 * self._localised(number) + int(dof) - 1, float(value)))
+            elif at == 0 or ("own", number) in self.rows:
+                terms.append((3 * self._own_directions(number) + int(dof) - 1, float(value)))
             else:
                 terms += [(3 * row + k, float(value * direction[k])) for k in range(3)]
         (dependent, first), others = terms[0], terms[1:]
@@ -228,11 +210,11 @@ class _Builder:
         """Displacement and force, N, of each component."""
         for force in self.deck.forces:
             for node in force.nodes:
-                if int(node) not in self.rows or force.first_dof > 3:
+                if ("", int(node)) not in self.rows or force.first_dof > 3:
                     if force.value == 0.0:
                         continue
                     found = f"{force.place}: node {node} has no dof {force.first_dof}"
                     raise SceneError("model", found, "give forces on nodes of elements, or of reference nodes")
                 for k, share in enumerate(self._frame(int(node))[force.first_dof - 1]):
                     if share:
-                        yield 3 * self.rows[int(node)] + k, self.units.force * force.value * float(share)
+                        yield 3 * self.rows["", int(node)] + k, self.units.force * force.value * float(share)

@@ -12,37 +12,33 @@ from pydantic import BaseModel
 
 from solver.model import FloatArray, ReducedModel
 from studies.fe_models.deck.contents import Deck
+from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_digest
 from studies.fe_models.from_files.constraints import Supported, find_constraints
-from studies.fe_models.from_files.export_mistakes import check_nodes_have_dofs
-from studies.fe_models.from_files.imported import import_matrices, read_recovery
+from studies.fe_models.from_files.imported import check_nodes_have_dofs, import_matrices, read_recovery
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import Selections, find_clamped, find_cut, find_surfaces
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
-from studies.fe_models.model_files import UNITS, ModelFiles, Units, file_digest
-from studies.fe_models.text import check_there
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
-from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
+from studies.finite_element.reduced_joint import FeScene, build_fe_scene
+from studies.finite_element.reduction import PreparedModel
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
-from studies.scene import SurfaceMesh, build_compliant
+from studies.scene import Progress, SurfaceMesh, build_compliant, silent
 from studies.scene_error import SceneError
 
 
 @dataclass(frozen=True)
 class LoadedModel:
-    """A model as its files and the study describe it.
+    """A model as its files and the study describe it. deck: in units of the files. model, joint: SI.
 
-    deck: in units of the file. mesh: m. model, joint: SI.
     omega_squared_held: square of the speed at which the matrices were made, rad2/s2; None where they do not tell.
     """
 
     deck: Deck
-    units: Units
-    mesh: SolidMesh
     model: FeModel
     joint: JointDefinition
     omega_squared_held: float | None
@@ -72,20 +68,25 @@ def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
 def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: Progress = silent) -> ReducedModel:
     """Reduced model, with all nodal diameters that the harmonics 0..n_harmonics see. Raises SceneError."""
     own = checked(parameters)
-
-    def reduced() -> ReducedModel:
-        return reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model
-
-    if own.contact_stiffness is None:
-        return reduced()
     what = [describe_origin(files, own), own.model_dump_json(exclude={"contact_stiffness"}), n_harmonics]
-    return build_compliant(json.dumps(what), own.contact_stiffness, reduced)
+    return build_compliant(
+        files.mesh.name,
+        json.dumps(what),
+        own.contact_stiffness,
+        lambda: reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model,
+    )
 
 
-def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, progress: Progress = silent) -> FeScene:
-    """Reduced model of a loaded one. Raises SceneError."""
+def reduce_model(
+    loaded: LoadedModel,
+    parameters: Parameters,
+    n_harmonics: int,
+    progress: Progress = silent,
+    prepared: PreparedModel | None = None,
+) -> FeScene:
+    """Reduced model of a loaded one, which may be prepared already. Raises SceneError."""
     options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-    return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress)
+    return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress, prepared)
 
 
 def describe_model_mesh(files: ModelFiles, parameters: BaseModel) -> SurfaceMesh:
@@ -123,10 +124,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
         imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
     nodes = mesh if imported is None else imported.mesh
-    numbers = nodes.numbers
-    if clamped is not None:
-        clamped = np.pad(clamped, ((0, len(numbers) - len(clamped)), (0, 0)))
-    supported = find_constraints(deck, numbers, clamped, units, on_cut)
+    supported = find_constraints(deck, nodes.numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
     n_nodes, forms = len(supported.held), None
@@ -158,7 +156,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         constraints=supported.constraints,
         pairs=_pairs_of_table(selections, whole, contacts, axis),
     )
-    return LoadedModel(deck, units, mesh, model, joint, None if imported is None else imported.omega_squared_held)
+    return LoadedModel(deck, model, joint, None if imported is None else imported.omega_squared_held)
 
 
 def _check_assembled(deck: Deck, units: Units) -> None:
@@ -167,26 +165,19 @@ def _check_assembled(deck: Deck, units: Units) -> None:
         raise SceneError("matrices", "missing", f"give the matrices of the nodes of {deck.path}")
     check_units(deck, None, units)
     if deck.unassembled:
-        remedy = "use solid elements, of one material in a .cdb, or give `matrices` of another program"
-        raise SceneError("model", deck.unassembled[0], remedy)
+        raise SceneError("model", deck.unassembled[0], "use solid elements, of one material in a .cdb, or `matrices`")
 
 
 def _pairs_of_table(
-    selections: Selections,
-    mesh: SolidMesh,
-    contacts: tuple[ContactSurfaces, ...],
-    axis: CyclicAxis | None,
+    selections: Selections, mesh: SolidMesh, contacts: tuple[ContactSurfaces, ...], axis: CyclicAxis | None
 ) -> ContactPairs | None:
     """Pairs of a table of nodes; None of a mesh, whose facets make them."""
     table, length = selections.deck.contact_nodes, selections.units.length
     if table is None:
         return None
-    others = mesh.n_nodes - len(table.area)
-    area, gap = (
-        np.pad(each, (0, others), constant_values=np.nan) for each in (table.area * length**2, table.gap * length)
-    )
-    normals = np.pad(table.normals, ((0, others), (0, 0)), constant_values=np.nan)
-    return match_nodes(mesh, contacts, (area, normals, gap), axis)
+    given = table * [length**2, 1.0, 1.0, 1.0, length]
+    area, *normals, gap = np.pad(given.T, ((0, 0), (0, mesh.n_nodes - len(given))), constant_values=np.nan)
+    return match_nodes(mesh, contacts, (area, np.stack(normals, axis=1), gap), axis)
 
 
 def _preload(selections: Selections, supported: Supported) -> FloatArray:

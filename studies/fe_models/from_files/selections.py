@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.model import BoolArray, IntArray
+from solver.model import IntArray
 from studies.fe_models.deck.contents import Deck, SurfacePair
+from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.model_files import Units
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import SolidMesh
@@ -120,8 +120,8 @@ def find_surfaces(
         if glued:
             found = f"{glued[0].glued}: all contact pairs are glued, so that nothing wears"
             raise SceneError("contact", found, "name those that move: `contact` in the study")
-        found = f"{deck.path} has neither CONTACT PAIR nor TIE"
-        raise SceneError("contact", found, 'give pairs of surfaces, as [["BLADES", "DISKS"]]')
+        remedy = 'give pairs of surfaces, as [["BLADES", "DISKS"]]'
+        raise SceneError("contact", f"{deck.path} has neither CONTACT PAIR nor TIE", remedy)
     # a name that the deck does not have is said before a friction coefficient that is missing for it
     named = [_surfaces(selections, pair, "contact") for pair in chosen]
     friction = _friction(chosen, selections.parameters, deck)
@@ -150,8 +150,7 @@ def _surfaces(selections: Selections, pair: SurfacePair, key: str) -> ContactSur
     if tolerance is None and pair.tolerance is not None:
         tolerance = pair.tolerance * length
     if pair.adjusted and clearance is None and parameters.gaps:
-        remedy = "leave ADJUST out where the distances of the mesh count, else leave gaps out"
-        raise SceneError("gaps", f"{pair.adjusted} onto the other surface, so that there are no gaps", remedy)
+        raise SceneError("gaps", f"{pair.adjusted} onto the other surface", "leave out gaps, or else ADJUST")
     if pair.fitted and not parameters.gaps:
         raise SceneError("gaps", f"{pair.fitted}, and the study lets the surfaces touch", "give gaps = true")
     clearance = None if clearance is None else clearance * length
@@ -199,8 +198,7 @@ def _friction(chosen: list[SurfacePair], parameters: Parameters, deck: Deck) -> 
         found.append(own[-1] if own else pair.friction_coefficient)
         if found[-1] is None:
             what = pair.problem or f"missing for {pair.labels[-1]} in {deck.path}"
-            remedy = "give one coefficient, there with *FRICTION or by friction_coefficient in the study"
-            raise SceneError("friction_coefficient", what, remedy)
+            raise SceneError("friction_coefficient", what, "give one coefficient, in the study or there with *FRICTION")
     return found
 
 
@@ -221,11 +219,7 @@ def find_cut(selections: Selections, axis: CyclicAxis | None, contacts: Sequence
     return match_cut_faces(mesh, axis, first, second)
 
 
-def find_clamped(selections: Selections) -> BoolArray | None:
-    """Displacements (n_nodes, 3) of the nodes that the study clamps; None where the deck says what is held."""
-    if selections.parameters.clamp is None:
-        return None
-    held = np.zeros((selections.mesh.n_nodes, 3), dtype=np.bool_)
-    for name in selections.parameters.clamp:
-        held[selections.nodes(name, "clamp")] = True
-    return held
+def find_clamped(selections: Selections) -> IntArray | None:
+    """Rows of the nodes that the study clamps; None where the deck says what is held. Raises SceneError."""
+    names = selections.parameters.clamp
+    return None if names is None else np.concatenate([_NONE, *(selections.nodes(name, "clamp") for name in names)])

@@ -10,8 +10,8 @@ import numpy as np
 
 from solver.model import FloatArray, IntArray
 from studies.fe_models.deck.contents import Deck
+from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import MaterialTable, Parameters
-from studies.fe_models.model_files import Units
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.scene_error import SceneError
@@ -62,7 +62,7 @@ def _materials(deck: Deck, parameters: Parameters, units: Units) -> Iterator[tup
     """Label, element numbers and material; where an element has several the last one holds."""
     given, whole = parameters.material, None
     if isinstance(given, MaterialTable):
-        whole = _own(given)
+        whole = Material(**given.model_dump())
     elif parameters.matrices is not None:
         whole = _NOTHING
     if whole is not None:
@@ -75,20 +75,14 @@ def _materials(deck: Deck, parameters: Parameters, units: Units) -> Iterator[tup
             values = found.young * units.stress, found.poisson, found.density * units.density
             yield section.name, section.elements, Material(*values)
         elif not isinstance(given, dict):
-            lacks = f"{section.material} in {deck.path} lacks Young's modulus, Poisson's ratio or density"
-            remedy = "give one isotropic law and a density in the deck, or `material` in the study"
-            raise SceneError("material", found.problem or lacks, remedy)
+            what = found.problem or f"{section.material} in {deck.path} is not complete"
+            raise SceneError("material", what, "give one isotropic law and a density there, or `material` in the study")
     for name, table in given.items() if isinstance(given, dict) else ():
         elements = deck.element_sets.get(name.strip().upper(), np.empty(0, dtype=np.int64))
         if elements.size == 0:
             known = ", ".join(sorted(deck.element_sets)[:6]) or "none"
-            found_none = f'there is no set of elements "{name}" in {deck.path}'
-            raise SceneError("material", found_none, f"give one of {known}")
-        yield name.strip().upper(), elements, _own(table)
-
-
-def _own(table: MaterialTable) -> Material:
-    return Material(table.young_modulus, table.poisson_ratio, table.density)
+            raise SceneError("material", f'no set of elements is named "{name}" in {deck.path}', f"give one of {known}")
+        yield name.strip().upper(), elements, Material(**table.model_dump())
 
 
 def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotation | None, CyclicAxis | None]:
@@ -98,20 +92,19 @@ def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotatio
     """
     speed, given, n_sectors = parameters.rotation_speed, parameters.axis, parameters.n_sectors
     own = None if speed is not None and given is not None else rotation_of_deck(deck, units)
-    of_study = of_sector = None
+    of_study = of_sector = rotation = None
     if given is not None:
-        of_study = np.array(given.point), _unit(np.array(given.direction))
+        of_study = _axis(np.array(given.point), np.array(given.direction))
     if deck.cyclic is not None:
         n_sectors = n_sectors or deck.cyclic.n_sectors
         start, end = deck.cyclic.axis * units.length
-        of_sector = start, _unit(end - start)
-    rotation, turning = None, None if own is None else (own.point, own.axis)
+        of_sector = _axis(start, end - start)
+    missing = SceneError("axis", "missing", "give {point, direction} of the axis: the deck has none")
     if speed or (speed is None and own is not None):
-        axis = of_study or turning or of_sector
+        axis = of_study or (None if own is None else (own.point, own.axis)) or of_sector
         if axis is None:
-            raise SceneError("axis", "missing", "give {point, direction} of the axis of rotation: the deck has none")
-        omega_squared = own.omega_squared if speed is None and own is not None else (np.pi * (speed or 0.0) / 30.0) ** 2
-        rotation = Rotation(omega_squared, *axis)
+            raise missing
+        rotation = Rotation(own.omega_squared if speed is None and own else (np.pi * (speed or 0.0) / 30.0) ** 2, *axis)
     if n_sectors is None:
         for key in ("cut_faces", "next_sector"):
             if getattr(parameters, key):
@@ -119,12 +112,13 @@ def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotatio
         return rotation, None
     axis = of_study or of_sector or (None if rotation is None else (rotation.point, rotation.axis))
     if axis is None:
-        raise SceneError("axis", "missing", "give {point, direction} of the axis of the cyclic structure")
+        raise missing
     return rotation, CyclicAxis(n_sectors, *axis)
 
 
-def _unit(vector: FloatArray) -> FloatArray:
-    return np.asarray(vector / np.linalg.norm(vector))
+def _axis(point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A point, and the unit vector along a direction."""
+    return point, direction / np.linalg.norm(direction)
 
 
 def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
@@ -135,8 +129,7 @@ def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
     for one, other in pairwise(loads):
         same = math.isclose(one.omega_squared, other.omega_squared, rel_tol=SPEED_AGREES)
         if not same or abs(one.axis @ other.axis) < 1 - 1e-9:
-            speeds = " and ".join(f"{math.sqrt(each.omega_squared):g} rad/s" for each in (one, other))
-            found = f"{other.place} turns otherwise than before: {speeds}"
+            found = f"{other.place} turns otherwise than {one.place}"
             raise SceneError("model", found, "give all of the model one speed and one axis")
     elements = np.concatenate([block.numbers for block in deck.blocks] or [np.empty(0, dtype=np.int64)])
     turning = np.unique(np.concatenate([load.elements for load in loads]))

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NoReturn
+from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 import pandas as pd
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from studies.fe_models.text import shown
+from studies.fe_models.files import FloatArray, IntArray, library_errors, shown
 from studies.scene_error import SceneError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 NAMES = ("stiffness", "mass", "damping", "load")
 """Matrices of a model, and constant forces."""
@@ -70,13 +67,34 @@ def label(node: IntArray, dof: IntArray, file: str) -> IntArray:
     """Labels (m,) of nodes and their dofs, from 1, or 0 for a coordinate of no place. Raises SceneError."""
     if node.size and (np.abs(node).max() > _MOST_NODES or dof.min() < 0 or dof.max() >= _DOFS):
         at = int(np.flatnonzero((np.abs(node) > _MOST_NODES) | (dof < 0) | (dof >= _DOFS))[0])
-        found = f"dof {dof[at]} of node {node[at]}"
-        wrong(file, found, f"give node numbers of at most ten digits, and dofs below {_DOFS}")
+        wrong(file, f"dof {dof[at]} of node {node[at]}", f"give numbers of at most ten digits, and dofs below {_DOFS}")
     return np.asarray(_DOFS * node + dof, dtype=np.int64)
 
 
-def of_table(file: str, matrix: object, labels: IntArray) -> Entries:
-    """Entries of a matrix, dense or sparse, or of forces, whose rows have labels (n_dof,). Raises SceneError."""
+def entries_of_tables(
+    found: Mapping[str, Any], files: Mapping[str, Path], labels: IntArray | None = None
+) -> dict[str, Entries]:
+    """Entries of matrices, dense or sparse, and forces by name, whose rows have labels (n_dof,).
+
+    labels: None where a table of the rows is among the files. Raises SceneError.
+    """
+    first = next(iter(files.values())).name
+    if labels is None and "rows" not in files:
+        wrong(first, "no table of its rows", "give job_rows.csv with node and dof of each row")
+    if labels is None:
+        path = files["rows"]
+        with library_errors(path, "pandas", "pandas", "matrices"):
+            table = pd.read_csv(path, skipinitialspace=True)
+        if not {"node", "dof"} <= set(table) or any(table[name].dtype.kind != "i" for name in ("node", "dof")):
+            wrong(path.name, "no columns node and dof of whole numbers", "give a line for each row of the matrices")
+        labels = label(table["node"].to_numpy(), table["dof"].to_numpy(), path.name)
+    if np.unique(labels).size < labels.size:
+        wrong(first, "a dof has two rows", "give node and dof of each row once")
+    names = {name: files[name if name in files else "matrices"].name for name in found}
+    return {name: _entries_of_table(names[name], matrix, labels) for name, matrix in found.items()}
+
+
+def _entries_of_table(file: str, matrix: object, labels: IntArray) -> Entries:
     try:
         found = sp.coo_array(matrix if sp.issparse(matrix) else np.atleast_2d(np.asarray(matrix)))
     except (ValueError, TypeError) as error:
@@ -85,11 +103,9 @@ def of_table(file: str, matrix: object, labels: IntArray) -> Entries:
         found = found.T.tocoo()
     if found.shape[0] != labels.size or found.shape[1] not in (1, labels.size):
         shape = " x ".join(str(length) for length in found.shape)
-        remedy = "give node and dof of each row, in the order of the rows"
-        wrong(file, f"{shape} entries for {labels.size} rows", remedy)
+        wrong(file, f"{shape} entries for {labels.size} rows", "give node and dof of each row, in their order")
     if np.iscomplexobj(found.data):
-        remedy = "give real matrices of the sector and its cut faces, or a scene file with nd/<k>"
-        wrong(file, "complex numbers", remedy)
+        wrong(file, "complex numbers", "give real matrices with both cut faces, or a scene file with nd/<k>")
     vector = found.shape[1] == 1 and labels.size > 1
     columns = np.zeros_like(found.col) if vector else labels[found.col]
     return Entries(file, labels[found.row], columns.astype(np.int64), found.data.astype(np.float64))
@@ -113,8 +129,8 @@ def assemble(parts: Mapping[str, Entries], files: tuple[str, ...], code: str) ->
     found = {name: _symmetric(each, labels) for name, each in square.items()}
     held = int(np.count_nonzero(found["stiffness"].diagonal() > _HELD))
     if held:
-        entries = f"{held} entries of the diagonal are 1e36: boundary conditions were active at export"
-        wrong(parts["stiffness"].file, entries, "remove them in the step that writes the matrices")
+        what = f"{held} entries of the diagonal are 1e36: boundary conditions were active at export"
+        wrong(parts["stiffness"].file, what, "remove them in the step that writes the matrices")
     node, direction = labels // _DOFS, labels % _DOFS - 1
     load = _forces(parts["load"], labels) if "load" in parts else None
     return Matrices(found["stiffness"], found["mass"], node, direction, files, code, found.get("damping"), load)

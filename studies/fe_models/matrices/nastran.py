@@ -15,7 +15,7 @@ a negative number of rows). A column behind the last one ends the matrix.
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
@@ -24,9 +24,8 @@ from typing import TextIO
 import numpy as np
 from scipy import sparse
 
-from studies.fe_models.matrices.matrices import Entries, Matrices, assemble, label, wrong
-from studies.fe_models.matrices.tables import matrices_of_tables
-from studies.fe_models.text import LARGEST_FILE, check_file, shown
+from studies.fe_models.files import check_file, shown, to_float
+from studies.fe_models.matrices.matrices import Entries, entries_of_tables, label, wrong
 
 _USUAL = {"stiffness": "KAAX", "mass": "MAAX", "damping": "BAAX", "load": "PAX"}
 _CD = 5  # field of a GRID, counted behind its first word
@@ -52,19 +51,18 @@ def _names_of_matrices(names: Iterable[str], file: str) -> dict[str, str]:
     return found
 
 
-def read_punch(files: Mapping[str, Path]) -> Matrices:
-    """Matrices of a punch file with DMIG entries; others are passed over. Raises SceneError about "matrices"."""
+def read_punch(files: Mapping[str, Path]) -> dict[str, Entries]:
+    """Entries of a punch file with DMIG entries; others are passed over. Raises SceneError about "matrices"."""
     path = files["matrices"]
-    check_file(path, LARGEST_FILE, "matrices")
+    check_file(path)
     columns: dict[str, list[np.ndarray]] = {}
     passed: set[str] = set()
     with path.open(encoding="latin-1") as file:
         for number, word, fields in _entries(file):
             fields = [*fields, *[""] * (_CD + 1 - len(fields))]
             if word in ("GRID", "GRDSET") and fields[_CD] not in ("", "0"):
-                found = f"line {number}: {word} {shown(fields[0])} has displacements in the coordinate system"
-                remedy = "write the matrices with all displacements in the basic system: CD blank"
-                wrong(path.name, f"{found} {shown(fields[_CD])} (CD)", remedy)
+                what = f"{word} {shown(fields[0])} has displacements in the coordinate system {shown(fields[_CD])}"
+                wrong(path.name, f"line {number}: {what}", "write all of them in the basic system: CD blank")
             if word == "DMIG" and fields[0][:1].upper() in ("K", "M", "B", "P"):
                 try:
                     _take(fields, columns, passed)
@@ -78,7 +76,7 @@ def read_punch(files: Mapping[str, Path]) -> Matrices:
         # a column of forces is the number of its load case
         column = of_column if name == "load" else label(of_column, component, path.name)
         parts[name] = Entries(path.name, rows, column, table[:, 4])
-    return assemble(parts, (path.name,), "nastran")
+    return parts
 
 
 def _entries(lines: Iterable[str]) -> Iterator[tuple[int, str, list[str]]]:
@@ -135,15 +133,17 @@ def _take(fields: list[str], columns: dict[str, list[np.ndarray]], passed: set[s
 
 
 def _real(text: str) -> float:
-    """A number of Nastran: 1.0, 1.0D+3, 1.0+3."""
-    text = text.upper().replace("D", "E")
-    return float(text if "E" in text else re.sub(r"(?<=[\d.])(?=[+-]\d+$)", "E", text))
+    """A number of Nastran: 1.0, 1.0D+3, 1.0+3. Raises ValueError."""
+    value = to_float(text)
+    if math.isnan(value):
+        raise ValueError(f"{text!r} in place of a number")
+    return value
 
 
-def read_op4(files: Mapping[str, Path]) -> Matrices:
-    """Matrices of an OP4 file by the names of Nastran; the rows have a table. Raises SceneError about "matrices"."""
+def read_op4(files: Mapping[str, Path]) -> dict[str, Entries]:
+    """Entries of an OP4 file by the names of Nastran; the rows have a table. Raises SceneError about "matrices"."""
     path = files["matrices"]
-    check_file(path, LARGEST_FILE, "matrices")
+    check_file(path)
     found = {}
     try:
         with path.open("rb") as file:
@@ -155,10 +155,9 @@ def read_op4(files: Mapping[str, Path]) -> Matrices:
             values = np.concatenate([[], *(values for *_, values in parts)])
             found[name] = sparse.coo_array((values, (rows.astype(np.int64), columns.astype(np.int64))), shape=shape)
     except (ValueError, TypeError, IndexError, OverflowError, StopIteration) as error:
-        what = f"this is no OP4 file, or damaged ({shown(str(error))})"
-        wrong(path.name, what, "write it again: OUTPUT4 or EXTSEOUT")
+        wrong(path.name, f"no OP4 file, or damaged ({shown(str(error))})", "write it again: OUTPUT4 or EXTSEOUT")
     names = _names_of_matrices(found, path.name)
-    return matrices_of_tables({name: found[own] for name, own in names.items()}, files)
+    return entries_of_tables({name: found[own] for name, own in names.items()}, files)
 
 
 def _check_type(kind: int, name: str) -> None:

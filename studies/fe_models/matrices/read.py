@@ -1,46 +1,42 @@
-"""The table of formats of matrices: which files each has, by the name that a user gives, and what reads them."""
+"""Matrices of other programs: what reads which files, by the name that a user gives. Those of Nastran: `nastran.py`.
+
+CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes job.sti and job.mas, the upper triangle in lines "row column value"
+from 1, and job.dof with a line "node.direction" for every row, no number: 10.1 is not 10.10.
+
+Abaqus: `*MATRIX GENERATE, STIFFNESS, MASS` writes job_STIF1.mtx and job_MASS1.mtx, one triangle or both in lines "node,
+dof, node, dof, value" (FORMAT=MATRIX INPUT). Internal nodes are negative. A held dof has 1e36 on its diagonal.
+
+Substructures: `*SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED` writes a `*USER ELEMENT`, its nodes in comments,
+which may be repeated, their dofs, and the upper triangle of each `*MATRIX` column by column.
+
+MATLAB (.mat), MatrixMarket and Harwell-Boeing files have no labels. Node and dof of each row, in the order of the rows,
+are the variable `rows` (n, 2) of a .mat file, or stand beside the files in job_rows.csv with the columns node and dof;
+dof 0 is a coordinate of no place, as of a mode.
+"""
 
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from glob import escape
 from pathlib import Path
+from typing import Any
 
-from studies.fe_models.matrices.matrices import NAMES, Matrices
+import h5py
+import numpy as np
+from scipy import io, sparse
+
+from studies.fe_models.files import check_file, library_errors, shown
+from studies.fe_models.matrices.matrices import NAMES, Entries, Matrices, assemble, entries_of_tables, label, wrong
 from studies.fe_models.matrices.nastran import read_op4, read_punch
-from studies.fe_models.matrices.tables import read_ansys, read_matlab, read_tables
-from studies.fe_models.matrices.text_files import read_abaqus, read_calculix, read_substructure
 from studies.scene_error import SceneError
 
+Files = Mapping[str, Path]
+"""Files of a model by what is in them."""
 
-@dataclass(frozen=True)
-class Format:
-    """A format.
-
-    ends: of the names of its files, by what is in them; * is a number. Damping, load and the table of rows may be
-    missing. reader: takes these files. by_name: whether the name that the files have in common is enough.
-    """
-
-    reader: Callable[[Mapping[str, Path]], Matrices]
-    ends: Mapping[str, str]
-    by_name: bool = True
-
-
-_ROWS = {"rows": "_rows.csv"}
-_ABAQUS = zip(NAMES, ("STIF", "MASS", "DMPV", "LOAD"), strict=True)
-FORMATS = (
-    Format(read_calculix, {"stiffness": ".sti", "mass": ".mas", "dofs": ".dof"}),
-    Format(read_abaqus, {name: f"_{short}*.mtx" for name, short in _ABAQUS}),
-    *(Format(read_tables, {name: f"_{name}{end}" for name in NAMES} | _ROWS) for end in (".mtx", ".hb", ".rb")),
-    *(Format(read_punch, {"matrices": end}, end in (".pch", ".dmig")) for end in (".pch", ".dmig", ".bdf", ".dat")),
-    Format(read_op4, {"matrices": ".op4"} | _ROWS),
-    Format(read_matlab, {"matrices": ".mat"} | _ROWS),
-    Format(read_ansys, {"matrices": ".full"}),
-    Format(read_substructure, {"matrices": ".mtx"}),
-)
-"""Matrices of CalculiX, of Abaqus, of any program, of Nastran, MATLAB and ANSYS, and substructures."""
+_OF_TYPE = {"STIFFNESS": "stiffness", "MASS": "mass", "VISCOUSDAMPING": "damping"}
 
 
 def find_matrix_files(path: Path) -> tuple[Path, ...]:
@@ -53,12 +49,211 @@ def find_matrix_files(path: Path) -> tuple[Path, ...]:
 
 def read_matrices(path: Path) -> Matrices:
     """The matrices of these files. Raises SceneError about "matrices"."""
-    reader, files = _find(path)
-    return reader(files)
+    kind, files = _find(path)
+    return assemble(kind.reader(files), tuple(own.name for part, own in files.items() if part != "rows"), kind.code)
 
 
-def _find(path: Path) -> tuple[Callable[[Mapping[str, Path]], Matrices], dict[str, Path]]:
-    """What reads the matrices, and their files by what is in them."""
+def _read_calculix(files: Files) -> dict[str, Entries]:
+    dofs = files["dofs"]
+    node, direction = _read_columns(dofs, ".", (int, int))
+    labels, n_dof = label(node, direction, dofs.name), node.size
+    if np.unique(labels).size < n_dof:
+        at = np.setdiff1d(np.arange(n_dof), np.unique(labels, return_index=True)[1])[0]
+        wrong(dofs.name, f"dof {direction[at]} of node {node[at]} has two rows", "export the matrices again")
+    parts = {}
+    for name in ("stiffness", "mass"):
+        path = files[name]
+        rows, columns, values = _read_columns(path, None, (int, int, float))
+        size = int(max(rows.max(), columns.max()))
+        if size == 2 * n_dof:
+            found = f"{size} rows for {n_dof} dofs in {dofs.name}, written for a nodal diameter"
+            wrong(path.name, found, "export without *SELECT CYCLIC SYMMETRY MODES, and with CYCMPC=INACTIVE")
+        if size != n_dof or min(rows.min(), columns.min()) < 1:
+            wrong(path.name, f"{size} rows for {n_dof} dofs in {dofs.name}", "give the three whole files of one run")
+        parts[name] = Entries(path.name, labels[rows - 1], labels[columns - 1], values)
+    return parts
+
+
+def _read_abaqus(files: Files) -> dict[str, Entries]:
+    parts = {}
+    for name, path in files.items():
+        kinds = (int, int, float) if name == "load" else (int, int, int, int, float)
+        *labels, values = _read_columns(path, ",", kinds, "*")
+        if any((node == 0).any() for node in labels[::2]):
+            wrong(path.name, "a node with the number 0", "export it again, FORMAT=MATRIX INPUT")
+        rows = label(labels[0], labels[1], path.name)
+        columns = np.zeros_like(rows) if name == "load" else label(labels[2], labels[3], path.name)
+        parts[name] = Entries(path.name, rows, columns, values)
+    return parts
+
+
+def _read_columns(
+    path: Path, separator: str | None, kinds: tuple[type, ...], comment: str | None = None
+) -> list[np.ndarray]:
+    """Columns of a text file, one array each, of the given types, int or float. Raises SceneError.
+
+    separator: between the numbers; None for any blanks. comment: character with which lines begin without numbers.
+    """
+    check_file(path)
+    columns = [(f"{place}", np.int64 if kind is int else np.float64) for place, kind in enumerate(kinds)]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a file without data
+            table = np.loadtxt(path, columns, comment, separator, encoding="latin-1", ndmin=1)
+    except (ValueError, OverflowError) as error:
+        remedy = "write them again" + (", FORMAT=MATRIX INPUT" if separator == "," else "")
+        wrong(path.name, f"a line is no row of numbers ({shown(str(error))})", remedy)
+    if not table.size:
+        wrong(path.name, "no entries in the file", "export it again")
+    return [table[name] for name, _ in columns]
+
+
+def _read_substructure(files: Files) -> dict[str, Entries]:
+    path = files["matrices"]
+    check_file(path)
+    nodes: list[int] = []
+    dofs: list[list[int]] = []
+    numbers: dict[str, list[float]] = {}
+    into: list[float] | None = None
+    in_nodes = False
+    with path.open(encoding="latin-1") as file:
+        for number, text in enumerate(file, 1):
+            fields = [field.strip() for field in text.lstrip("* ").split(",") if field.strip()]
+            try:
+                if text.startswith("**"):
+                    in_nodes = in_nodes and all(field.lstrip("-").isdigit() for field in fields)
+                    nodes += [int(field) for field in fields] if in_nodes else []
+                    in_nodes = in_nodes or text.upper().split() == ["**", "ELEMENT", "NODES"]
+                elif text.startswith("*"):
+                    in_nodes = False
+                    kind = text.upper().replace(" ", "").strip().partition("*MATRIX,TYPE=")[2]
+                    into = numbers.setdefault(_OF_TYPE.get(kind, kind), []) if kind else None
+                elif into is not None:
+                    into += [float(field) for field in fields]
+                elif fields and not numbers:
+                    dofs.append([int(field) for field in fields])
+            except ValueError:
+                wrong(path.name, f"line {number} is {shown(text)!r}", "write OUTPUT FILE=USER DEFINED")
+    if not nodes or not dofs:
+        wrong(path.name, "no *USER ELEMENT with its nodes", "write OUTPUT FILE=USER DEFINED")
+    # dofs of the first node, then the place of a node from which on others hold, and these
+    changes, own, pairs = {each[0]: each[1:] for each in dofs[1:]}, dofs[0], []
+    for place, node in enumerate(nodes, 1):
+        own = changes.get(place, own)
+        pairs += [(node, dof) for dof in own]
+    rows = np.array(pairs, dtype=np.int64)
+    labels = label(rows[:, 0], rows[:, 1], path.name)
+    column, row = np.tril_indices(labels.size)
+    parts = {}
+    for name, values in numbers.items():
+        if name not in _OF_TYPE.values():
+            continue
+        if len(values) != row.size:
+            wrong(path.name, f"{len(values)} entries of {name} for {labels.size} dofs", "write the whole triangle")
+        parts[name] = Entries(path.name, labels[row], labels[column], np.array(values))
+    return parts
+
+
+def _read_tables(files: Files) -> dict[str, Entries]:
+    """MatrixMarket and Harwell-Boeing files, each with a matrix."""
+    found = {}
+    for name in [name for name in NAMES if name in files]:
+        path = files[name]
+        with library_errors(path, "scipy.io", "scipy", "matrices"):
+            found[name] = io.mmread(path) if path.suffix.lower() == ".mtx" else io.hb_read(path)
+    return entries_of_tables(found, files)
+
+
+def _read_matlab(files: Files) -> dict[str, Entries]:
+    """A .mat file of any version, by the variables NAMES and `rows`."""
+    path = files["matrices"]
+    with library_errors(path, "scipy.io", "scipy", "matrices"):
+        with path.open("rb") as file:
+            newest = file.read(10) == b"MATLAB 7.3" or h5py.is_hdf5(path)
+        found = _read_v73(path) if newest else io.loadmat(path, variable_names=[*NAMES, "rows"])
+    labels = None
+    if "rows" in found:
+        table = np.asarray(found["rows"])
+        if table.ndim != 2 or table.shape[1] != 2 or table.dtype.kind not in "iuf":
+            wrong(path.name, f"rows have the shape {table.shape}", "give node and dof of each row of the matrices")
+        labels = label(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), path.name)
+    return entries_of_tables({name: found[name] for name in NAMES if name in found}, files, labels)
+
+
+def _read_v73(path: Path) -> dict[str, Any]:
+    """Variables of a .mat file of version 7.3, which is HDF5 and holds arrays transposed."""
+    found: dict[str, Any] = {}
+    with h5py.File(path) as file:
+        for name in {*NAMES, "rows"} & set(file):
+            item = file[name]
+            if isinstance(item, h5py.Group):  # a sparse matrix, column by column
+                places, starts = (item[part][()].astype(np.int64) for part in ("ir", "jc"))
+                shape = int(item.attrs["MATLAB_sparse"]), len(starts) - 1
+                found[name] = sparse.csc_array((item["data"][()], places, starts), shape=shape)
+            else:
+                values = item[()].T
+                found[name] = values["real"] + 1j * values["imag"] if values.dtype.names else values
+    return found
+
+
+def _read_ansys(files: Files) -> dict[str, Entries]:
+    """A .full file, without the rows that ANSYS holds."""
+    path = files["matrices"]
+    with library_errors(path, "ansys.mapdl.reader", "ansys-mapdl-reader", "matrices"):
+        from ansys.mapdl import reader
+
+        try:
+            file = reader.read_binary(str(path))
+        except NotImplementedError as error:
+            what = "lumped" if "lumped" in str(error) else "not symmetric"
+            wrong(path.name, f"the matrices are {what}", "write them with LUMPM,OFF and without CORIOLIS")
+        reference, stiffness, mass = file.load_km() if hasattr(file, "load_km") else (None, None, None)
+        if stiffness is None or mass is None:
+            wrong(path.name, "no stiffness and mass", "write that of a modal analysis, with HBMAT or WRFULL before it")
+        held = np.array([[node, direction] for node, direction in file.const], dtype=np.int64).reshape(-1, 2)
+    reference = np.asarray(reference, dtype=np.int64)
+    labels = label(reference[:, 0], reference[:, 1] + 1, path.name)
+    # held rows are in the file, empty
+    free = np.flatnonzero(~np.isin(labels, label(held[:, 0], held[:, 1] + 1, path.name)))
+    if not free.size:
+        wrong(path.name, "no dof that is free", "write the file of the unconstrained bodies")
+    found = {"stiffness": stiffness, "mass": mass}
+    own = {name: matrix.tocsr()[free][:, free] for name, matrix in found.items()}
+    return entries_of_tables(own, files, labels[free])
+
+
+@dataclass(frozen=True)
+class _Format:
+    """A format.
+
+    code: see `Matrices`. ends: of the names of its files, by what is in them; * is a number. Damping, load and the
+    table of rows may be missing. by_name: whether the name that the files have in common is enough.
+    """
+
+    code: str
+    reader: Callable[[Files], dict[str, Entries]]
+    ends: Mapping[str, str]
+    by_name: bool = True
+
+
+_ROWS = {"rows": "_rows.csv"}
+_ABAQUS = zip(NAMES, ("STIF", "MASS", "DMPV", "LOAD"), strict=True)
+FORMATS = (
+    _Format("calculix", _read_calculix, {"stiffness": ".sti", "mass": ".mas", "dofs": ".dof"}),
+    _Format("abaqus", _read_abaqus, {name: f"_{short}*.mtx" for name, short in _ABAQUS}),
+    *(_Format("table", _read_tables, {name: f"_{name}{e}" for name in NAMES} | _ROWS) for e in (".mtx", ".hb", ".rb")),
+    *(_Format("nastran", read_punch, {"matrices": end}) for end in (".pch", ".dmig")),
+    *(_Format("nastran", read_punch, {"matrices": end}, by_name=False) for end in (".bdf", ".dat")),
+    _Format("table", read_op4, {"matrices": ".op4"} | _ROWS),
+    _Format("table", _read_matlab, {"matrices": ".mat"} | _ROWS),
+    _Format("ansys", _read_ansys, {"matrices": ".full"}),
+    _Format("abaqus", _read_substructure, {"matrices": ".mtx"}),
+)
+"""Matrices of CalculiX, of Abaqus, of any program, of Nastran, MATLAB and ANSYS, and substructures."""
+
+
+def _find(path: Path) -> tuple[_Format, dict[str, Path]]:
+    """The format of the matrices, and their files by what is in them."""
     for each in FORMATS:
         for end in set(each.ends.values()) - set(_ROWS.values()):
             pattern = "(.*)" + re.escape(end).replace(r"\*", r"(\d+)")
@@ -66,7 +261,7 @@ def _find(path: Path) -> tuple[Callable[[Mapping[str, Path]], Matrices], dict[st
                 job, number = match[1], match[match.re.groups]
                 files = {part: path.with_name(job + name.replace("*", number)) for part, name in each.ends.items()}
                 may_miss = ("damping", "load", "rows")
-                return each.reader, {part: own for part, own in files.items() if part not in may_miss or own.is_file()}
+                return each, {part: own for part, own in files.items() if part not in may_miss or own.is_file()}
     firsts = [next(iter(each.ends.values())) for each in FORMATS if each.by_name]
     found = [
         file for end in firsts for file in sorted(path.parent.glob(escape(path.name) + end.replace("*", "[0-9]*")))

@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.fe_models.from_files.model import find_files, load_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.finite_element.reduced_joint import glued_frequencies, prepare_model
+from studies.finite_element.reduced_joint import prepare_model
 from tests.studies.fe_models.solid_meshes import run_ccx
 
 SECTOR = Path(__file__).parent / "calculix_sector.inp"
@@ -232,7 +232,7 @@ def prepared_deck(folder, text, nodal_diameter=0, **given):
 
 def frequencies(folder, text, nodal_diameter=0, **given):
     """The four lowest glued frequencies of a deck, Hz."""
-    return glued_frequencies(prepared_deck(folder, text, nodal_diameter, **given)[0], nodal_diameter, 4)
+    return prepared_deck(folder, text, nodal_diameter, **given)[0].frequencies(nodal_diameter, 4)
 
 
 def run_tied(folder, text, step):

@@ -5,7 +5,6 @@ import shutil
 import numpy as np
 import pytest
 
-from studies.finite_element.reduced_joint import glued_frequencies
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 from tests.studies.fe_models.solid_meshes import needs_ccx
@@ -105,7 +104,7 @@ def test_forces_of_the_deck_and_gravity(tmp_path):
     moved = []
     for force in ("900, 1, 6.", "XE, 1, 1."):
         pulled, _ = prepared_deck(tmp_path, f"{coupling}{force}\n*END STEP\n")
-        moved.append(pulled.reduction.solve_static(pulled.static_load))
+        moved.append(pulled.solve_static(pulled.static_load))
     np.testing.assert_allclose(moved[0], moved[1], atol=1e-9 * abs(moved[0]).max())
 
 
@@ -133,7 +132,7 @@ def test_moving_nodes_that_are_held_obliquely(tmp_path):
     assert prepared.pairs.present.sum(axis=0).tolist() == [15, 15, 12]
     other, _ = prepared_deck(tmp_path, text.replace("\nSUP, SLOW\n", "\nSLOW, SUP\n"))
     assert other.pairs.moving_name == ("SLOW",)
-    own, expected = (glued_frequencies(each, 0, 4) for each in (prepared, other))
+    own, expected = (each.frequencies(0, 4) for each in (prepared, other))
     np.testing.assert_allclose(own, expected, rtol=1e-9)
     if shutil.which("ccx") is not None:
         # of nodes that are tied CalculiX holds those of the other surface

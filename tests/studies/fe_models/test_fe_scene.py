@@ -37,7 +37,7 @@ def dense_twin(sector, joint, pairs, forms, nodal_diameter, n_modes):
     follow = node_blocks(n_nodes, rows)
     phase = np.exp(2j * np.pi * nodal_diameter / N_SECTORS)
     rows = [
-        [(right, np.eye(3)), (left, -phase * joint.cut.rotation)]
+        [(right, np.eye(3)), (left, -phase * joint.cut.axis.pitch())]
         for left, right in zip(joint.cut.left, joint.cut.right, strict=True)
     ]
     held = np.eye(3 * n_nodes)[joint.held.ravel()]
@@ -80,22 +80,22 @@ def test_reduction_against_dense_constraints(name, nodal_diameter):
     sector = CASES[name]()
     joint = sector.joint(held=plane_of_symmetry(sector)) if name == "plane of symmetry" else sector.joint()
     prepared = prepare_model(sector.model(), joint)
-    pairs, forms = prepared.pairs, prepared.reduction.forms
+    pairs, forms = prepared.pairs, prepared.forms
     load = np.stack([prepared.static_load, joint.load], axis=1)
     n_modes = 5
-    own = prepared.reduction.reduce(nodal_diameter, n_modes, load)
+    found, own, vectors = prepared.reduce(nodal_diameter, n_modes, load)
     shapes, stiffness, mass, frequencies = dense_twin(sector, joint, pairs, forms, nodal_diameter, n_modes)
     n = len(stiffness)
-    assert own.forms["stiffness"].shape == (n + n_modes, n + n_modes)
-    assert np.iscomplexobj(own.forms["mass"]) == (nodal_diameter == 2)
-    for ours, reference in ((own.forms["stiffness"], stiffness), (own.forms["mass"], mass)):
+    assert own["stiffness"].shape == (n + n_modes, n + n_modes)
+    assert np.iscomplexobj(own["mass"]) == (nodal_diameter == 2)
+    for ours, reference in ((own["stiffness"], stiffness), (own["mass"], mass)):
         assert np.abs(ours[:n, :n] - reference).max() < 1e-8 * np.abs(reference).max()
-    assert np.allclose(own.frequencies, frequencies, rtol=1e-8)
-    assert np.allclose(np.diag(own.forms["stiffness"])[n:], frequencies**2, rtol=1e-8)
-    assert np.abs(own.vectors[:n] - shapes.conj().T @ load).max() < 1e-8 * np.abs(own.vectors).max()
+    assert np.allclose(found, frequencies, rtol=1e-8)
+    assert np.allclose(np.diag(own["stiffness"])[n:], frequencies**2, rtol=1e-8)
+    assert np.abs(vectors[:n] - shapes.conj().T @ load).max() < 1e-8 * np.abs(vectors).max()
     # elastic stiffness, which is not the one of the shapes
     elastic = shapes.conj().T @ forms["elastic"].toarray() @ shapes
-    assert np.abs(own.forms["elastic"][:n, :n] - elastic).max() < 1e-7 * np.abs(elastic).max()
+    assert np.abs(own["elastic"][:n, :n] - elastic).max() < 1e-7 * np.abs(elastic).max()
 
 
 def test_pairs_on_cut_faces_and_planes_of_symmetry():

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from studies.finite_element.closest_points import closest_points
 from studies.finite_element.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
-from studies.finite_element.surfaces import faces_of_elements, pressure_forces, surface_of_faces, surface_of_nodes
+from studies.finite_element.surfaces import (
+    closest_points,
+    faces_of_elements,
+    pressure_forces,
+    surface_of_faces,
+    surface_of_nodes,
+)
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, surface_where
 from tests.studies.fe_models.solid_meshes import block, joined
@@ -147,7 +152,7 @@ def test_cut_faces_are_matched_and_found():
     axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
     shuffled = np.random.default_rng(0).permutation(sector.left)
     cut = match_cut_faces(mesh, axis, sector.right, shuffled)
-    turned = mesh.coordinates[cut.left] @ cut.rotation.T
+    turned = mesh.coordinates[cut.left] @ cut.axis.pitch().T
     assert np.allclose(turned, mesh.coordinates[cut.right], atol=1e-10)
     assert np.array_equal(np.sort(cut.left), sector.left)
     found = find_cut_faces(mesh, axis, NONE)
@@ -159,7 +164,7 @@ def test_cut_faces_are_matched_and_found():
     tilted = CyclicAxis(N_SECTORS, np.array([1.0, 2.0, 3.0]), frame @ Z)
     again = match_cut_faces(replace(mesh, coordinates=moved), tilted, sector.left, sector.right)
     assert np.array_equal(again.left[np.argsort(again.left)], np.sort(cut.left))
-    assert np.allclose(again.rotation @ frame, frame @ cut.rotation, atol=1e-12)
+    assert np.allclose(again.axis.pitch() @ frame, frame @ cut.axis.pitch(), atol=1e-12)
 
 
 def test_wrong_cut_faces_are_named():

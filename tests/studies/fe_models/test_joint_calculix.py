@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.fe_models.files import UNITS
 from studies.fe_models.from_files.check import describe_model
 from studies.fe_models.from_files.imported import order_by_nodes
 from studies.fe_models.from_files.model import find_files, load_model, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.matrices.read import read_matrices
-from studies.fe_models.model_files import UNITS
-from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
+from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.finite_element.solid_mesh import Rotation
 from studies.finite_element.structure import FeModel, ReductionOptions
 from studies.scene_error import SceneError
@@ -70,7 +70,7 @@ def test_meshes_that_do_not_match(tmp_path):
     prepared = prepare_model(sector.model(prestress=False), sector.joint())
     assert not np.isclose(prepared.pairs.opposite.data, 1.0).all()
     expected = calculix_frequencies(tmp_path, sector_lines(sector), (0, 2))
-    own = np.array([glued_frequencies(prepared, k, N_MODES) for k in (0, 2)])
+    own = np.array([prepared.frequencies(k, N_MODES) for k in (0, 2)])
     assert np.abs(own / expected - 1.0).max() < 1e-3
 
 
@@ -109,13 +109,13 @@ def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
     (tmp_path / "s.inp").write_text("\n".join(lines) + "\n", encoding="ascii")
     given = {"units": "SI", "friction_coefficient": 0.3, "n_sectors": 12, "axis": {"direction": [0, 0, 1]}}
     given |= {"clamp": ["BORE"], "load": {"set": "LEAD", "direction": [0, 1, 0]}}
-    expected = [glued_frequencies(prepare_model(model, joint), k, N_MODES) for k in (0, 3, 6)]
+    expected = [prepare_model(model, joint).frequencies(k, N_MODES) for k in (0, 3, 6)]
     for change in ({"contact": [["LEAD", "TRAIL"]]}, {"contact": [["TRAIL", "LEAD"]]}):
         parameters = Parameters(**given, **change, next_sector=True)
         loaded = load_model(find_files(tmp_path, "s.inp", parameters), parameters)
         assert sorted(loaded.joint.cut.left) == sorted(joint.cut.left)
         prepared = prepare_model(loaded.model, loaded.joint)
-        found = [glued_frequencies(prepared, k, N_MODES) for k in (0, 3, 6)]
+        found = [prepared.frequencies(k, N_MODES) for k in (0, 3, 6)]
         np.testing.assert_allclose(found, expected, rtol=1e-7)
     rows = dict(describe_model(loaded, reduce_model(loaded, parameters, 1), parameters))
     assert "8 nodes of TRAIL on LEAD of the sector before" in rows["contact"]
@@ -135,6 +135,6 @@ def test_stuck_shrouds_are_those_of_calculix(tmp_path):
     left = np.concatenate([joint.cut.left, contact.second.nodes])
     right = np.concatenate([joint.cut.right, contact.first.nodes])
     prepared, diameters = prepare_model(model, joint), (0, 1, 3, 5, 6)
-    own = [glued_frequencies(prepared, k, N_MODES) for k in diameters]
+    own = [prepared.frequencies(k, N_MODES) for k in diameters]
     lines = cyclic_lines(model.mesh, np.flatnonzero(joint.held[:, 0]), left, right)
     np.testing.assert_allclose(own, calculix_frequencies(tmp_path, lines, diameters), rtol=2e-4)

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy import io
 
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.finite_element.solid_mesh import assemble_stiffness
@@ -95,6 +96,12 @@ def test_tables_without_their_rows_or_with_complex_numbers(tmp_path, kind):
         REDUCED[kind](tmp_path, {**named, "stiffness": matrix}, of_rows)
         with pytest.raises(SceneError, match=sentence):
             read_matrices(tmp_path / "job")
+
+
+def test_a_file_of_matlab_without_any_of_the_matrices(tmp_path):
+    io.savemat(tmp_path / "job.mat", {"other": 1.0})
+    with pytest.raises(SceneError, match=r"matrices: job.mat: no table of its rows"):
+        read_matrices(tmp_path / "job")
 
 
 @needs_ccx

@@ -51,6 +51,7 @@ NO_FRICTION = [with_friction("*FRICTION, TAUMAX=100.\n0.4"), with_friction("*FRI
     ("text", "sentence"),
     [
         (BLOCKS + "*CONTACT\n", r"\*CONTACT: .* may change the model; give \*CONTACT PAIR for"),
+        (BLOCKS + "*COUPLING, REF NODE=5, SURFACE=SUP\n", r"\*COUPLING: no \*KINEMATIC below it"),
         (BLOCKS + "*NONSENSE\n", r"\*NONSENSE: .* may change the model; remove it"),
         (BLOCKS + "*MATERIAL, NAME=STEEL\n*ELASTIC\n7e4, 0.3\n", r"\*ELASTIC: one material again \(before: deck.inp"),
         (BLOCKS + "*INITIAL CONDITIONS, TYPE=STRESS\n", r"\*INITIAL CONDITIONS: TYPE=STRESS is not read"),

@@ -1,4 +1,7 @@
-"""Estimated errors of a history of wear or of missions, from its difference to the reference solution."""
+"""Estimated errors of a history of wear or of missions, from its difference to another solution.
+
+An adaptive history is compared with its reference solution, a history with given steps with the adaptive history.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ import numpy as np
 
 from solver.model import BoolArray, FloatArray
 from solver.settings import WearTarget
+from solver.wear.slow_time import Solution
 
 HISTORY_SAFETY = 1.5
 """Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps of
@@ -43,20 +47,46 @@ class HistoryError:
 
 @dataclass(frozen=True)
 class Compared:
-    """Values of a history and of its reference solution at equal counts.
+    """Values of a history and of another solution at equal counts.
 
-    counts (n,): ascending. fine, reference: values as of `Course.read`, none where there is no reference solution.
+    counts (n,): ascending. values, reference: as of `Course.read`; the latter empty where there is no other solution.
     follows: whether the frequency of the excitation follows the structure.
     """
 
     counts: FloatArray
-    fine: Mapping[str, Any]
+    values: Mapping[str, Any]
     reference: Mapping[str, Any]
     follows: bool = False
 
     def other(self, name: str) -> Any:
-        """Values of the reference solution."""
-        return self.reference.get(name, np.full_like(self.fine[name], np.nan))
+        """Values of the other solution."""
+        return self.reference.get(name, np.full_like(self.values[name], np.nan))
+
+
+def compare(
+    solution: Solution,
+    counts: FloatArray,
+    *,
+    given: bool = False,
+    follows: bool = False,
+    part: Callable[[dict[str, Any]], dict[str, Any]] = lambda values: values,
+) -> tuple[Compared, HistoryError]:
+    """A history beside the solution that it is compared with at ascending counts (n,), and its errors there.
+
+    given: whether its steps are given, so that the other solution is an adaptive history. follows: as in `Compared`.
+    part: what is compared of the values of both.
+    """
+    course, other = solution.course, solution.compared
+    if given and other is not None and other.state is not None:
+        _, error = compare(other, counts, follows=follows)
+        both = Compared(counts, course.read(counts), other.course.read(counts), follows)
+        return both, error_of_given_steps(both, error, course.area)
+    known = None if given or other is None or not other.course.nodes else other.course
+    both, steps = (
+        Compared(at, part(course.read(at)), {} if known is None else part(known.read(at)), follows)
+        for at in (counts, course.counts)
+    )
+    return both, history_error(both, steps, course.area)
 
 
 def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> HistoryError:
@@ -65,23 +95,23 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     outputs, steps: both solutions at the counts to report, the first 0, and at the ends of the steps.
     area (n_contact,): m2.
     """
-    fine = outputs.fine
+    values = outputs.values
 
     def crossing(differences: FloatArray) -> FloatArray:
-        return HISTORY_SAFETY * largest_before(steps.counts, differences, outputs.counts)
+        return HISTORY_SAFETY * _largest_before(steps.counts, differences, outputs.counts)
 
     def largest(change: Callable[[Compared], FloatArray]) -> FloatArray:
         return np.fmax(HISTORY_SAFETY * change(outputs), crossing(change(steps)))
 
-    depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
+    depth, volume = values["wear_depth"], values["wear_depth"] @ area
     difference = HISTORY_SAFETY * _depth_change(outputs)
     error = np.fmax(difference @ area, crossing(_depth_change(steps) @ area))
     # the error of the start state remains, even where later states agree by chance: its rates, pair by pair
-    rate, other = (rates[0] * area for rates in (fine["depth_rate"], outputs.other("depth_rate")))
+    rate, other = (rates[0] * area for rates in (values["depth_rate"], outputs.other("depth_rate")))
     known = rate.sum() > 0.0 and np.isfinite(other).all()
-    at_start = np.fmax(np.abs(rate - other).sum() / rate.sum() if known else 0.0, fine["wear_rate_error"][0])
+    at_start = np.fmax(np.abs(rate - other).sum() / rate.sum() if known else 0.0, values["wear_rate_error"][0])
     # start state and steps have nothing to do with each other: the worst case is their sum
-    error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume + fine["local"])
+    error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume + values["local"])
     # a pair that agrees with the reference solution better than the volume does so by chance (dovetail, 211.25 Hz: else
     # 5 of 24 deep pairs are outside of their errors, by seven times); the error of the volume is smaller than that of
     # its independent pairs by the root of the number of equal pairs that would share the volume
@@ -93,16 +123,13 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     unknown = np.asarray(~np.isfinite(difference).all(axis=1))
     response = np.fmax(largest(_response_change), _change_within(volume, error, steps, area))
     frequency = _frequency_error(outputs, HISTORY_SAFETY, 0.0)
-    return _known(outputs, HistoryError(error, of_pairs, response, largest(_rate_change), frequency), unknown, area)
+    return _completed(outputs, HistoryError(error, of_pairs, response, largest(_rate_change), frequency), unknown, area)
 
 
 def error_of_given_steps(outputs: Compared, adaptive: HistoryError, area: FloatArray) -> HistoryError:
-    """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter.
-
-    outputs: the history, and the adaptive one in place of the reference solution. adaptive: errors of the latter.
-    """
+    """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter."""
     apart, other = _depth_change(outputs), outputs.other("wear_depth") @ area
-    found = HistoryError(
+    error = HistoryError(
         apart @ area + adaptive.worn_volume * other,
         apart + adaptive.wear_depth,
         # both relative errors of the adaptive history are nearly those of this one: their values are as large
@@ -110,76 +137,72 @@ def error_of_given_steps(outputs: Compared, adaptive: HistoryError, area: FloatA
         _rate_change(outputs) + adaptive.wear_rate,
         _frequency_error(outputs, 1.0, adaptive.excitation_frequency),
     )
-    return _known(outputs, found, ~np.isfinite(found.worn_volume), area)
+    return _completed(outputs, error, ~np.isfinite(error.worn_volume), area)
 
 
-def _known(outputs: Compared, found: HistoryError, unknown: BoolArray, area: FloatArray) -> HistoryError:
+def _completed(outputs: Compared, error: HistoryError, unknown: BoolArray, area: FloatArray) -> HistoryError:
     """Errors whose worn volume, m3, becomes relative: inf where unknown (n,), NaN beyond the end of the history."""
-    fine, depth = outputs.fine, outputs.fine["wear_depth"]
+    values, depth = outputs.values, outputs.values["wear_depth"]
     volume = depth @ area
     reached, unworn = np.isfinite(volume), (outputs.counts == 0.0) | (volume <= 0.0)
 
-    def of_state(name: str, error: FloatArray) -> FloatArray:
+    def of_state(name: str, change: FloatArray) -> FloatArray:
         # an unworn state has errors of its own, from states with more harmonics
-        larger = np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], error)))
+        larger = np.where(unworn, values[name], np.where(unknown, np.inf, np.fmax(values[name], change)))
         return np.where(reached, larger, np.nan)
 
-    relative = np.where(unknown & (volume > 0.0), np.inf, _over(found.worn_volume, volume))
-    of_pairs = np.where(unknown[:, None], np.where(depth > 0.0, np.inf, 0.0), found.wear_depth)
+    relative = np.where(unknown & (volume > 0.0), np.inf, _over(error.worn_volume, volume))
+    of_pairs = np.where(unknown[:, None], np.where(depth > 0.0, np.inf, 0.0), error.wear_depth)
     return HistoryError(
         np.where(reached, relative, np.nan),
         np.where(reached[:, None], of_pairs, np.nan),
-        of_state("response_error", found.response),
-        of_state("wear_rate_error", found.wear_rate),
-        found.excitation_frequency,
+        of_state("response_error", error.response),
+        of_state("wear_rate_error", error.wear_rate),
+        error.excitation_frequency,
     )
 
 
 def error_of_target(
-    target: WearTarget,
-    at: float,
-    other: float,
-    fine: Mapping[str, Any],
-    last_rate: FloatArray,
-    error: HistoryError,
-    area: FloatArray,
+    solution: Solution, target: WearTarget, compare_at: Callable[[FloatArray], tuple[Compared, HistoryError]]
 ) -> float:
-    """Estimated error of the count at which a history reaches its target: its difference to the other solution, or the
-    time that the error of the wear takes, if that is longer.
-
-    at, other: counts at which both solutions reach the target; NaN where the other one does not.
-    fine, error: values and errors of the history at two counts, of which the target is the second.
-    last_rate (n_contact,): wear rates at the end of the history, m per count. area (n_contact,): m2.
+    """Estimated error of the count at which a history has reached its target: its difference to that of the other
+    solution, or the time that the error of the wear takes, if that is longer. compare_at: as `compare`, at some counts.
     """
-    depth, weights = fine["wear_depth"][1], area
-    wrong = float(error.worn_volume[1] * (depth @ area))
+    course, other = solution.course, solution.compared
+    if other is None:
+        return math.inf
+    at, by_interpolation = course.reach(target)
+    both, error = compare_at(np.array([0.0, at]))
+    depth, weights = both.values["wear_depth"][1], course.area
+    wrong = float(error.worn_volume[1] * (depth @ weights))
     if target.quantity == "wear_depth":
         # any pair may have the largest depth within its error
         weights = np.arange(depth.size) == depth.argmax()
         wrong = float((depth + error.wear_depth[1]).max(initial=0.0) - depth.max(initial=0.0))
-    rate = min(float(rates @ weights) for rates in (fine["depth_rate"][1], last_rate))
+    last_rate = course.nodes[-1].rate.reshape(-1, depth.size).sum(axis=0)
+    rate = min(float(rates @ weights) for rates in (both.values["depth_rate"][1], last_rate))
     by_wear = 0.0 if wrong == 0.0 else wrong / rate if rate > 0.0 else math.inf
-    apart = abs(other - at)
-    return max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0)
+    apart = abs(other.course.reach(target)[0] - at)
+    return max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0) + by_interpolation
 
 
 def _frequency_error(both: Compared, safety: float, known: FloatArray | float) -> FloatArray:
     """Error (n,), Hz, of the frequency of the excitation: its difference times `safety`, and the error of the other."""
     name = "excitation_frequency"
-    own = both.fine.get("excitation_frequency_error", np.zeros(len(both.counts)))
+    of_states = both.values.get("excitation_frequency_error", np.zeros(len(both.counts)))
     if not both.follows:
-        return np.asarray(own)
-    whole = np.maximum(own, safety * np.abs(both.fine[name] - both.other(name)) + known)
-    return np.where(np.isfinite(both.fine["wear_rate"]) & np.isnan(whole), np.inf, whole)
+        return np.asarray(of_states)
+    whole = np.maximum(of_states, safety * np.abs(both.values[name] - both.other(name)) + known)
+    return np.where(np.isfinite(both.values["wear_rate"]) & np.isnan(whole), np.inf, whole)
 
 
-def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
+def _largest_before(at: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
     """Largest difference (n_output, ...) from `CROSSING_WINDOW` times each count up to this count; 0 if none.
 
-    cycles (n,): ascending counts of the differences (n, ...), NaN beyond the end of the reference solution.
+    at (n,): ascending counts of the differences (n, ...), NaN beyond the end of the reference solution.
     """
     known = np.isfinite(differences).all(axis=tuple(range(1, differences.ndim)))
-    at, differences = cycles[known], differences[known]
+    at, differences = at[known], differences[known]
     first = np.searchsorted(at, CROSSING_WINDOW * counts, "left")
     last = np.searchsorted(at, counts, "right")
     return np.array([differences[one:other].max(axis=0, initial=0.0) for one, other in zip(first, last, strict=True)])
@@ -189,27 +212,27 @@ def _change_within(volume: FloatArray, error: FloatArray, steps: Compared, area:
     """Relative change (n,) of the response while the worn volume (n,), m3, passes the values within its error (n,), m3:
     a state is not known better than the depths with which it vibrates. steps: the history at the ends of its steps.
     """
-    worn = steps.fine["wear_depth"] @ area
-    response, worn = steps.fine["response"][np.isfinite(worn)], worn[np.isfinite(worn)]
-    found = np.zeros_like(volume)
+    worn = steps.values["wear_depth"] @ area
+    response, worn = steps.values["response"][np.isfinite(worn)], worn[np.isfinite(worn)]
+    change = np.zeros_like(volume)
     for place in np.flatnonzero(np.isfinite(error)) if worn.size > 1 else ():
         low, high = volume[place] - error[place], volume[place] + error[place]
         ends = np.array([np.interp([volume[place], low, high], worn, each) for each in response.T])
         size, passed = np.linalg.norm(ends[:, 0]), response[(worn > low) & (worn < high)].T
         if size > 0.0:
-            found[place] = np.linalg.norm(np.hstack([ends, passed]) - ends[:, :1], axis=0).max() / size
-    return found
+            change[place] = np.linalg.norm(np.hstack([ends, passed]) - ends[:, :1], axis=0).max() / size
+    return change
 
 
 def _depth_change(both: Compared) -> FloatArray:
     """Difference (n, n_contact) of the depths, m."""
-    return np.asarray(np.abs(both.fine["wear_depth"] - both.other("wear_depth")))
+    return np.asarray(np.abs(both.values["wear_depth"] - both.other("wear_depth")))
 
 
 def _response_change(both: Compared) -> FloatArray:
     """Relative difference (n,) of the responses: the larger one of first harmonic and peak."""
     one, other = (
-        _over(np.linalg.norm(both.fine[name] - both.other(name), axis=1), np.linalg.norm(both.fine[name], axis=1))
+        _over(np.linalg.norm(both.values[name] - both.other(name), axis=1), np.linalg.norm(both.values[name], axis=1))
         for name in ("response", "response_peak")
     )
     return np.fmax(one, other)
@@ -217,7 +240,7 @@ def _response_change(both: Compared) -> FloatArray:
 
 def _rate_change(both: Compared) -> FloatArray:
     """Relative difference (n,) of the wear rates."""
-    return _over(np.abs(both.fine["wear_rate"] - both.other("wear_rate")), both.fine["wear_rate"])
+    return _over(np.abs(both.values["wear_rate"] - both.other("wear_rate")), both.values["wear_rate"])
 
 
 def _over(part: FloatArray, whole: FloatArray) -> FloatArray:

@@ -1,8 +1,9 @@
-"""Files of other programs and what is wrong in them: one sentence with file, line, cause and remedy."""
+"""Files of other programs: those of a model, its units, numbers in them, and what is wrong in them, in one sentence."""
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 import math
 import re
@@ -17,6 +18,7 @@ from studies.scene_error import SceneError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 LARGEST_NUMBER = 2**31 - 1
 """Of a node or an element: the codes count in 32 bits."""
@@ -29,10 +31,81 @@ _INTEGER = re.compile(r"[+-]?\d{1,18}")
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([+-]\d{1,4})|[eEdD](\d{1,4}))?")
 
 
+@dataclass(frozen=True)
+class ModelFiles:
+    """Files of a model.
+
+    mesh: the deck, mesh or table of nodes. matrices: the files with the matrices, none where they are assembled here.
+    recovery: the table of further responses; None of none.
+    """
+
+    mesh: Path
+    matrices: tuple[Path, ...] = ()
+    recovery: Path | None = None
+
+    @property
+    def has_faces(self) -> bool:
+        """Whether the mesh has faces that can be drawn."""
+        return self.mesh.suffix.lower() != ".csv"
+
+    @property
+    def all(self) -> tuple[Path, ...]:
+        """All of them but what the deck includes."""
+        return (self.mesh, *self.matrices, *((self.recovery,) if self.recovery is not None else ()))
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal. Raises OSError."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass(frozen=True)
+class Units:
+    """A system of units by its length (m), mass (kg) and time (s); what is derived from them follows, in SI units.
+
+    label_of_length, label_of_mass: for messages.
+    """
+
+    name: str
+    length: float
+    mass: float
+    label_of_length: str
+    label_of_mass: str
+
+    @property
+    def stiffness(self) -> float:
+        """N/m."""
+        return self.mass  # mass / s2
+
+    @property
+    def force(self) -> float:
+        """N."""
+        return self.mass * self.length  # mass length / s2
+
+    @property
+    def density(self) -> float:
+        """kg/m3."""
+        return self.mass / self.length**3
+
+    @property
+    def stress(self) -> float:
+        """Pa."""
+        return self.mass / self.length
+
+
+UNITS = {"SI": Units("SI", 1.0, 1.0, "m", "kg"), "mm-t-s": Units("mm-t-s", 1e-3, 1e3, "mm", "t")}
+"""Systems of units by their names."""
+
+
 def shown(text: str) -> str:
     """A text out of a file as it may stand in a message: at most 40 characters, all of them printable."""
-    clean = "".join(letter if letter.isprintable() else "?" for letter in text.strip())
+    clean = _printable(text.strip())
     return clean if len(clean) <= 40 else f"{clean[:37]}..."
+
+
+def _printable(text: str) -> str:
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def check_there(path: Path, key: str = "model") -> None:
@@ -48,7 +121,7 @@ def check_there(path: Path, key: str = "model") -> None:
         raise SceneError(key, f"there is no file {shown(path.name)}", "give a path relative to the study file")
 
 
-def check_file(path: Path, largest: int, key: str = "model") -> None:
+def check_file(path: Path, largest: int = LARGEST_FILE, key: str = "matrices") -> None:
     """The same where a file is empty, or larger than `largest` bytes."""
     check_there(path, key)
     size = path.stat().st_size
@@ -78,7 +151,7 @@ def library_errors(path: Path, library: str, package: str, key: str) -> Iterator
 
     library, package: the module, and the package that brings it. key: what errors are about. Raises SceneError.
     """
-    check_file(path, LARGEST_FILE, key)
+    check_file(path, key=key)
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
@@ -93,18 +166,10 @@ def library_errors(path: Path, library: str, package: str, key: str) -> Iterator
         # errors of Python itself say nothing about the file
         reason = said.getvalue() if isinstance(error, SystemExit) else str(error)
         known = isinstance(error, SystemExit) or type(error).__module__ != "builtins"
-        clean = "".join(each if each.isprintable() else "?" for each in " ".join(reason.split()))
+        clean = _printable(" ".join(reason.split()))
         why = f" ({clean[:_LONGEST_REASON]})" if clean and known else ""
         found = f"{path.name} is damaged, or of a kind that {library} does not know{why}"
         raise SceneError(key, found, "write it again") from error
-
-
-def read_name(text: str) -> str:
-    """A name in capitals: without blanks, or as it stands between quotation marks."""
-    text = text.strip()
-    if len(text) >= 2 and text[0] == text[-1] == '"':
-        return text[1:-1].upper()
-    return "".join(text.split()).upper()
 
 
 def is_integer(text: str) -> bool:
@@ -112,12 +177,17 @@ def is_integer(text: str) -> bool:
     return _INTEGER.fullmatch(text) is not None
 
 
-def read_float(text: str, place: Place) -> float:
-    """A finite number, Fortran's 1.5D+03 and 1.5+3 included; 0 for an empty text. Raises SceneError."""
-    text = text.strip()
-    match = _REAL.fullmatch(text or "0")
+def to_float(text: str) -> float:
+    """A number, Fortran's 1.5D+03 and 1.5+3 included; NaN for any other text, infinity included."""
+    match = _REAL.fullmatch(text)
     value = math.nan if match is None else float(f"{match[1]}e{match[2] or match[3] or 0}")
-    if not math.isfinite(value):
+    return value if math.isfinite(value) else math.nan
+
+
+def read_float(text: str, place: Place) -> float:
+    """A finite number; 0 for an empty text. Raises SceneError."""
+    value = to_float(text.strip() or "0")
+    if math.isnan(value):
         raise place.wrong(f"{shown(text)!r} in place of a number", "give a finite number")
     return value
 
@@ -128,11 +198,3 @@ def read_integer(text: str, place: Place, what: str = "a whole number") -> int:
     if not is_integer(text) or not 0 < int(text) <= LARGEST_NUMBER:
         raise place.wrong(f"{shown(text)!r} in place of {what}", f"give a whole number of at most {LARGEST_NUMBER}")
     return int(text)
-
-
-def unit(vector: FloatArray, place: Place, remedy: str) -> FloatArray:
-    """A vector (3,) of unit length. Raises SceneError, which asks for what gives one, where it has none."""
-    length = float(np.linalg.norm(vector))
-    if not 0 < length < np.inf:
-        raise place.wrong("a direction without a length", f"give {remedy}")
-    return np.asarray(vector / length)
