@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 
-from studyrunner.user_error import WrongValueError
 from studyrunner.values import NotNegative, Positive, Section, Whole, Wrong
 
 Array = NDArray[np.float64]
@@ -217,7 +216,7 @@ def draw(
     with pairs of each input that belongs to them, (samples, n_pairs). Without width the study's own values, exactly.
 
     own_values: of the study: a number, (n_values, 1) of an axis, (n_pairs,) of pairs; not needed for an absolute
-    distribution. Raises WrongValueError, with its key, where physics forbids a draw, positions are missing, or a width
+    distribution. Raises Wrong where physics forbids a draw, positions are missing, or a width
     is a share of 0.
     """
     from scipy.special import ndtri
@@ -253,7 +252,7 @@ def _field(name: str, length: float, pairs: ScatteredPairs) -> Array:
     """
     if not np.isfinite(pairs.position).all():
         remedy = "leave it out: the scene does not say where its contact pairs are"
-        raise WrongValueError(length, remedy, f"scatter.{name}.correlation_length")
+        raise Wrong(f"scatter.{name}.correlation_length", length, remedy)
     distance = np.linalg.norm(pairs.position[:, None] - pairs.position[None], axis=2)
     surface = np.array(pairs.surface)
     covariance = np.where(surface[:, None] == surface, np.exp(-0.5 * (distance / length) ** 2), 0.0)
@@ -269,11 +268,11 @@ def _check(name: str, distribution: Distribution, own: Array, values: Array) -> 
     varies = distribution.at(np.array(1.0), np.array([-1.0, 1.0])).std() > 0.0
     if not distribution.is_absolute and not own.any() and not values.any() and varies:
         remedy = "give a width in the unit of the input: the study's own value is 0, of which a share is nothing"
-        raise WrongValueError(shown, remedy, f"scatter.{name}")
+        raise Wrong(f"scatter.{name}", shown, remedy)
     smallest = float(values.min())
     if (smallest < 0.0 and name.startswith(_NOT_BELOW_ZERO)) or (smallest <= 0.0 and name in _ABOVE_ZERO):
         remedy = f"give less width, or lognormal: a sample draws {smallest:.3g}, which {name} cannot be"
-        raise WrongValueError(shown, remedy, f"scatter.{name}")
+        raise Wrong(f"scatter.{name}", shown, remedy)
 
 
 def unit_design(method: Method, seed: int, samples: int, dimensions: int, groups: Sequence[int] = ()) -> Array:
@@ -283,7 +282,7 @@ def unit_design(method: Method, seed: int, samples: int, dimensions: int, groups
     design of fewer samples. "sobol" is scrambled by a random lower triangular matrix and a digital shift (Matousek
     1998). With "saltelli" (Saltelli et al. 2010) each base sample has 2 + len(groups) rows: A, B, and for each group of
     columns A with this group from B. groups: numbers of columns that vary together; each alone if empty. Raises
-    WrongValueError where a Sobol' sequence has not so many columns.
+    Wrong where a Sobol' sequence has not so many columns.
     """
     if method == "saltelli":
         return _saltelli(seed, samples, groups or (1,) * dimensions)
@@ -304,7 +303,7 @@ def _sobol(seed: int, samples: int, dimensions: int) -> Array:
 
     if dimensions > qmc.Sobol.MAXDIM:
         remedy = f'give "random": a Sobol\' sequence has at most {qmc.Sobol.MAXDIM} columns, {dimensions} are drawn'
-        raise WrongValueError("sobol", remedy, "scatter.method")
+        raise Wrong("scatter.method", "sobol", remedy)
     power = max(samples - 1, 0).bit_length()
     plain = qmc.Sobol(dimensions, scramble=False, bits=_DIGITS).random_base2(power)[:samples]
     whole = (plain * 2.0**_DIGITS).astype(np.int64)

@@ -13,7 +13,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from studies.scene_error import SceneError, remedy_of
-from studyrunner.user_error import UserError, Verbatim, WrongValueError
+from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Section, Wrong
 
 _SINGLE = ("float_type", "int_type", "bool_type", "string_type")
@@ -21,7 +21,7 @@ _SINGLE = ("float_type", "int_type", "bool_type", "string_type")
 
 def raise_wrong(source: str, wrong: Iterable[Wrong]) -> None:
     """Raises UserError with all that is wrong, if anything is; the first counts of several under one key."""
-    _raise_all([UserError(source, *each) for each in wrong])
+    _raise_all([UserError(source, each.key, each.value, each.remedy) for each in wrong])
 
 
 def _raise_all(mistakes: Iterable[UserError]) -> None:
@@ -76,7 +76,7 @@ def check_tables(kinds: Mapping[str, type[BaseModel]], tables: Mapping[str, Any]
             checked[name] = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
         except ValidationError as error:
             found = _wrong_keys(error, kind, table, elsewhere)
-            wrong += (each._replace(key=f"{name}.{each.key}".removesuffix(".")) for each in found)
+            wrong += (Wrong(f"{name}.{each.key}".removesuffix("."), each.value, each.remedy) for each in found)
     raise_wrong(source, wrong)
     return checked
 
@@ -152,7 +152,7 @@ def _wrong(key: str, found: Sequence[_Mistake], elsewhere: Mapping[str, str]) ->
         return Wrong(key, value if is_value else None, remedy + meaning)
     if isinstance(cause, SceneError):
         return Wrong(cause.key or key, Verbatim(cause.value), cause.remedy + meaning)
-    if isinstance(cause, WrongValueError):
+    if isinstance(cause, Wrong):
         return Wrong(".".join(filter(None, (key, cause.key))), cause.value, cause.remedy + meaning)
     own_axes = [name for each in tables for name in getattr(each, "AXES", each.model_fields)]
     if isinstance(value, list) and kind in _SINGLE and key in own_axes:

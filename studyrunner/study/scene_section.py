@@ -18,7 +18,7 @@ from studies.scenes import scene_parameters
 from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
 from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file
 from studyrunner.system.progress import count as counted
-from studyrunner.user_error import UserError, Verbatim, WrongValueError
+from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Axis, NotNegative, Section, Wrong, listed
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Worn(Section):
     def depths(self, n_contact: int) -> tuple[float, ...]:
         """Depths (n_contact,), m, of the only state.
 
-        Raises WrongValueError where there are others than pairs; one depth is of all pairs, but not one of a result.
+        Raises Wrong where there are others than pairs; one depth is of all pairs, but not one of a result.
         """
         (depth,) = self.depth
         if len(depth) == n_contact:
@@ -92,7 +92,7 @@ class Worn(Section):
             return depth * n_contact
         key, given = ("result", "a result with the same pairs") if self.result else ("depth", "one depth for each pair")
         remedy = f"give {given}: the scene has {counted(n_contact, 'contact pair')}"
-        raise WrongValueError(Verbatim(f"there are {counted(len(depth), 'depth')}"), remedy, key)
+        raise Wrong(key, Verbatim(f"there are {counted(len(depth), 'depth')}"), remedy)
 
 
 class SceneSection(Section):
