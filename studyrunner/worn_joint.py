@@ -105,14 +105,17 @@ def _overrides(result: Result) -> dict[str, Any]:
         raise UserError(str(result.path), f"scatter.{study.scatter.of_pairs[0]}", None, remedy)
     place = tuple(shown[name] for name in study.axes_of_parts)
     part = next(each.study for each in parts_of(study) if each.place == place)
-    given: dict[str, Any] = {f"axes.{axis.key[0]}": None for axis in study.scene_axes}
+    keys: dict[str, Any] = {f"axes.{axis.key[0]}": None for axis in study.scene_axes}
     # all of them: room for wear is made for the whole history
-    given |= {f"scene.{key}": value for key, value in part.scene.parameters.model_dump(mode="json").items()}
+    keys |= {f"scene.{key}": value for key, value in part.scene.parameters.model_dump(mode="json").items()}
     for name in study.dimensions.keys() - study.axes_of_parts.keys():
-        given[f"axes.{name}"] = (getattr(part.axes, name, None) or study.dimensions[name])[shown[name]]
+        keys[f"axes.{name}"] = (getattr(part.axes, name, None) or study.dimensions[name])[shown[name]]
     if result.followed:
-        given["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
-    return given | _ALONE
+        if not result.has("excitation_frequency"):
+            remedy = result.lacks("excitation_frequency").removesuffix(".")
+            raise UserError(str(result.path), "excitation_frequency", None, remedy)
+        keys["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
+    return keys | _ALONE
 
 
 def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: bool = False) -> dict[str, Any]:
