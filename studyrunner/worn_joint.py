@@ -97,9 +97,12 @@ def compute_worn_joint(
 def _overrides(result: Result) -> dict[str, Any]:
     """Keys of a study of the shown point alone, with the values of its sample and its scene, new and without wear.
 
-    Raises UserError where each pair has drawn a value of its own.
+    Raises UserError where each pair has drawn a value of its own, or the study is not that of the result.
     """
     shown, study = result.shown, read_study(result.path)
+    sizes = {name: result.dataset.sizes[name] for name in result.axes}
+    if {name: len(values) for name, values in study.dimensions.items()} != sizes:
+        raise UserError(str(result.path), "the attribute study", None, "give a result file of run-study that is whole")
     if study.scatter is not None and study.scatter.of_pairs:
         remedy = "give a result whose samples draw no value for each pair"
         raise UserError(str(result.path), f"scatter.{study.scatter.of_pairs[0]}", None, remedy)
