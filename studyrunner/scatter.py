@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 
-from studyrunner.user_error import WrongValueError
 from studyrunner.values import NotNegative, Positive, Section, Whole, Wrong
 
 Array = NDArray[np.float64]
@@ -23,7 +22,6 @@ Of = Literal["all pairs", "each surface", "each pair"]
 OF_PAIRS = ("area", "friction_coefficient", "gap")
 """Inputs that may differ between the contact pairs; named as in a scene file."""
 
-_OF_ALL = ("friction_coefficient", "all pairs")
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
 _NOT_BELOW_ZERO = ("friction_coefficient", "surfaces_", "threshold", "wear_coefficient")
 
@@ -177,8 +175,8 @@ class ScatterSection(Section):
     @property
     def of_pairs(self) -> tuple[str, ...]:
         """Inputs that belong to contact pairs: gaps, areas, a friction coefficient with draws of its own."""
-        inputs = self.inputs.items()
-        return tuple(name for name, each in inputs if name in OF_PAIRS and (name, each.of) != _OF_ALL)
+        of_all = {name for name, each in self.inputs.items() if each.of == "all pairs"} & {"friction_coefficient"}
+        return tuple(name for name in self.inputs if name in OF_PAIRS and name not in of_all)
 
     @property
     def rows_a_sample(self) -> int:
@@ -193,11 +191,11 @@ class ScatterSection(Section):
 
 def flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
     """[scatter] with inputs by name, factors of surfaces as the dimensions that they have as axes: `surfaces_flat`."""
-    surfaces = table.get("surfaces")
-    if not isinstance(surfaces, Mapping):
-        return dict(sorted(table.items()))
-    others = {name: value for name, value in table.items() if name != "surfaces"}
-    return dict(sorted((others | {f"surfaces_{label}": value for label, value in surfaces.items()}).items()))
+    flat, surfaces = dict(table), table.get("surfaces")
+    if isinstance(surfaces, Mapping):
+        del flat["surfaces"]
+        flat |= {f"surfaces_{label}": value for label, value in surfaces.items()}
+    return dict(sorted(flat.items()))
 
 
 # --- what is drawn ---
@@ -218,7 +216,7 @@ def draw(
     with pairs of each input that belongs to them, (samples, n_pairs). Without width the study's own values, exactly.
 
     own_values: of the study: a number, (n_values, 1) of an axis, (n_pairs,) of pairs; not needed for an absolute
-    distribution. Raises WrongValueError, with its key, where physics forbids a draw, positions are missing, or a width
+    distribution. Raises Wrong where physics forbids a draw, positions are missing, or a width
     is a share of 0.
     """
     from scipy.special import ndtri
@@ -254,7 +252,7 @@ def _field(name: str, length: float, pairs: ScatteredPairs) -> Array:
     """
     if not np.isfinite(pairs.position).all():
         remedy = "leave it out: the scene does not say where its contact pairs are"
-        raise WrongValueError(length, remedy, f"scatter.{name}.correlation_length")
+        raise Wrong(f"scatter.{name}.correlation_length", length, remedy)
     distance = np.linalg.norm(pairs.position[:, None] - pairs.position[None], axis=2)
     surface = np.array(pairs.surface)
     covariance = np.where(surface[:, None] == surface, np.exp(-0.5 * (distance / length) ** 2), 0.0)
@@ -270,11 +268,11 @@ def _check(name: str, distribution: Distribution, own: Array, values: Array) -> 
     varies = distribution.at(np.array(1.0), np.array([-1.0, 1.0])).std() > 0.0
     if not distribution.is_absolute and not own.any() and not values.any() and varies:
         remedy = "give a width in the unit of the input: the study's own value is 0, of which a share is nothing"
-        raise WrongValueError(shown, remedy, f"scatter.{name}")
+        raise Wrong(f"scatter.{name}", shown, remedy)
     smallest = float(values.min())
     if (smallest < 0.0 and name.startswith(_NOT_BELOW_ZERO)) or (smallest <= 0.0 and name in _ABOVE_ZERO):
         remedy = f"give less width, or lognormal: a sample draws {smallest:.3g}, which {name} cannot be"
-        raise WrongValueError(shown, remedy, f"scatter.{name}")
+        raise Wrong(f"scatter.{name}", shown, remedy)
 
 
 def unit_design(method: Method, seed: int, samples: int, dimensions: int, groups: Sequence[int] = ()) -> Array:
@@ -284,7 +282,7 @@ def unit_design(method: Method, seed: int, samples: int, dimensions: int, groups
     design of fewer samples. "sobol" is scrambled by a random lower triangular matrix and a digital shift (Matousek
     1998). With "saltelli" (Saltelli et al. 2010) each base sample has 2 + len(groups) rows: A, B, and for each group of
     columns A with this group from B. groups: numbers of columns that vary together; each alone if empty. Raises
-    WrongValueError where a Sobol' sequence has not so many columns.
+    Wrong where a Sobol' sequence has not so many columns.
     """
     if method == "saltelli":
         return _saltelli(seed, samples, groups or (1,) * dimensions)
@@ -305,7 +303,7 @@ def _sobol(seed: int, samples: int, dimensions: int) -> Array:
 
     if dimensions > qmc.Sobol.MAXDIM:
         remedy = f'give "random": a Sobol\' sequence has at most {qmc.Sobol.MAXDIM} columns, {dimensions} are drawn'
-        raise WrongValueError("sobol", remedy, "scatter.method")
+        raise Wrong("scatter.method", "sobol", remedy)
     power = max(samples - 1, 0).bit_length()
     plain = qmc.Sobol(dimensions, scramble=False, bits=_DIGITS).random_base2(power)[:samples]
     whole = (plain * 2.0**_DIGITS).astype(np.int64)

@@ -70,19 +70,6 @@ class Verbatim(str):
     """A value that is shown to the user as it is: a description rather than what stands in the file."""
 
 
-class WrongValueError(ValueError):
-    """A value that a check of one key refuses; the reader of the study adds the file and the key.
-
-    key: dotted name below that key, where a rule between keys refuses it.
-    """
-
-    def __init__(self, value: object, remedy: str, key: str | None = None) -> None:
-        super().__init__(remedy)
-        self.value = value
-        self.remedy = remedy
-        self.key = key
-
-
 def show_value(value: object) -> str:
     """`value` as it would stand in a TOML file, on one line and cut where it is long."""
     if isinstance(value, Verbatim):

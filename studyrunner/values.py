@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import decimal
 from collections.abc import Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
-
-from studyrunner.user_error import WrongValueError
 
 T = TypeVar("T", bound=Hashable)
 
@@ -23,8 +22,12 @@ _LARGEST_WHOLE = 2.0**53
 _TOO_LARGE = 1e100  # its square is still a number
 
 
-class Wrong(NamedTuple):
-    """What a rule between keys refuses: dotted key, "" for the whole table, its value, what would be right."""
+@dataclass(eq=False, repr=False)
+class Wrong(ValueError):  # noqa: N818 - rules yield it
+    """What a check of one key, or a rule between keys, refuses; the reader of the study adds the file.
+
+    key: dotted name below what is checked, "" for all of it. value: the offending part. remedy: what would be right.
+    """
 
     key: str
     value: object
@@ -47,8 +50,8 @@ class Section(BaseModel):
 
     @model_validator(mode="after")
     def _keep_rules(self) -> Self:
-        for key, value, remedy in self.rules():
-            raise WrongValueError(value, remedy, key)
+        for wrong in self.rules():
+            raise wrong
         return self
 
 
@@ -64,12 +67,12 @@ def listed(value: object) -> Sequence[Any]:
 
 
 def once(values: Iterable[T]) -> tuple[T, ...]:
-    """The values in their order. Raises WrongValueError where one of them comes twice."""
+    """The values in their order. Raises Wrong where one of them comes twice."""
     seen: set[T] = set()
     kept = tuple(values)
     for value in kept:
         if value in seen:
-            raise WrongValueError(value, "give every value once")
+            raise Wrong("", value, "give every value once")
         seen.add(value)
     return kept
 
@@ -97,7 +100,7 @@ def read_axis(value: object) -> tuple[Any, ...]:
         raise ValueError(f"give at least one value, and at most {LONGEST_AXIS}")
     for each in values:
         if not isinstance(each, bool | int | float | str):
-            raise WrongValueError(each, "give a number, true, false or a name, a list of them or {start, stop, num}")
+            raise Wrong("", each, "give a number, true, false or a name, a list of them or {start, stop, num}")
     return once(values)
 
 
@@ -125,11 +128,11 @@ class Range(Section):
         """The values, each the number that a person would write: 212.8, not 212.79999999999998.
 
         They are computed from the decimals of start and stop and rounded once, so that `sel` finds them by the number
-        written and a point is the same in a range and in a list. Raises WrongValueError.
+        written and a point is the same in a range and in a list. Raises Wrong.
         """
         start, stop, num = self.start, self.stop, self.num
         if self.spacing == "log" and min(start, stop) <= 0.0:
-            raise WrongValueError(min(start, stop), 'give start and stop above 0 with spacing = "log"')
+            raise Wrong("", min(start, stop), 'give start and stop above 0 with spacing = "log"')
         if num == 1:
             return (start,)
         with decimal.localcontext(prec=60):

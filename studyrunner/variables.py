@@ -73,10 +73,7 @@ ASKED = {
     ),
     "wear_rate_error": Variable(_CYCLE, "1", "estimated relative error of the wear rate", "As response_error."),
     "worn_volume_error": Variable(
-        _CYCLE,
-        "1",
-        "estimated relative error of the worn volume",
-        "0 where nothing has worn.",
+        _CYCLE, "1", "estimated relative error of the worn volume", "0 where nothing has worn."
     ),
     "wear_depth_error": Variable(
         _PAIRS, "m", "estimated error of the wear depth", "Relatively larger than for the volume."
@@ -87,14 +84,8 @@ ASKED = {
 """Those that `outputs.variables` asks for, in the order of the file."""
 
 OF_SAMPLES = (
-    "worn_volume",
-    "wear_rate",
-    "wear_depth_max",
-    "wear_depth_max_error",
-    "wear_depth_last",
-    "response_amplitude",
-    "response_peak",
-    "worn_volume_error",
+    *("worn_volume", "wear_rate", "wear_depth_max", "wear_depth_max_error", "wear_depth_last"),
+    *("response_amplitude", "response_peak", "worn_volume_error"),
 )
 """Those of a study with [scatter] that names none: what statistics and pictures need, as there are many points."""
 
@@ -144,11 +135,7 @@ CERTIFICATE = {
 
 OF_A_HISTORY = {
     "outcome": Variable(
-        (),
-        "1",
-        "how the computation of the point ended",
-        "See the attribute sentences.",
-        dtype="int8",
+        (), "1", "how the computation of the point ended", "See the attribute sentences.", dtype="int8"
     ),
     "jump_cycle": Variable((), "1", "first cycle count at which the solution branch was lost", "NaN if it never was."),
     "cycles_to_target": Variable((), "1", "cycle count at which slow_time.until was reached", _NO_TARGET),
@@ -213,8 +200,13 @@ _BLOCK, _BLOCKS = ("block",), ("mission", "block")
 
 def _by_mission(name: str) -> Variable:
     """A variable of wear histories with missions in place of cycles."""
-    entry = ASKED[name]
-    return replace(entry, dimensions=tuple("mission" if each == "cycle" else each for each in entry.dimensions))
+    entry = (ASKED | OF_A_HISTORY)[name]
+    long_name, comment = (
+        text.replace("cycle count", "number of missions").replace("cycles", "missions")
+        for text in (entry.long_name, entry.comment)
+    )
+    dimensions = tuple("mission" if each == "cycle" else each for each in entry.dimensions)
+    return replace(entry, dimensions=dimensions, long_name=long_name, comment=comment)
 
 
 def _of_block(name: str, when: str = "end") -> Variable:
@@ -266,23 +258,14 @@ OF_SAMPLED_MISSIONS = tuple(name for name in OF_MISSIONS if name not in ("wear_d
 """Those of a study of missions with [scatter] that names none."""
 
 
-def _of_history_by_mission(name: str) -> Variable:
-    entry = OF_A_HISTORY[name]
-    long_name, comment = (
-        text.replace("cycle count", "number of missions").replace("cycles", "missions")
-        for text in (entry.long_name, entry.comment)
-    )
-    return replace(entry, long_name=long_name, comment=comment)
-
-
 OF_A_MISSION = {
     "outcome": OF_A_HISTORY["outcome"],
-    "missions_to_target": _of_history_by_mission("cycles_to_target"),
-    "missions_to_target_error": _of_history_by_mission("cycles_to_target_error"),
+    "missions_to_target": _by_mission("cycles_to_target"),
+    "missions_to_target_error": _by_mission("cycles_to_target_error"),
     "newton_iterations": replace(OF_A_HISTORY["newton_iterations"], comment="Of all blocks."),
     "run_time": replace(OF_A_HISTORY["run_time"], comment="Of all blocks; differs from run to run."),
     "error_estimate": OF_A_HISTORY["error_estimate"],
-    "last_mission": _of_history_by_mission("last_cycle"),
+    "last_mission": _by_mission("last_cycle"),
     "largest_wear_depth": OF_A_HISTORY["largest_wear_depth"],
     "message": OF_A_HISTORY["message"],
 }

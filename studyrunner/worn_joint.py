@@ -16,14 +16,13 @@ import xarray as xr
 from studyrunner.api import run_study
 from studyrunner.result.pairs import depths, has_depths, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result, open_for_report
-from studyrunner.statistics.samples import DRAWN
-from studyrunner.study.sections import AxesSection, WearSection
+from studyrunner.study.parts import parts_of
 from studyrunner.study.study_file import read_study
-from studyrunner.user_error import UserError, Verbatim
+from studyrunner.user_error import UserError
 
 _N_FREQUENCIES = 25  # of the curve around a resonance that the study follows
 _ALONE: dict[str, Any] = {
-    **dict.fromkeys(("scatter", "loading", "slow_time.until", "scene.worn")),
+    **dict.fromkeys(("scatter", "loading", "wear", "slow_time.until", "scene.worn")),
     "axes.scheme": "adaptive",
     "slow_time": {"cycles": 0.0},
     "outputs.loops": [],
@@ -96,34 +95,30 @@ def compute_worn_joint(
 
 
 def _overrides(result: Result) -> dict[str, Any]:
-    """Keys of a study of the shown point alone, new and without wear."""
-    shown, keys = result.shown, dict[str, Any]()
-    for name in result.axes:
-        value = result.dataset[name].values[shown[name]].item()
-        if name == "sample":
-            keys |= _drawn_inputs(result, shown)
-        elif name != "worn_cycle" and not (name == "frequency" and result.followed):
-            keys[f"axes.{name}"] = float(value) if name == "rtol" else value
+    """Keys of a study of the shown point alone, with the values of its sample and its scene, new and without wear.
+
+    Raises UserError where each pair has drawn a value of its own, or the study is not that of the result.
+    """
+    shown, study = result.shown, read_study(result.path)
+    sizes = {name: result.dataset.sizes[name] for name in result.axes}
+    if {name: len(values) for name, values in study.dimensions.items()} != sizes:
+        raise UserError(str(result.path), "the attribute study", None, "give a result file of run-study that is whole")
+    if study.scatter is not None and study.scatter.of_pairs:
+        remedy = "give a result whose samples draw no value for each pair"
+        raise UserError(str(result.path), f"scatter.{study.scatter.of_pairs[0]}", None, remedy)
+    place = tuple(shown[name] for name in study.axes_of_parts)
+    part = next(each.study for each in parts_of(study) if each.place == place)
+    keys: dict[str, Any] = {f"axes.{axis.key[0]}": None for axis in study.scene_axes}
+    # all of them: room for wear is made for the whole history
+    keys |= {f"scene.{key}": value for key, value in part.scene.parameters.model_dump(mode="json").items()}
+    for name in study.dimensions.keys() - study.axes_of_parts.keys():
+        keys[f"axes.{name}"] = (getattr(part.axes, name, None) or study.dimensions[name])[shown[name]]
     if result.followed:
         if not result.has("excitation_frequency"):
             remedy = result.lacks("excitation_frequency").removesuffix(".")
             raise UserError(str(result.path), "excitation_frequency", None, remedy)
         keys["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
     return keys | _ALONE
-
-
-def _drawn_inputs(result: Result, shown: Mapping[str, int]) -> dict[str, Any]:
-    """Keys of the study with what the shown sample has drawn. Raises UserError where each pair has drawn its own."""
-    keys = {}
-    for coordinate, drawn in result.dataset.coords.items():
-        name = str(coordinate).removeprefix(DRAWN)
-        if str(coordinate).startswith(DRAWN) and name not in WearSection.AXES:
-            value = drawn.isel(shown, missing_dims="ignore")
-            if value.ndim:
-                remedy = "give a result whose samples draw no value for each pair"
-                raise UserError(str(result.path), f"scatter.{name}", Verbatim("drawn for each pair"), remedy)
-            keys[f"{'axes' if name in AxesSection.model_fields else 'scene'}.{name}"] = float(value)
-    return keys
 
 
 def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: bool = False) -> dict[str, Any]:

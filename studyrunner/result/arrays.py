@@ -65,7 +65,7 @@ def small_arrays(
 def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[SmallArray]:
     """Coordinates of the file but those of samples and worn joints."""
     along: dict[str, Sequence[object] | NDArray[np.generic]] = dict(study.dimensions)
-    counted = study.output_missions if study.mission else np.array(study.output_counts)
+    counted = np.array(study.output_counts, dtype=int if study.mission else float)
     along.setdefault(study.kind.counted or "cycle", counted)
     along |= {"block": [block.name for block in study.mission]} if study.mission else {}
     along |= {"contact": range(facts.contact.n_contact), "response": facts.response_names}

@@ -22,7 +22,8 @@ from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.text import check_result_file, read_toml
-from studyrunner.user_error import UserError, Verbatim, WrongValueError, show_text
+from studyrunner.user_error import UserError, Verbatim, show_text
+from studyrunner.values import Wrong
 from studyrunner.variables import (
     ASKED,
     CERTIFICATE,
@@ -154,8 +155,8 @@ def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
     """Turns errors of the libraries about a damaged file into UserError; every: all errors, of a block that reads."""
     try:
         yield
-    except WrongValueError as error:
-        raise UserError(source, str(error.key), error.value, error.remedy) from None
+    except Wrong as error:
+        raise UserError(source, error.key, error.value, error.remedy) from None
     except Exception as error:
         of_library = isinstance(error, OSError | RuntimeError) and "NetCDF:" in str(error)
         if (every or of_library) and not isinstance(error, UserError):
@@ -217,7 +218,7 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
 
 def _need(right: object, name: str, wrong: str) -> None:
     if not right:
-        raise WrongValueError(Verbatim(wrong), _REMEDY, name)
+        raise Wrong(name, Verbatim(wrong), _REMEDY)
 
 
 def _slow_time(dataset: xr.Dataset) -> str:
@@ -228,7 +229,7 @@ def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Va
     """Of each variable that the report knows its dimensions and what it is, None for the values of an axis."""
     slow, sizes = _slow_time(dataset), {str(name): size for name, size in dataset.sizes.items()}
     if lacking := [name for name in ("outcome", slow, "contact") if name not in dataset.variables]:
-        raise WrongValueError(None, f"holds no {' and no '.join(lacking)}; {_REMEDY}", "OUT.nc")
+        raise Wrong("OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
     axes = tuple(map(str, dataset["outcome"].dims))
     for name in (*axes, slow, "contact"):
         _need(0 < sizes.get(name, 0) <= _MOST_NAMES, name, f"{sizes.get(name, 0)} values")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Iterator
 from datetime import UTC, date, datetime
 from importlib import metadata
 
@@ -79,10 +80,16 @@ def describe_versions() -> str:
     return ", ".join([f"Python {platform.python_version()}", *packages])
 
 
-def compare_with_archived(study: Study, scene_sha256: str) -> tuple[str, ...]:
+def compare_with_archived(study: Study, scene_sha256: str) -> Iterator[str]:
     """Why a study from a result file may have another result with a scene of this digest, as lines; none for others."""
-    there = study.archived
-    return () if there is None else there.differences(scene_sha256, solver_digest(), describe_versions())
+    there, versions = study.archived, describe_versions()
+    if there is None:
+        return
+    if there.scene_sha256 not in (None, scene_sha256):
+        before = there.scene_sha256[:12] or "missing"
+        yield f"its scene_sha256 is {before}, that of the scene built now {scene_sha256[:12]}: another scene"
+    if there.solver_digest != solver_digest():
+        yield f"computed by another solver ({there.versions or 'unknown'}; now {versions}): numbers may differ"
 
 
 def check_date(text: str, place: str, key: str) -> str:

@@ -20,7 +20,8 @@ from studyrunner.study.mistakes import keys_as_given
 from studyrunner.study.parts import Part, draw_inputs, parts_of
 from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
-from studyrunner.user_error import UserError, WrongValueError
+from studyrunner.user_error import UserError
+from studyrunner.values import Wrong
 
 _MOST_PLANNED = 8
 
@@ -245,5 +246,5 @@ def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
         return np.zeros(facts.contact.n_contact)
     try:
         return np.array(study.scene.worn.depths(facts.contact.n_contact))
-    except WrongValueError as error:
+    except Wrong as error:
         raise UserError(study.source, f"scene.worn.{error.key}", error.value, error.remedy) from None

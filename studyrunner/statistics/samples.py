@@ -1,12 +1,10 @@
 """Samples of a quantity, some of them without a value: quantiles, probabilities, what decides, two groups.
 
-Each estimate has ends over all that samples without a value may be, and a confidence interval, (..., d, 2). The
-intervals are of independent samples. Samples of a Sobol' sequence or a Latin hypercube fill the distribution more
-evenly: their intervals are wider than necessary.
+Each estimate has ends over all that samples without a value may be, and a confidence interval, (..., d, 2), of
+independent samples: those of a Sobol' sequence or a Latin hypercube are more even, and their intervals too wide.
 
-By hand: `scipy.stats.sobol_indices`, which is used, takes no samples without a value; `scipy.stats.spearmanr` gives no
-interval; the intervals of quantiles in `scipy.stats` are of one set of samples a call; the mixtures of scikit-learn
-take a skewed density with one peak for two groups.
+By hand: functions of `scipy.stats` take no samples without a value, `spearmanr` gives no interval, and those of
+quantiles are of one set of samples a call; mixtures of scikit-learn take a skewed density for two groups.
 """
 
 from __future__ import annotations
@@ -58,10 +56,10 @@ class SampleValues:
         """Some of the points or samples, as numpy's indices select them."""
         return SampleValues(self.low[place], self.high[place], self.error[place])
 
-    @property
-    def widened(self) -> SampleValues:
-        """The samples between their values less and more the numerical error, without error."""
-        return SampleValues(self.low - self.error, self.high + self.error, np.zeros_like(self.error))
+    def widened(self, where: Any = True) -> SampleValues:
+        """Some of the samples, or all, between their values less and more the numerical error, without error."""
+        by = np.where(where, self.error, 0.0)
+        return SampleValues(self.low - by, self.high + by, np.where(where, 0.0, self.error))
 
     @property
     def limited(self) -> SampleValues:
@@ -222,11 +220,9 @@ def two_groups(values: SampleValues) -> Groups | None:
     by chance has a probability below 0.5 %. Of the gaps that pass, and are longer than the numerical errors beside
     them, the longest is taken. A sample whose error is above half of the range of all counts as one without a value.
     """
-    known, wide = values.is_known, values.widened
+    known = values.is_known
     if known.any():
-        vague = known & (values.error > 0.5 * np.ptp(values.low[known]))
-        low, high = np.where(vague, wide.low, values.low), np.where(vague, wide.high, values.high)
-        values = SampleValues(low, high, np.where(vague, 0.0, values.error))
+        values = values.widened(known & (values.error > 0.5 * np.ptp(values.low[known])))
         known = values.is_known
     order = np.argsort(values.low[known], kind="stable")
     sample, error = values.low[known][order], values.error[known][order]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,13 +38,13 @@ def worn_volume_statistics(
 ) -> xr.Dataset:
     """What the samples of a result say of worn volume and depth, over all its other dimensions.
 
-    Each statistic has a dimension `bound`: its lowest and highest value over all that samples without a value may have,
-    which are equal where all have one. NAME_interval is the confidence interval. With saltelli, indices are of the
-    whole design, all others of its independent rows.
+    Each statistic has a dimension `bound`: lowest and highest over all that samples without a value may have, equal
+    where all have one; NAME_interval: its confidence interval. With saltelli, indices are of the whole design, all
+    others of its independent rows.
 
     dataset: with the dimension `sample`, drawn values as coordinates `sample_NAME`, and `worn_volume`. quantiles:
-    probabilities, ascending. confidence: of the intervals. exceed, depth: worn volumes, m3, and depths, m, whose
-    probability of exceedance is wanted; by default 41 up to the largest.
+    probabilities, ascending. confidence: of the intervals. exceed, depth: worn volumes, m3, and depths, m, for the
+    probabilities of exceedance; by default 41 up to the largest.
 
     Returns worn_volume_quantile (m3), worn_volume_exceedance, wear_depth_exceedance, and of each input first_index and
     total_index (1) with saltelli, else rank_correlation (1), each with _interval; worn_volume_quantile_error (m3), the
@@ -129,9 +130,8 @@ def _read_samples(dataset: xr.Dataset, name: str) -> tuple[SampleValues, tuple[s
         # its error is relative
         error *= low
     sensitive = (outcome == words.get("sensitive", -1)).broadcast_like(values).transpose(*values.dims).values
-    vague = sensitive & ~missing
-    low, high = np.where(vague, np.maximum(low - error, 0.0), low), np.where(vague, high + error, high)
-    return SampleValues(low, high, np.where(vague, 0.0, error)), tuple(map(str, values.dims[:-1]))
+    found = SampleValues(low, high, error).widened(sensitive & ~missing)
+    return replace(found, low=np.maximum(found.low, 0.0)), tuple(map(str, values.dims[:-1]))
 
 
 def _about(units: str, long_name: str) -> dict[str, str]:
@@ -140,11 +140,12 @@ def _about(units: str, long_name: str) -> dict[str, str]:
 
 def _bands(name: str, long_name: str, units: str, band: tuple[Array, Array], dims: tuple[str, ...]) -> _Arrays:
     """NAME and NAME_interval, with the last dimension `bound`."""
-    words = (long_name, f"{long_name}, confidence interval")
     # a correlation alone may be below 0
-    ends = band if name.endswith("correlation") else [np.maximum(each, 0.0) for each in band]
-    both = zip((name, f"{name}_interval"), ends, words, strict=True)
-    return {each: ((*dims, "bound"), values, _about(units, shown)) for each, values, shown in both}
+    value, interval = band if name.endswith("correlation") else (np.maximum(each, 0.0) for each in band)
+    return {
+        name: ((*dims, "bound"), value, _about(units, long_name)),
+        f"{name}_interval": ((*dims, "bound"), interval, _about(units, f"{long_name}, confidence interval")),
+    }
 
 
 def _of_values(
@@ -161,7 +162,7 @@ def _of_values(
     coords["quantile"] = ("quantile", np.asarray(probabilities), _about("1", "probability"))
     band = samples.quantiles(values, probabilities, confidence)
     found = _bands("worn_volume_quantile", "quantile of worn volume", "m3", band, (*names, "quantile"))
-    moved = np.maximum(samples.quantiles(values.widened, probabilities, confidence)[0], 0.0)
+    moved = np.maximum(samples.quantiles(values.widened(), probabilities, confidence)[0], 0.0)
     about_error = _about("m3", "quantile of worn volume, with numerical error")
     found["worn_volume_quantile_error"] = ((*names, "quantile", "bound"), moved, about_error)
     found["n_samples"] = ((), np.int32(len(rows)), _about("1", "samples"))
@@ -193,7 +194,7 @@ def _of_inputs(
     *,
     is_saltelli: bool,
 ) -> _Arrays:
-    """What each input decides, in the order of the columns of the design; of an input of pairs their mean counts."""
+    """What each input decides, in the order of the columns of the design; of an input of pairs the mean counts."""
     drawn, dims = [dataset[f"{DRAWN}{name}"] for name in inputs], (*names, "input")
     table = np.stack([each.mean([d for d in each.dims if d != SAMPLE]).values for each in drawn], axis=1)
     if is_saltelli:

@@ -8,10 +8,9 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
-from studyrunner.study.mission import MissionBlock
 from studyrunner.study.mistakes import check_tables, keys_as_given, scene_errors
 from studyrunner.study.scene_section import SceneSection
-from studyrunner.study.sections import SECTIONS, StudySection
+from studyrunner.study.sections import SECTIONS, MissionBlock, StudySection
 from studyrunner.user_error import UserError, toml_value
 from studyrunner.values import Section
 
@@ -59,10 +58,18 @@ def write_new_study(name: str, deck: Path | None = None) -> Path:
     path = Path(f"{name}.toml")
     with keys_as_given({"study.name": "--new"}):
         check_tables({"study": StudySection}, {"study": {"name": name}}, "command line")
-    text = _new_study(name, _NEW if deck is None else {**_NEW, **_tables_of_deck(deck)})
+    tables = _NEW | ({} if deck is None else _tables_of_deck(deck)) | {"study": {"name": (name, "")}}
+    lines = [_HEAD.format(name=name)]
+    for table in ("study", "scene", "axes", "slow_time", "wear", "solver", "outputs"):
+        given = tables.get(table, {})
+        lines.append(f"[{table}]")
+        lines += [f"{key} = {toml_value(value)}" + f" # {note}" * bool(note) for key, (value, note) in given.items()]
+        others = [each for each in _keys(table, SECTIONS[table]) if each[0] not in given] if table != "scene" else []
+        lines += [f"# {key} = {default} # {meaning}" for key, default, meaning in others if default]
+        lines.append("")
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+            file.write("\n".join([*lines, _TAIL]))
     except OSError as error:
         raise UserError("command line", "--new", name, f"give another name: {error.strerror}") from None
     return path
@@ -75,8 +82,6 @@ def _tables_of_deck(path: Path) -> dict[str, Given]:
     """
     from studies.fe_models.meshes import read_mesh_file  # where it is used: it takes a while to load
 
-    if path.suffix.lower() == ".csv":
-        raise UserError("command line", "--from", str(path), "give a deck; of reduced matrices: see OWN_MODEL.md")
     with scene_errors("command line", path):
         deck = read_mesh_file(path)
     held = np.unique(np.concatenate([np.empty(0), *(each.nodes for each in deck.boundaries)]))
@@ -110,18 +115,6 @@ def _tables_of_deck(path: Path) -> dict[str, Given]:
     return {"scene": scene, "axes": {"frequency_ratio": ratios, "excitation_amplitude": (1.0, "N")}}
 
 
-def _new_study(name: str, tables: dict[str, Given]) -> str:
-    lines = [_HEAD.format(name=name)]
-    for table in ("study", "scene", "axes", "slow_time", "wear", "solver", "outputs"):
-        given: Given = {"name": (name, "")} if table == "study" else tables.get(table, {})
-        lines.append(f"[{table}]")
-        lines += [f"{key} = {toml_value(value)}" + f" # {note}" * bool(note) for key, (value, note) in given.items()]
-        others = [each for each in _keys(table, SECTIONS[table]) if each[0] not in given] if table != "scene" else []
-        lines += [f"# {key} = {default} # {meaning}" for key, default, meaning in others if default]
-        lines.append("")
-    return "\n".join([*lines, _TAIL])
-
-
 def key_list() -> str:
     """Markdown: all keys of a study file with default and meaning."""
     lines = []
@@ -140,19 +133,19 @@ def _keys(table: str, kind: type[Section]) -> Iterator[tuple[str, str, str]]:
         value = None if field.is_required() else field.default
         if table in ("axes", "solver") and isinstance(value, tuple):
             value = value[0]
-        words = ", ".join(f'"{each}"' for each in _words(field.annotation))
-        if words and _is_number(field.annotation):
+        inner = [*_types_and_words(field.annotation)]
+        words = ", ".join(f'"{each}"' for each in inner if isinstance(each, str))
+        if words and {int, float} & {*inner}:
             words = f"a number, or {words}"
         if field.description:
             default = "" if value is None else toml_value(value)
             yield key, default, f"{words}: {field.description}" if words else field.description
 
 
-def _words(annotation: object) -> list[str]:
-    if get_origin(annotation) is Literal:
-        return [each for each in get_args(annotation) if isinstance(each, str)]
-    return [word for each in get_args(annotation) for word in _words(each)]
-
-
-def _is_number(annotation: object) -> bool:
-    return annotation in (int, float) or any(map(_is_number, get_args(annotation)))
+def _types_and_words(annotation: object) -> Iterator[object]:
+    """All types in an annotation, and the words that it takes."""
+    inner = get_args(annotation)
+    for each in inner:
+        yield from (each,) if get_origin(annotation) is Literal else _types_and_words(each)
+    if not inner:
+        yield annotation

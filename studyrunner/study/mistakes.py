@@ -6,24 +6,22 @@ import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from studies.scene_error import SceneError, remedy_of
-from studyrunner.user_error import UserError, Verbatim, WrongValueError
+from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Section, Wrong
-
-Details = dict[str, Any]
-"""One of the `errors()` of pydantic."""
 
 _SINGLE = ("float_type", "int_type", "bool_type", "string_type")
 
 
 def raise_wrong(source: str, wrong: Iterable[Wrong]) -> None:
     """Raises UserError with all that is wrong, if anything is; the first counts of several under one key."""
-    _raise_all([UserError(source, *each) for each in wrong])
+    _raise_all([UserError(source, each.key, each.value, each.remedy) for each in wrong])
 
 
 def _raise_all(mistakes: Iterable[UserError]) -> None:
@@ -77,22 +75,52 @@ def check_tables(kinds: Mapping[str, type[BaseModel]], tables: Mapping[str, Any]
             # tables of scenes are made for other callers as well, and take this from their caller
             checked[name] = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
         except ValidationError as error:
-            for each in _wrong_keys(error, kind, table, elsewhere):
-                wrong.append(each._replace(key=f"{name}.{each.key}" if each.key else name))
+            found = _wrong_keys(error, kind, table, elsewhere)
+            wrong += (Wrong(f"{name}.{each.key}".removesuffix("."), each.value, each.remedy) for each in found)
     raise_wrong(source, wrong)
     return checked
 
 
-class _Place(NamedTuple):
-    """Where an error is: keys that lead there, classes of the table with the last one, and what this key means."""
+@dataclass(frozen=True)
+class _Mistake:
+    """One of the `errors()` of pydantic. names: keys that lead there. tables: classes of the table with the last one.
 
+    meaning: of this key, as it stands behind a remedy.
+    """
+
+    details: dict[str, Any]
     names: tuple[str, ...]
     tables: list[type[BaseModel]]
     meaning: str
 
 
-def _place_of(kind: type[BaseModel], table: object, details: Details) -> _Place:
-    """Without places in lists and the kinds of value that were tried on the way."""
+def _wrong_keys(
+    error: ValidationError, kind: type[BaseModel], table: object, elsewhere: Mapping[str, str]
+) -> Iterator[Wrong]:
+    """What is wrong in a table, once for each key. elsewhere: keys of all tables, and where they stand."""
+    of_keys: dict[str, list[_Mistake]] = {}
+    for details in _flat_errors(error):
+        mistake = _locate(details, kind, table)
+        of_keys.setdefault(".".join(mistake.names), []).append(mistake)
+    for key, found in of_keys.items():
+        if not any(other.startswith(f"{key}.") for other in of_keys):
+            # of a key that takes several kinds of values, the kinds that fit as far as can be
+            deepest = max(len(each.details["loc"]) for each in found)
+            yield _wrong(key, [each for each in found if len(each.details["loc"]) == deepest], elsewhere)
+
+
+def _flat_errors(error: ValidationError) -> Iterator[dict[str, Any]]:
+    """All that is wrong, with its way from the table, also in tables that were checked on the way."""
+    for details in error.errors(include_url=False):
+        cause = details.get("ctx", {}).get("error")
+        if isinstance(cause, ValidationError):
+            yield from ({**each, "loc": (*details["loc"], *each["loc"])} for each in _flat_errors(cause))
+        else:
+            yield {**details}
+
+
+def _locate(details: dict[str, Any], kind: type[BaseModel], table: object) -> _Mistake:
+    """Where an error is, without places in lists and the kinds of value that were tried on the way."""
     names, around, meaning = list[str](), [kind], ""
     inner, tables = table, [kind]
     for number, part in enumerate(details["loc"], 1):
@@ -101,65 +129,36 @@ def _place_of(kind: type[BaseModel], table: object, details: Details) -> _Place:
             names, around, inner = [*names, str(part)], tables, inner.get(part)
             fields = [each.model_fields[part] for each in tables if part in each.model_fields]
             extra = [each.EXTRA for each in tables if issubclass(each, Section) and each.EXTRA and not fields]
-            tables = [
-                *(table for field in fields for table in tables_in(field.annotation)),
-                *(each for each, _ in extra),
-            ]
+            tables = [found for field in fields for found in tables_in(field.annotation)] + [each for each, _ in extra]
             # a key without a description of its own is part of one with a description
             meanings = (*(field.description for field in fields), *(f"as {looks}" for _, looks in extra))
             meaning = next(filter(None, meanings), meaning)
         elif isinstance(inner, list | tuple) and isinstance(part, int) and part < len(inner):
             inner = inner[part]
-    return _Place(tuple(names), around, f" ({re.sub(', [-1]$', '', meaning)})" if meaning else "")
+    return _Mistake(details, tuple(names), around, f" ({re.sub(', [-1]$', '', meaning)})" if meaning else "")
 
 
-def _wrong_keys(
-    error: ValidationError, kind: type[BaseModel], table: object, elsewhere: Mapping[str, str]
-) -> Iterator[Wrong]:
-    """What is wrong in a table, once for each key. elsewhere: keys of all tables, and where they stand."""
-    of_keys: dict[str, list[Details]] = {}
-    places: dict[str, _Place] = {}
-    for details in _flat_errors(error):
-        place = _place_of(kind, table, details)
-        places[".".join(place.names)] = place
-        of_keys.setdefault(".".join(place.names), []).append(details)
-    for key, found in of_keys.items():
-        if not any(other.startswith(f"{key}.") for other in of_keys):
-            # of a key that takes several kinds of values, the kinds that fit as far as can be
-            deepest = max(len(each["loc"]) for each in found)
-            yield _wrong(key, places[key], [each for each in found if len(each["loc"]) == deepest], elsewhere)
-
-
-def _wrong(key: str, place: _Place, found: Sequence[Details], elsewhere: Mapping[str, str]) -> Wrong:
-    kind, value, cause = found[0]["type"], found[0]["input"], found[0].get("ctx", {}).get("error")
+def _wrong(key: str, found: Sequence[_Mistake], elsewhere: Mapping[str, str]) -> Wrong:
+    details, tables, meaning = found[0].details, found[0].tables, found[0].meaning
+    kind, value, cause = details["type"], details["input"], details.get("ctx", {}).get("error")
     if kind == "extra_forbidden":
-        known = [name for each in place.tables for name, field in each.model_fields.items() if not field.exclude]
-        name = place.names[-1]
-        other = "" if len(place.names) > 1 or close_name(name, known) else close_name(name, list(elsewhere))
+        known = [name for each in tables for name, field in each.model_fields.items() if not field.exclude]
+        *above, name = found[0].names
+        other = "" if above or close_name(name, known) else close_name(name, list(elsewhere))
         return Wrong(key, value, f"unknown key, give {elsewhere.get(other) or nearest_name(name, known)}")
     if kind == "missing":
-        is_value = isinstance(found[0]["loc"][-1], int)
+        is_value = isinstance(details["loc"][-1], int)
         remedy = "give more values" if is_value else "missing: give it"
-        return Wrong(key, value if is_value else None, remedy + place.meaning)
+        return Wrong(key, value if is_value else None, remedy + meaning)
     if isinstance(cause, SceneError):
-        return Wrong(cause.key or key, Verbatim(cause.value), cause.remedy + place.meaning)
-    if isinstance(cause, WrongValueError):
-        return Wrong(".".join(filter(None, (key, cause.key))), cause.value, cause.remedy + place.meaning)
-    own_axes = [name for each in place.tables for name in getattr(each, "AXES", each.model_fields)]
+        return Wrong(cause.key or key, Verbatim(cause.value), cause.remedy + meaning)
+    if isinstance(cause, Wrong):
+        return Wrong(".".join(filter(None, (key, cause.key))), cause.value, cause.remedy + meaning)
+    own_axes = [name for each in tables for name in getattr(each, "AXES", each.model_fields)]
     if isinstance(value, list) and kind in _SINGLE and key in own_axes:
-        return Wrong(key, value, f"give one value here, or the list as axes.{key}{place.meaning}")
-    remedies = dict.fromkeys(remedy_of(each).removeprefix("give ") for each in found)
-    return Wrong(key, value, f"give {', or '.join(remedies)}{place.meaning}")
-
-
-def _flat_errors(error: ValidationError) -> Iterator[Details]:
-    """All that is wrong, with its way from the table, also in tables that were checked on the way."""
-    for details in error.errors(include_url=False):
-        cause = details.get("ctx", {}).get("error")
-        if isinstance(cause, ValidationError):
-            yield from ({**each, "loc": (*details["loc"], *each["loc"])} for each in _flat_errors(cause))
-        else:
-            yield {**details}
+        return Wrong(key, value, f"give one value here, or the list as axes.{key}{meaning}")
+    remedies = dict.fromkeys(remedy_of(each.details).removeprefix("give ") for each in found)
+    return Wrong(key, value, f"give {', or '.join(remedies)}{meaning}")
 
 
 def tables_in(annotation: object) -> list[type[BaseModel]]:

@@ -12,10 +12,11 @@ from pydantic import BaseModel
 
 from studies.scene import ExpectedWear, as_scene
 from studyrunner.scatter import Scattered, ScatteredPairs, draw
-from studyrunner.study.mission import MissionBlock
 from studyrunner.study.scene_section import SceneSection
+from studyrunner.study.sections import MissionBlock
 from studyrunner.study.study import NUMBERS, Study
-from studyrunner.user_error import UserError, WrongValueError
+from studyrunner.user_error import UserError
+from studyrunner.values import Wrong
 
 _FAR = 3.1
 """Standard deviations of each input up to which a scene has room for the wear of its samples: 999 of 1000 lie below.
@@ -60,7 +61,7 @@ def draw_inputs(
     }
     try:
         return draw(section, own, pairs)
-    except WrongValueError as error:
+    except Wrong as error:
         raise UserError(study.source, error.key or "scatter", error.value, error.remedy) from None
 
 

@@ -8,9 +8,8 @@ from typing import Any, get_args
 from solver.settings import FIRST_HARMONICS
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import OF_PAIRS
-from studyrunner.study.mission import OWN_AXES
 from studyrunner.study.mistakes import nearest_name
-from studyrunner.study.sections import AUTO, DEFAULT
+from studyrunner.study.sections import AUTO, DEFAULT, OWN_AXES
 from studyrunner.study.study import MISSIONS, MODES, NUMBERS, WEAR, Study
 from studyrunner.values import Wrong
 from studyrunner.variables import OF_A_HISTORY
@@ -20,31 +19,26 @@ _MOST_POINTS = 1_000_000
 
 def broken_rules(study: Study) -> Iterator[Wrong]:
     """All that does not fit together. study: with its axes, without variants, and before it is complete."""
-    for rule in (_kind, _blocks, _frequency, _variables, _size_of_result, _solver, _end, _scatter):
+    for rule in (_kind, _blocks, _frequency, _outputs, _solver_and_end, _scatter):
         yield from rule(study)
 
 
 def _kind(study: Study) -> Iterator[Wrong]:
     """Keys have a use in a study of this kind; missions are counted where there are blocks."""
-    kind, axes = study.kind, study.axes
+    kind, axes, worn, missions = study.kind, study.axes, study.scene.worn, study.slow_time.missions
     for name, keys in kind.unused.items():
         table = getattr(study, name)
-        for key in [key for key in keys if key in table.model_fields_set]:
-            if (value := getattr(table, key)) != ():
-                yield Wrong(f"{name}.{key}", value, kind.why)
-    worn, missions = study.scene.worn, study.slow_time.missions
+        given = {key: getattr(table, key) for key in keys if key in table.model_fields_set}
+        yield from (Wrong(f"{name}.{key}", value, kind.why) for key, value in given.items() if value != ())
     if kind is MODES and "ramp" in axes.sweep:
         yield Wrong("axes.sweep", "ramp", 'give "up" or "down": the modal amplitude is raised or lowered')
     if kind is MODES and worn is not None and not any(axis.key == ("worn",) for axis in study.scene_axes):
-        yield Wrong(
-            "scene.worn.cycle", None, "missing: give the cycle count of each depth, the coordinate of the modes"
-        )
+        remedy = "missing: give the cycle count of each depth, the coordinate of the modes"
+        yield Wrong("scene.worn.cycle", None, remedy)
     if kind is not MODES and axes.mode != (1,):
         yield Wrong("axes.mode", axes.mode, "give axes.modal_amplitude as well: mode is that of a nonlinear mode")
-    if kind is MISSIONS and missions is None:
-        yield Wrong("slow_time.missions", None, "missing: give how often the blocks are repeated")
-    if kind is WEAR and missions is not None:
-        yield Wrong("slow_time.missions", missions, "give slow_time.cycles in its place, or blocks under [[mission]]")
+    if kind is not MODES and (kind is MISSIONS) != (missions is not None):
+        yield Wrong("slow_time.missions", missions, "give it with blocks under [[mission]], else slow_time.cycles")
 
 
 def _blocks(study: Study) -> Iterator[Wrong]:
@@ -52,15 +46,13 @@ def _blocks(study: Study) -> Iterator[Wrong]:
     blocks, axes = study.mission, study.axes
     for before, block in zip((*blocks[-1:], *blocks), blocks, strict=False):
         key, (theirs, ours) = f"mission.{block.name}", (before.parameters, block.parameters)
-        changed = [name for name in {**theirs, **ours} if theirs.get(name) != ours.get(name)]
+        changed = any(theirs.get(name) != ours.get(name) for name in {**theirs, **ours})
         if not block.gives("frequency") and not axes.frequency:
             yield Wrong(f"{key}.frequency", None, "missing: give it here, or axes.frequency for all blocks without one")
-        if block.begin == "continue" and changed:
-            yield Wrong(
-                f"{key}.begin", "continue", f'give "ramp": {before.name}, the block before, differs in {changed[0]}'
-            )
-        if block.begin == "sweep" and block.passage is None and "ramp" in axes.sweep:
-            yield Wrong(f"{key}.begin", "sweep", 'give "ramp", or axes.sweep = "up" or "down"')
+        no_sweep = block.begin == "sweep" and block.passage is None and "ramp" in axes.sweep
+        if no_sweep or (block.begin == "continue" and changed):
+            remedy = 'give "ramp": only blocks with the same keys of [scene] continue, and axes.sweep sweeps up or down'
+            yield Wrong(f"{key}.begin", block.begin, remedy)
     for name in (*OWN_AXES, *(axis.name for axis in study.scene_axes)):
         given = name not in OWN_AXES or name in axes.model_fields_set
         if blocks and given and all(block.gives(name) for block in blocks):
@@ -71,22 +63,15 @@ def _frequency(study: Study) -> Iterator[Wrong]:
     """The frequency is given once: in Hz, as a ratio, or as a resonance in a range."""
     axes, word, frequency = study.axes, _followed(study), list(study.axes.frequency or ())
     given = axes.model_fields_set & {"frequency", "frequency_ratio"}
-    if study.kind is WEAR and not given:
-        yield Wrong("axes.frequency", None, "missing: give it, in Hz, or frequency_ratio")
-    if len(given) > 1:
-        yield Wrong("axes.frequency", frequency, "leave it out, or frequency_ratio: give one of both")
+    if (study.kind is WEAR and not given) or len(given) > 1:
+        yield Wrong("axes.frequency", frequency or None, "give either it, in Hz, or frequency_ratio")
     if word is None and study.loading is not None:
-        yield Wrong("loading", study.loading.model_dump(), 'leave it out: it is the range of axes.frequency = "peak"')
-    if word is None:
-        return
-    if study.kind is MISSIONS:
-        yield Wrong("axes.frequency", word, "give frequencies in Hz: blocks of a mission follow no resonance")
-    if len(frequency) > 1:
-        yield Wrong("axes.frequency", frequency, f'give "{word}" alone: every point has the frequency that it finds')
-    if "ramp" in axes.sweep:
-        yield Wrong("axes.sweep", "ramp", f'give "up" or "down": a ramp has a fixed frequency, and no {word}')
-    if "final" in axes.scheme:
-        yield Wrong("axes.scheme", "final", f'give "adaptive": the scheme "final" has a fixed frequency, and no {word}')
+        remedy = 'leave it out: it is the range of axes.frequency = "peak"'
+        yield Wrong("loading", study.loading.model_dump(), remedy)
+    is_fixed = study.kind is MISSIONS or "ramp" in axes.sweep or "final" in axes.scheme
+    if word is not None and (is_fixed or len(frequency) > 1):
+        remedy = f'give Hz: "{word}" stands alone, and goes with no mission, no sweep "ramp" and no scheme "final"'
+        yield Wrong("axes.frequency", frequency, remedy)
 
 
 def _followed(study: Study) -> str | None:
@@ -95,10 +80,22 @@ def _followed(study: Study) -> str | None:
     return next((each for each in given if isinstance(each, str)), None)
 
 
-def _size_of_result(study: Study) -> Iterator[Wrong]:
-    """A study has so many points at most, and two dimensions of the result have two names."""
-    if "nodal_diameter" in study.dimensions and "natural_frequency" in study.scene_variables:
-        yield Wrong("outputs.variables", "natural_frequency", "leave it out: its own dimension is nodal_diameter, too")
+def _outputs(study: Study) -> Iterator[Wrong]:
+    """Variables are those of such a study, of different names, and of so many points at most."""
+    known = [*study.kind.asked, *(name for name in SCENE if name != "exact" or study.kind is WEAR)]
+    of_pairs = study.scatter is not None and bool(study.scatter.of_pairs)
+    no_exact = study.to_the_end or _followed(study) or study.axes.frequency_ratio or of_pairs
+    for name in study.outputs.variables:
+        remedy = ""
+        if name not in (DEFAULT, *OF_A_HISTORY, *known):
+            remedy = f"give {nearest_name(name, known)}, for {study.kind.name}"
+        elif name in ("mesh", "exact") and (name not in study.scene.offers or (name == "exact" and no_exact)):
+            remedy = f"leave it out: the scene {study.scene.model} has none"
+            remedy += ", or not with these frequencies, cycle counts and pairs" if name == "exact" else ""
+        elif name == "natural_frequency" and "nodal_diameter" in study.dimensions and name in study.scene_variables:
+            remedy = "leave it out: its own dimension is nodal_diameter, too"
+        if remedy:
+            yield Wrong("outputs.variables", name, remedy)
     if study.n_points > _MOST_POINTS:
         longest = max(study.dimensions, key=lambda name: len(study.dimensions[name]))
         remedy = f"give fewer values: there are {study.n_points:.3g} points, and a study has at most {_MOST_POINTS}"
@@ -106,45 +103,22 @@ def _size_of_result(study: Study) -> Iterator[Wrong]:
         yield Wrong(key, len(study.dimensions[longest]), remedy)
 
 
-def _variables(study: Study) -> Iterator[Wrong]:
-    of_scene = (name for name in SCENE if name != "exact" or study.kind is WEAR)
-    known = dict.fromkeys((*study.kind.asked, *of_scene))
-    no_exact = study.to_the_end or _followed(study) or study.axes.frequency_ratio
-    of_pairs = () if study.scatter is None else study.scatter.of_pairs
-    for name in study.outputs.variables:
-        if name not in (DEFAULT, *OF_A_HISTORY, *known):
-            yield Wrong("outputs.variables", name, f"give {nearest_name(name, known)}, for {study.kind.name}")
-        elif name in ("mesh", "exact") and name not in study.scene.offers:
-            yield Wrong("outputs.variables", name, f"leave it out: the scene {study.scene.model} has none")
-        elif name == "exact" and (no_exact or of_pairs):
-            remedy = "leave it out: it is of given frequencies and cycle counts, and of pairs that scatter in nothing"
-            yield Wrong("outputs.variables", name, remedy)
-
-
-def _solver(study: Study) -> Iterator[Wrong]:
-    """Samples in a period resolve the harmonics; a law that depends on depths knows them."""
+def _solver_and_end(study: Study) -> Iterator[Wrong]:
+    """Samples in a period resolve the harmonics; a law that depends on depths knows them; histories can end."""
+    schemes, slow_time = study.axes.scheme, study.slow_time
     # automatic harmonics begin with three
-    automatic = [FIRST_HARMONICS] if AUTO in study.solver.harmonics else []
-    most = max((*study.given_harmonics, *automatic), default=0)
+    most = max((*study.given_harmonics, *([FIRST_HARMONICS] if AUTO in study.solver.harmonics else ())), default=0)
     fewest = min((number for number in study.solver.samples if number != AUTO), default=None)
     if fewest is not None and fewest <= 2 * most:
         yield Wrong("solver.samples", fewest, f"give more than twice the {most} harmonics, at least {2 * most + 1}")
     if study.wear.law == "table" and study.scene.worn is not None:
-        yield Wrong(
-            "wear.law", "table", "give another law: its factors are of depths, which a worn scene counts from 0"
-        )
-
-
-def _end(study: Study) -> Iterator[Wrong]:
-    schemes, slow_time = study.axes.scheme, study.slow_time
+        remedy = "give another law: its factors are of depths, which a worn scene counts from 0"
+        yield Wrong("wear.law", "table", remedy)
     if study.to_the_end and "explicit" in schemes:
         yield Wrong("axes.scheme", "explicit", 'give "adaptive" or "implicit": with cycles = inf steps have to grow')
-    if "final" in schemes and not study.to_the_end:
-        yield Wrong(
-            "slow_time.cycles", slow_time.cycles, 'give inf: the scheme "final" finds where nothing wears any more'
-        )
-    if "final" in schemes and slow_time.until is not None:
-        yield Wrong("slow_time.until", slow_time.until, 'leave it out: the scheme "final" computes no way to it')
+    if "final" in schemes and (not study.to_the_end or slow_time.until is not None):
+        remedy = "give slow_time.cycles = inf, without until, beside it: it finds where nothing wears any more"
+        yield Wrong("axes.scheme", "final", remedy)
 
 
 def _scatter(study: Study) -> Iterator[Wrong]:
@@ -154,14 +128,15 @@ def _scatter(study: Study) -> Iterator[Wrong]:
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
     known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
     for name, scattered in study.scatter.inputs.items() if study.scatter else ():
-        key, absolute = f"scatter.{name}", scattered.distribution.is_absolute
-        shown = scattered.distribution.model_dump(exclude_none=True)
         several = name in NUMBERS and len(getattr(study.axes, name) or ()) > 1
-        giving = [block.name for block in study.mission if block.gives(name)]
+        giving = any(block.gives(name) for block in study.mission)
         if name not in known:
-            yield Wrong(key, None, f"unknown input, give {nearest_name(name, known)}")
+            yield Wrong(f"scatter.{name}", None, f"unknown input, give {nearest_name(name, known)}")
         if name == "frequency" and (_followed(study) or study.axes.frequency_ratio or giving):
-            yield Wrong(key, None, "leave it out: each sample, or a block, has a frequency of its own")
-        if absolute and (giving or several or any(axis.name == name for axis in study.scene_axes)):
+            remedy = "leave it out: each sample, or a block, has a frequency of its own"
+            yield Wrong(f"scatter.{name}", None, remedy)
+        if scattered.distribution.is_absolute and (
+            giving or several or any(axis.name == name for axis in study.scene_axes)
+        ):
             remedy = "give a distribution around own values, as {std = ...}: an axis or a block gives values"
-            yield Wrong(key, shown, remedy)
+            yield Wrong(f"scatter.{name}", scattered.distribution.model_dump(exclude_none=True), remedy)

@@ -91,8 +91,7 @@ def take_axes(tables: Tables, scene: type[BaseModel], source: str) -> tuple[Scen
 
 def keys_below_axes(scene_axes: Sequence[SceneAxis]) -> dict[str, str]:
     """For keys of [scene] or [wear] whose values stand under [axes]: the keys there."""
-    of_keys = (axis for axis in scene_axes if axis.key != ("worn",))
-    return {f"{axis.table}.{axis.key[0]}": f"axes.{axis.key[0]}" for axis in of_keys}
+    return {f"{axis.table}.{axis.key[0]}": f"axes.{axis.key[0]}" for axis in scene_axes if axis.key != ("worn",)}
 
 
 def variants_of(tables: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[Tables]:

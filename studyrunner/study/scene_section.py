@@ -18,7 +18,7 @@ from studies.scenes import scene_parameters
 from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
 from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file
 from studyrunner.system.progress import count as counted
-from studyrunner.user_error import UserError, Verbatim, WrongValueError
+from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Axis, NotNegative, Section, Wrong, listed
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Worn(Section):
     def depths(self, n_contact: int) -> tuple[float, ...]:
         """Depths (n_contact,), m, of the only state.
 
-        Raises WrongValueError where there are others than pairs; one depth is of all pairs, but not one of a result.
+        Raises Wrong where there are others than pairs; one depth is of all pairs, but not one of a result.
         """
         (depth,) = self.depth
         if len(depth) == n_contact:
@@ -92,7 +92,7 @@ class Worn(Section):
             return depth * n_contact
         key, given = ("result", "a result with the same pairs") if self.result else ("depth", "one depth for each pair")
         remedy = f"give {given}: the scene has {counted(n_contact, 'contact pair')}"
-        raise WrongValueError(Verbatim(f"there are {counted(len(depth), 'depth')}"), remedy, key)
+        raise Wrong(key, Verbatim(f"there are {counted(len(depth), 'depth')}"), remedy)
 
 
 class SceneSection(Section):
@@ -148,8 +148,7 @@ def parameters_of(model: object, source: str, folder: Path | None = None) -> typ
     folder: relative paths start here; None where a result holds the scene.
     """
     if not isinstance(model, str):
-        remedy = "give a bundled scene or the path of a scene file, in quotes"
-        raise UserError(source, "scene.model", model, remedy if model is not None else f"missing: {remedy}")
+        raise UserError(source, "scene.model", model, "give a bundled scene or the path of a scene file, in quotes")
     if _names_model(model):
         if folder is not None:  # a file that is missing is named before keys that are
             with scene_errors(source, None):
@@ -165,10 +164,11 @@ def parameters_of(model: object, source: str, folder: Path | None = None) -> typ
         raise UserError(source, "scene.model", model, error.remedy) from None
 
 
-def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
+def find_scene(scene: SceneSection, origin: Origin, known: SceneSection | None = None) -> SceneSection:
     """The scene with its files and what it offers: in the result that is read, in files, or to be built.
 
-    scene: checked. Raises UserError where there is no such file, or the result holds the model of another scene.
+    scene: checked. known: of another variant of the study, whose file is not read again. Raises UserError where there
+    is no such file, or the result holds the model of another scene.
     """
     model, before = scene.model, origin.scene
     if scene.is_bundled:
@@ -177,7 +177,7 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
         ours, theirs = scene.of_model, before.of_model
         changed = [key for key in {**theirs, **ours} if ours.get(key) != theirs.get(key)]
         if not changed:
-            return _in_file(scene, origin.path, SCENE_GROUP, origin)
+            return _in_file(scene, origin.path, SCENE_GROUP, origin, known)
         if not scene.is_bundled:
             remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
             raise UserError(origin.source, f"scene.{changed[0]}", ours.get(changed[0]), remedy)
@@ -190,7 +190,7 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
         if not exists:
             remedy = "there is no such file: give a path relative to the study file"
             raise UserError(origin.source, "scene.model", model, remedy)
-        return _in_file(scene, path, "", origin)
+        return _in_file(scene, path, "", origin, known)
     # what reads and reduces it is loaded where there is one
     from studies.fe_models.from_files.model import find_files
     from studies.fe_models.from_files.parameters import Parameters
@@ -201,10 +201,12 @@ def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
     return scene.model_copy(update={"files": files, "offers": ("mesh",) if files.has_faces else ()})
 
 
-def _in_file(scene: SceneSection, path: Path, group: str, origin: Origin) -> SceneSection:
+def _in_file(scene: SceneSection, path: Path, group: str, origin: Origin, known: SceneSection | None) -> SceneSection:
     """The scene in a file, once it is known that it can be read at all."""
     from studies.scene_file import read_mesh
 
+    if known is not None and (known.path, known.group) == (path, group):
+        return scene.model_copy(update={"path": path, "group": group, "offers": known.offers})
     with scene_errors(origin.source, path):
         offers = scene.offers or (("mesh",) if read_mesh(path, group) is not None else ())
     return scene.model_copy(update={"path": path, "group": group, "offers": offers})

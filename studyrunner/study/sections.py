@@ -1,4 +1,4 @@
-"""The tables of a study file but [scene], [scatter] and [[mission]]: their keys, what each key takes, its default."""
+"""The tables of a study file but [scene] and [scatter]: their keys, what each key takes, its default."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from solver.contact.wear_law import WearLaw, WearTable
-from solver.settings import TARGETS, Followed
+from solver.settings import TARGETS, Followed, Passage
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
+from studyrunner.study.mistakes import check_tables, nearest_name, raise_wrong
+from studyrunner.user_error import UserError
 from studyrunner.values import Axis, Fraction, Listed, NotNegative, Positive, Section, Whole, Wrong, ascending, once
 from studyrunner.variables import ASKED, OF_MISSIONS, OF_MODES
 
@@ -28,6 +30,7 @@ VARIABLES = tuple(dict.fromkeys((*ASKED, *SCENE, *OF_MODES, *OF_MISSIONS)))
 """All that `outputs.variables` may name, in the order of the result."""
 
 _OF_SURFACE = "surfaces_"
+_NO_KEYS_OF_BLOCKS = ("model", "worn", "mesh")
 _MOST_KNOTS = 1000
 
 
@@ -37,17 +40,29 @@ def _check_name(value: str) -> str:
     return value
 
 
+def _check_block_name(value: str) -> str:
+    if not value.strip() or not value.isprintable() or len(value) > 60 or "." in value:
+        raise ValueError("give a name of at most 60 characters without a point, in quotes")
+    return value
+
+
 def _check_target(value: dict[str, float]) -> dict[str, float]:
     if len(value) != 1 or next(iter(value)) not in TARGETS:
         raise ValueError("give one of " + ", ".join(f"{{{name} = ...}}" for name in TARGETS))
     return value
 
 
+def _check_passage(value: dict[str, float]) -> dict[str, float]:
+    if value.keys() != {"start", "stop", "rate"} or value["start"] == value["stop"]:
+        raise ValueError("give {start = Hz, stop = another Hz, rate = Hz/s} for a passage")
+    return {name: value[name] for name in ("start", "stop", "rate")}
+
+
 _Scheme = Literal["implicit", "explicit", "adaptive", "final"]
 _Samples = Annotated[Whole, Field(ge=4, le=100_000)]
 _Number = Annotated[Whole, Field(ge=1, le=1000)]
 _Knots = Annotated[Listed[float], Field(min_length=1, max_length=_MOST_KNOTS), AfterValidator(ascending)]
-
+_Passage = Annotated[dict[str, Positive], AfterValidator(_check_passage)]
 
 if TYPE_CHECKING:
     _Frequencies = tuple[float, ...]  # of a complete study
@@ -110,16 +125,12 @@ class WearSection(Section):
         """Each law takes its own keys, and a table has a factor for each pressure and depth."""
         for law, keys in self.TAKEN.items():
             for key in keys:
-                value = getattr(self, key)
-                if law == self.law and value is None:
-                    yield Wrong("law", law, f"give wear.{key} beside it")
-                if law != self.law and value is not None:
-                    yield Wrong(key, value, f'leave it out: only the law "{law}" takes it')
-        if self.pressure is not None and self.depth is not None and self.factor is not None:
-            n_rows, n_columns = len(self.pressure), len(self.depth)
-            if len(self.factor) != n_rows or any(len(row) != n_columns for row in self.factor):
-                remedy = f"give a row for each of {n_rows} pressures, with a number for each of {n_columns} depths"
-                yield Wrong("factor", self.factor, remedy)
+                if (law == self.law) != ((value := getattr(self, key)) is not None):
+                    yield Wrong(key, value, f'give it with the law "{law}", and with no other law')
+        n_rows, n_columns = len(self.pressure or ()), len(self.depth or ())
+        if self.factor is not None and [len(row) for row in self.factor] != [n_columns] * n_rows:
+            remedy = f"give a row for each of {n_rows} pressures, with a number for each of {n_columns} depths"
+            yield Wrong("factor", self.factor, remedy)
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -130,18 +141,15 @@ class WearSection(Section):
 
     def with_numbers(self, values: Mapping[str, float]) -> WearSection:
         """With other values of `numbers`."""
-        table = {f"{_OF_SURFACE}{label}": (label, factor) for label, factor in (self.surfaces or {}).items()}
-        surfaces = {label: values.get(name, factor) for name, (label, factor) in table.items()} or None
-        return self.model_copy(update={"threshold": values.get("threshold", self.threshold), "surfaces": surfaces})
+        own = {label: values.get(f"{_OF_SURFACE}{label}", factor) for label, factor in (self.surfaces or {}).items()}
+        return self.model_copy(update={"threshold": values.get("threshold", self.threshold), "surfaces": own or None})
 
     @property
     def as_law(self) -> WearLaw:
         """As the solver takes it."""
-        table = None
-        if self.pressure is not None and self.depth is not None and self.factor is not None:
-            table = WearTable(self.pressure, self.depth, self.factor)
-        surfaces = () if self.surfaces is None else tuple(self.surfaces.items())
-        return WearLaw(self.law, self.threshold or 0.0, table, surfaces)
+        # all three, or none
+        table = WearTable(self.pressure or (), self.depth or (), self.factor) if self.factor is not None else None
+        return WearLaw(self.law, self.threshold or 0.0, table, tuple((self.surfaces or {}).items()))
 
 
 class SlowTimeSection(Section):
@@ -154,16 +162,12 @@ class SlowTimeSection(Section):
         None, description="repetitions of the blocks under [[mission]], in place of cycles"
     )
     final_share: Fraction = Field(
-        1e-4,
-        description="of its largest wear rate, below which a pair wears no more with cycles = inf",
+        1e-4, description="of its largest wear rate, below which a pair wears no more with cycles = inf"
     )
     outputs: (
         Annotated[Whole, Field(ge=1, le=1_000_000)]
         | Annotated[Listed[NotNegative], Field(min_length=1), AfterValidator(ascending)]
-    ) = Field(
-        101,
-        description="number of equally spaced cycle counts with 0 and the last, or a list",
-    )
+    ) = Field(101, description="number of equally spaced cycle counts with 0 and the last, or a list")
     until: Annotated[dict[str, Positive], AfterValidator(_check_target)] | None = Field(
         None,
         description="end of a point: {wear_depth = 1e-5}, m, of the deepest pair, {worn_volume = 1e-9}, m3,"
@@ -177,19 +181,16 @@ class SlowTimeSection(Section):
         """The outputs lie on the way to the end."""
         missions, cycles, outputs = self.missions, self.cycles, self.outputs
         counts = outputs if isinstance(outputs, tuple) else ()
-        if missions is not None:
-            if counts and (counts[-1] > missions or any(count != round(count) for count in counts)):
-                remedy = f"give whole numbers of missions, at most slow_time.missions = {missions}"
-                yield Wrong("outputs", outputs, remedy)
-            if self.until is not None and "frequency_shift" in self.until:
-                remedy = "give wear_depth or worn_volume: blocks of a mission have frequencies of their own"
-                yield Wrong("until", self.until, remedy)
-        elif counts and cycles == math.inf:
+        if missions is not None and self.until is not None and "frequency_shift" in self.until:
+            remedy = "give wear_depth or worn_volume: blocks of a mission have frequencies of their own"
+            yield Wrong("until", self.until, remedy)
+        if counts and missions is None and cycles == math.inf:
             remedy = "give their number: with slow_time.cycles = inf they are spaced evenly in worn volume and cycles"
             yield Wrong("outputs", outputs, remedy)
-        elif counts and counts[-1] > cycles:
-            yield Wrong("outputs", counts[-1], f"give cycle counts of at most slow_time.cycles = {cycles:g}")
-        elif outputs == 1 and cycles > 0.0:
+        if counts and (counts[-1] > (missions or cycles) or (missions and any(each != round(each) for each in counts))):
+            remedy = "give cycle counts of at most slow_time.cycles, or whole numbers of at most slow_time.missions"
+            yield Wrong("outputs", outputs, remedy)
+        if outputs == 1 and missions is None and cycles > 0.0:
             yield Wrong("outputs", outputs, "give at least 2: cycle 0 and the last one")
 
 
@@ -213,9 +214,7 @@ class OutputsSection(Section):
         (DEFAULT,), description="list of names; default: those that cost little"
     )
     loops: Annotated[
-        Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]],
-        AfterValidator(once),
-        AfterValidator(lambda loops: tuple(sorted(loops))),
+        Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]], AfterValidator(lambda loops: tuple(sorted(once(loops))))
     ] = Field((), description="list of the contact pairs, from 0 on, whose fretting loops are stored")
     scene: bool = Field(False, description="whether the result holds the reduced model of a bundled scene")
 
@@ -228,6 +227,71 @@ class LoadingSection(Section):
     )
 
 
+class MissionBlock(Section):
+    """A block of [[mission]]. Other keys are those of [scene] to which the block gives values of its own."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: Annotated[str, AfterValidator(_check_block_name)] = Field(
+        description="of the block, a coordinate of the result"
+    )
+    frequency: Positive | _Passage | None = Field(
+        None, description="Hz; or {start, stop, rate}: a passage, rate in Hz/s; or that of [axes]"
+    )
+    engine_order: Positive | None = Field(None, description="in place of frequency: order times rotation_speed / 60")
+    cycles: Positive | None = Field(None, description="of steady vibration in one mission; or seconds")
+    seconds: Positive | None = Field(None, description="s, of steady vibration in one mission; or cycles")
+    begin: Literal["ramp", "sweep", "continue"] = Field(
+        "ramp",
+        description="the excitation rises from the static state, a sweep as axes.sweep says, or the last state of the"
+        " block before",
+    )
+    excitation_amplitude: Positive | None = Field(None, description="N; or that of [axes]")
+
+    def rules(self) -> Iterator[Wrong]:
+        """A block has one frequency and one duration."""
+        if self.frequency is not None and self.engine_order is not None:
+            yield Wrong("engine_order", self.engine_order, "leave it out, or frequency: give one of both")
+        if self.passage is not None and (self.cycles or self.seconds or self.begin != "sweep"):
+            remedy = "leave out cycles, seconds and begin: a passage is a sweep, as long as its rate says"
+            yield Wrong("frequency", self.frequency, remedy)
+        if self.passage is None and (self.cycles is None) == (self.seconds is None):
+            yield Wrong("cycles", self.cycles, "give either cycles or seconds, the duration of the block in a mission")
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Keys of [scene] to which the block gives values of its own."""
+        return self.model_extra or {}
+
+    @property
+    def passage(self) -> Passage | None:
+        """The frequencies that it passes; None where the vibration is steady."""
+        return Passage(**self.frequency) if isinstance(self.frequency, dict) else None
+
+    def gives(self, name: str) -> bool:
+        """Whether the block gives a value of its own to an axis."""
+        own = self.engine_order is not None and name == "frequency"
+        return own or name in self.parameters or (name in OWN_AXES and getattr(self, name) is not None)
+
+    def cycles_at(self, frequency: float) -> float:
+        """Cycles of the block in one mission. frequency: of steady vibration, Hz."""
+        if self.passage is not None:
+            return self.passage.cycles
+        return self.cycles if self.cycles is not None else (self.seconds or 0.0) * frequency
+
+    def describe(self, frequency: float) -> str:
+        """In words. frequency: of steady vibration, Hz."""
+        cycles = f"{self.cycles_at(frequency):.4g} cycles a mission"
+        if self.passage is not None:
+            ends = f"{self.passage.start:g} to {self.passage.stop:g} Hz"
+            return f"passage from {ends} at {self.passage.rate:g} Hz/s, {cycles}"
+        how = "continues the block before" if self.begin == "continue" else f"begins with a {self.begin}"
+        return f"{frequency:g} Hz, {cycles}, {how}"
+
+
+OWN_AXES = tuple(name for name in AxesSection.model_fields if name in MissionBlock.model_fields)
+"""Axes of a study that a block may give a value of its own."""
+
 SECTIONS: dict[str, type[Section]] = {
     "study": StudySection,
     "axes": AxesSection,
@@ -238,3 +302,31 @@ SECTIONS: dict[str, type[Section]] = {
     "scatter": ScatterSection,
     "loading": LoadingSection,
 }
+
+
+def read_blocks(given: object, scene: type[BaseModel], source: str) -> tuple[MissionBlock, ...]:
+    """The blocks of a study file, each right in itself; values of keys of [scene] are not looked at.
+
+    given: what stands under `mission`. scene: what [scene] of this model consists of. Raises UserError.
+    """
+    if not isinstance(given, list) or not given or not all(isinstance(block, dict) for block in given):
+        raise UserError(source, "mission", given, "give blocks in order, each under a line [[mission]]")
+    tables: dict[str, Any] = {}
+    for number, table in enumerate(given):
+        name = table.get("name")
+        place = f"mission.{name if isinstance(name, str) and name.isprintable() and name else number}"
+        if place in tables:
+            raise UserError(source, "mission.name", name, "give each block a name of its own")
+        tables[place] = {"begin": "sweep", **table} if isinstance(table.get("frequency"), dict) else table
+    blocks = check_tables(dict.fromkeys(tables, MissionBlock), tables, source)
+    known = [*MissionBlock.model_fields, *(name for name in scene.model_fields if name not in _NO_KEYS_OF_BLOCKS)]
+    raise_wrong(
+        source,
+        (
+            Wrong(f"{place}.{key}", value, f"unknown key of a block, give {nearest_name(key, known)}")
+            for place, block in blocks.items()
+            for key, value in block.parameters.items()
+            if key not in known
+        ),
+    )
+    return tuple(blocks.values())

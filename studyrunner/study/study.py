@@ -14,14 +14,15 @@ from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner import variables
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
-from studyrunner.study.mission import OWN_AXES, MissionBlock
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.sections import (
     AUTO,
+    OWN_AXES,
     SOLVER_AXES,
     AxesSection,
     LoadingSection,
+    MissionBlock,
     OutputsSection,
     SlowTimeSection,
     SolverSection,
@@ -37,10 +38,9 @@ class Kind:
     """A kind of study.
 
     name: what its points are. about: what a result holds, of a {scene}. time: how well the time of a run is known.
-    axes: axes of the result that are neither keys of the solver, of [scene] and [wear], nor samples, in their order.
-    asked, always: variables that its points may have, and that its result always holds.
-    usual, of_samples: variables where the study names none, and where samples are drawn.
-    counted: what the slow time counts; empty where nothing wears.
+    axes: those of the result that are neither keys of the solver, of [scene] and [wear], nor samples, in their order.
+    asked, always: variables that its points may have, and that its result always holds. usual, of_samples: those where
+    the study names none, and where samples are drawn. counted: what the slow time counts; empty where nothing wears.
     unused: keys without a use, by table. why: the remedy where one is given.
     """
 
@@ -192,25 +192,14 @@ class Study(Section):
     @cached_property
     def output_counts(self) -> tuple[float, ...]:
         """Cycle counts, or numbers of missions, of the result, ascending; with `to_the_end` numbers of the outputs."""
-        cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
-        if self.mission:
-            return tuple(map(float, self.output_missions))
+        outputs, end = self.slow_time.outputs, float(self.slow_time.missions or self.slow_time.cycles)
         if isinstance(outputs, tuple):
             return outputs
-        if self.to_the_end:
+        if end == math.inf:
             return tuple(map(float, range(outputs)))
-        if cycles == 0.0:
-            return (0.0,)
-        return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)
-
-    @property
-    def output_missions(self) -> tuple[int, ...]:
-        """Numbers of missions of the result, ascending; equally spaced, rounded to whole numbers."""
-        missions, outputs = self.slow_time.missions or 0, self.slow_time.outputs
-        if isinstance(outputs, tuple):
-            return tuple(map(int, outputs))
-        spaced = (round(missions * position / max(1, outputs - 1)) for position in range(outputs))
-        return tuple(sorted({*spaced, missions}))
+        steps = max(1, outputs - 1)
+        spaced = (end * position / steps for position in range(steps))
+        return tuple(sorted({*(map(float, map(round, spaced)) if self.mission else spaced), end}))
 
     @property
     def given_harmonics(self) -> tuple[int, ...]:

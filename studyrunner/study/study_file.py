@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, cast
@@ -15,7 +17,6 @@ from pydantic import BaseModel
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter import flat_table
-from studyrunner.study.mission import OWN_AXES, engine_frequency, read_blocks
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
 from studyrunner.study.parts import with_room_for_wear
 from studyrunner.study.rules import broken_rules
@@ -29,8 +30,18 @@ from studyrunner.study.scene_axes import (
     take_axes,
     variants_of,
 )
-from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, Worn, find_scene, parameters_of, read_worn
-from studyrunner.study.sections import DEFAULT, SECTIONS, SOLVER_AXES, VARIABLES, SlowTimeSection, WearSection
+from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, parameters_of, read_worn
+from studyrunner.study.sections import (
+    DEFAULT,
+    OWN_AXES,
+    SECTIONS,
+    SOLVER_AXES,
+    VARIABLES,
+    AxesSection,
+    SlowTimeSection,
+    WearSection,
+    read_blocks,
+)
 from studyrunner.study.study import MODES, Study
 from studyrunner.study.text import format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError
@@ -65,7 +76,10 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
             table = read_toml(path, source)
     except OSError as error:
         raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
+    before = None if archived is None else _about_scenes(_tables_of(table, source))
     _override(table, overrides)
+    if archived is not None and _about_scenes(_tables_of(table, source)) != before:
+        archived = replace(archived, scene_sha256=None)
     return _check_study(table, Origin(source, path, archived, scene))
 
 
@@ -100,6 +114,13 @@ def _tables_of(table: Mapping[str, object], source: str) -> Tables:
     return tables
 
 
+def _about_scenes(tables: Tables) -> str:
+    """All that the scenes of a study depend on, as text."""
+    keys = [(name, value) for name, value in tables["axes"].items() if name not in AxesSection.model_fields]
+    scene = {name: value for name, value in tables["scene"].items() if name != "worn"}
+    return json.dumps([scene, keys, tables.get("scatter")], sort_keys=True, default=str)
+
+
 def _scene_of_result(table: Mapping[str, object], source: str) -> SceneSection:
     """The scene of the study of a result that keeps its reduced model: one for all values of axes."""
     tables = _tables_of(table, source)
@@ -125,16 +146,21 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
         tables.setdefault("loading", {})
     kinds: dict[str, type[BaseModel]] = {name: each for name, each in SECTIONS.items() if name in tables}
     with keys_as_given({**keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
-        variants, studies = [*variants_of(tables, axes)], []
+        variants, studies = [*variants_of(tables, axes)], list[Study]()
         sections = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
-        worn_axis = _worn_axis(worn, "cycle" if sections["axes"].modal_amplitude else WORN_AXIS)
+        worn_axis: tuple[SceneAxis, ...] = ()
+        if worn is not None and worn.cycle:
+            name = "cycle" if sections["axes"].modal_amplitude else WORN_AXIS
+            meaning = "number of vibration cycles that have worn the joint before"
+            worn_axis = (SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),)
         fixed = {"mission": blocks, "source": source, "folder": origin.path.parent, "archived": origin.archived}
         fixed |= {"solver_axes": solver_axes, "scene_axes": (*axes, *worn_axis)}
         for given in variants:
             checked = check_tables({"scene": kind, "wear": WearSection}, given, source)
             for state in (None,) if worn is None else worn.states():
                 scene = SceneSection(model=model, parameters=checked["scene"], worn=state)
-                own = {"scene": find_scene(scene, origin), "wear": checked["wear"]}
+                known = studies[0].scene if studies else None
+                own = {"scene": find_scene(scene, origin, known), "wear": checked["wear"]}
                 study = Study.model_construct(**{**sections, **fixed, **own})
                 raise_wrong(source, broken_rules(study))
                 study = study.model_copy(update={"scene_axes": ()})
@@ -145,12 +171,6 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     return study
 
 
-def _worn_axis(worn: Worn | None, name: str) -> tuple[SceneAxis, ...]:
-    """The axis of worn states, the last one; none where their cycle counts are not known."""
-    meaning = "number of vibration cycles that have worn the joint before"
-    return (SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),) if worn and worn.cycle else ()
-
-
 def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
     """The study with a study of each block alone. given: keys of [scene] in the study file."""
     studies, source, scene = [], study.source, study.scene
@@ -158,10 +178,16 @@ def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) 
         with keys_as_given({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
             table = {"scene": {**given, **block.parameters}}
             parameters = check_tables({"scene": type(scene.parameters)}, table, source)["scene"]
-            of_block = find_scene(SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin)
+            of_block = find_scene(
+                SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin, scene
+            )
         own = {name: (getattr(block, name),) for name in OWN_AXES if isinstance(getattr(block, name), float)}
         if block.engine_order is not None:
-            own["frequency"] = (engine_frequency(block, parameters, source),)
+            speed, key = dict(parameters).get("rotation_speed"), f"mission.{block.name}.engine_order"
+            if not isinstance(speed, int | float) or speed <= 0.0:
+                remedy = "give scene.rotation_speed above 0, rpm, which the order multiplies, or a frequency"
+                raise UserError(source, key, block.engine_order, remedy)
+            own["frequency"] = (block.engine_order * float(speed) / 60.0,)
         axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own})
         update = {"mission": (), "slow_time": SlowTimeSection(), "scene": of_block, "axes": axes}
         studies.append(study.model_copy(update=update))
@@ -241,18 +267,18 @@ def _worn_states(study: Study) -> dict[str, object] | None:
 def _override(table: Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
     """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
     if isinstance(overrides, Mapping):
-        for key, value in overrides.items():
-            _set_key(table, key, _plain(value), "overrides", key)
-        return
-    for text in [overrides] if isinstance(overrides, str) else overrides:
-        key, equals, value_text = (part.strip() for part in text.partition("="))
-        if not equals or not all(key.split(".")):
-            raise UserError("command line", "--set", text, "give KEY=VALUE with the dotted name of a key")
-        _set_key(table, key, _value_of(key, value_text), "command line", f"--set {key}")
+        source, option, given = "overrides", "", [(key, _plain(value)) for key, value in overrides.items()]
+    else:
+        texts = [overrides] if isinstance(overrides, str) else overrides
+        source, option, given = "command line", "--set ", [_key_and_value(text) for text in texts]
+    for key, value in given:
+        if not isinstance(key, str) or not all(key.split(".")) or not _set_key(table, key, value):
+            remedy = "give the dotted name of a key in a table, that of a block with the name of the block"
+            raise UserError(source, f"{option}{key}", value, remedy)
 
 
-def _set_key(table: Tables, key: str, value: object, source: str, shown: str) -> None:
-    """Sets the key of a dotted name. source, shown: where the user gave it, and how it is called there."""
+def _set_key(table: Tables, key: str, value: object) -> bool:
+    """Sets the key of a dotted name, or with None leaves it out; whether there is a table that can hold it."""
     (*names, last), place = key.split("."), cast("Any", table)
     for name in names:
         if isinstance(place, list):
@@ -260,14 +286,12 @@ def _set_key(table: Tables, key: str, value: object, source: str, shown: str) ->
             blocks = {str(number): each for number, each in enumerate(place)}
             place = (blocks | {str(each.get("name")): each for each in place if isinstance(each, dict)}).get(name)
         else:
-            place = place.setdefault(name, {})
-        if not isinstance(place, dict | list):
-            raise UserError(source, shown, value, f"{name} is no table: give a key of a table")
+            place = place.setdefault(name, {}) if isinstance(place, dict) else None
     if not isinstance(place, dict):
-        raise UserError(source, shown, value, f"give {'.'.join(names)}.NAME.KEY with the name of a table in this list")
+        return False
     if value is None:
         place.pop(last, None)
-        return
+        return True
     place[last] = value
     place.pop(_INSTEAD.get(key, ""), None)
     # the last place where a key is given counts, here or under [axes]
@@ -277,19 +301,22 @@ def _set_key(table: Tables, key: str, value: object, source: str, shown: str) ->
         given = table.get(other)
         if isinstance(given, dict) and not is_table(given.get(last)):
             given.pop(last, None)
+    return True
 
 
-def _value_of(key: str, text: str) -> object:
+def _key_and_value(text: str) -> tuple[str, object]:
+    """The key and the value in KEY=VALUE, where VALUE is TOML or a bare word. Raises UserError."""
+    key, _, value = (part.strip() for part in text.partition("="))
     try:
-        parsed = read_toml(f"value = {text}".encode(), "")
+        parsed = read_toml(f"value = {value}".encode(), "")
     except UserError:
-        if re.fullmatch(r"[^\s\"'\[\]{}=,#]+", text):
-            return text
-        remedy = f'give a TOML value or a bare word; words in a list stand in quotes, as \'{key}=["up", "down"]\''
-        raise UserError("command line", f"--set {key}", text, remedy) from None
+        parsed = {"value": value} if re.fullmatch(r"[^\s\"'\[\]{}=,#]+", value) else {}
     if set(parsed) != {"value"}:
-        raise UserError("command line", f"--set {key}", text, "give one TOML value")
-    return parsed["value"]
+        remedy = (
+            f'give KEY=VALUE with a TOML value or a bare word; words in a list in quotes, as \'{key}=["up", "down"]\''
+        )
+        raise UserError("command line", f"--set {key}", value, remedy)
+    return key, parsed["value"]
 
 
 def _plain(value: object) -> object:

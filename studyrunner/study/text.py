@@ -54,25 +54,15 @@ class Archived:
     """Attributes of a result file.
 
     study: the effective study, TOML. scene_sha256, solver_digest, versions: hashes of scene and solver, and versions of
-    packages; empty where unknown. holds_scene: whether the group SCENE_GROUP is there.
+    packages; empty where unknown; scene_sha256 None where the scenes are no longer those of the file. holds_scene:
+    whether the group SCENE_GROUP is there.
     """
 
     study: str
-    scene_sha256: str
+    scene_sha256: str | None
     solver_digest: str
     versions: str
     holds_scene: bool
-
-    def differences(self, scene_sha256: str, solver_digest: str, versions: str) -> tuple[str, ...]:
-        """Reasons why a result that is computed now may have other numbers, as lines."""
-        lines = []
-        if self.scene_sha256 != scene_sha256:
-            there, here = self.scene_sha256[:12] or "missing", scene_sha256[:12]
-            lines.append(f"its scene_sha256 is {there}, that of the scene built now {here}: another scene")
-        if self.solver_digest != solver_digest:
-            before = self.versions or "unknown"
-            lines.append(f"computed by another solver ({before}; now {versions}): numbers may differ")
-        return tuple(lines)
 
 
 @contextmanager
@@ -80,12 +70,9 @@ def _user_errors(name: str) -> Iterator[None]:
     """What is wrong with a result file, called `name` by the user, becomes UserError."""
     try:
         yield
-    except SceneError as error:
-        where = "the file" if error.key == "model" else f"the attribute {error.key}"
-        raise UserError(name, where, Verbatim(error.value), "give a result file of run-study that is whole") from None
     except (OSError, RuntimeError, ValueError, TypeError, KeyError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "damaged"
-        raise UserError(name, "the file", Verbatim(reason), "give a result file that can be read") from None
+        reason = error.value if isinstance(error, SceneError) else getattr(error, "strerror", None) or "damaged"
+        raise UserError(name, "the file", Verbatim(reason), "give a result file of run-study that is whole") from None
 
 
 def read_archived(path: Path, name: str) -> Archived:

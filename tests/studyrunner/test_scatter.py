@@ -11,7 +11,7 @@ from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.parts import draw_inputs, parts_of
 from studyrunner.study.study_file import read_study
-from studyrunner.user_error import WrongValueError
+from studyrunner.values import Wrong
 from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
 
@@ -104,7 +104,7 @@ def test_neighbouring_pairs_are_correlated_over_the_length():
 )
 def test_draws_that_cannot_be_are_refused(own, name, given):
     nowhere = ScatteredPairs(PAIRS.surface, np.full((5, 3), np.nan))
-    with pytest.raises(WrongValueError) as caught:
+    with pytest.raises(Wrong) as caught:
         drawn(OWN | own, nowhere, **{name: given}, samples=8192)
     assert caught.value.key.startswith(f"scatter.{name}")
 

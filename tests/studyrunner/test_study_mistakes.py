@@ -61,9 +61,9 @@ WRONG = {
         solver.harmonics=1e9
         solver.samples=10
         solver.harmonics=auto ; solver.samples=4
-        slow_time.outputs=[0, 10] -> slow_time.outputs = 10.0
+        slow_time.outputs=[0, 10]
         slow_time.until={{hours = 1}}
-        wear.law=threshold
+        wear.law=threshold -> wear.threshold
         wear={{law='table', pressure=[0], depth=[0], factor=[[1]]}} ; scene.worn={{depth=1e-6}} -> wear.law
         wear.threshold=1.0
         outputs.variables=['wear'] -> outputs.variables = "wear"
@@ -92,7 +92,7 @@ WRONG = {
         scene.worn={{result='none.nc', cycle=[0]}} -> none.nc: the file
         scene.worn={{result='missions.nc', cycle=[0]}} -> scene.worn.result
         scene.worn={{result='ended.nc', cycle=[1]}} -> scene.worn.cycle = 1.0
-        axes.scheme=final ; solver.samples=8 -> solver.samples, slow_time.cycles
+        axes.scheme=final ; solver.samples=8 -> solver.samples, axes.scheme
     """,
     SLIDER.replace("[study]\nname", "[other]\nname"): "-> other",
     SLIDER.replace('model = "sdof_slider"\n', ""): "-> scene.model",
@@ -103,7 +103,7 @@ WRONG = {
     SLIDER.replace("[150.0]", "1e999999999"): "-> axes.frequency = inf",
     SLIDER + '"\\u001b]0;x\\u0007" = 1\n': r"-> solver.\x1b]0;x\x07",
     SLIDER + '[wear]\nlaw = "threshold"\n[scatter]\nsamples = 0\nmu = {normal = {sigma = 1}}\n': """
-        scene.mas=1 ; scene.area=-1 ; axes.damping=[-0.2, 0.1] ; axes.shceme=euler -> axes.shceme, wear.law, \
+        scene.mas=1 ; scene.area=-1 ; axes.damping=[-0.2, 0.1] ; axes.shceme=euler -> axes.shceme, wear.threshold, \
 scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
     """,
     "sdof_slider": "axes.friction_coefficient={support=[0.3]} -> scene.friction_coefficient = 0.5",
@@ -113,15 +113,15 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
     TO_THE_END: """
         axes.scheme=['adaptive', 'explicit'] -> axes.scheme = "explicit"
         slow_time.outputs=[0, 10]
-        axes.scheme=final ; slow_time.cycles=5
-        axes.scheme=final ; slow_time.until={wear_depth=1}
+        slow_time.cycles=5 ; axes.scheme=final
+        slow_time.until={wear_depth=1} ; axes.scheme=final
         outputs.variables=['default', 'exact'] -> outputs.variables = "exact"
     """,
     FOLLOWED: """
         axes.frequency=['peak', 200.0]
         axes.frequency=200.0 -> loading
         loading.between=[230.0, 180.0]
-        axes.sweep=ramp
+        axes.sweep=ramp -> axes.frequency
         scatter={samples=3, frequency={normal={std=1.0}}} -> scatter.frequency
     """,
     MODES: """
@@ -142,7 +142,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         mission.heavy.engine_order=4
         mission.cruise.engine_order=4 -> axes.frequency
         mission.heavy.begin=continue
-        mission.run-up.begin=ramp
+        mission.run-up.begin=ramp -> mission.run-up.frequency
         mission.heavy.wear_coefficient=1.0
         mission.heavy.name=cruise -> mission.name
         mission=[]
@@ -211,6 +211,7 @@ COMMANDS = [
     ("s.toml --bogus", "command line: options"),
     ("s.toml --set axes.step=[1,", "command line: --set axes.step"),
     ("s.toml --set study.name.first=a", "command line: --set study.name.first"),
+    ("s.toml --set axes.step", "command line: --set axes.step"),
     ("s.toml -o nowhere/out.nc", "command line: -o"),
     ("s.toml -o \udcff.nc", "command line: -o"),
     ("s.toml -o s.toml", "command line: -o"),

@@ -79,6 +79,22 @@ def test_the_command_draws_what_it_computes_and_says_what_is_wrong(path, tmp_pat
         compute_worn_joint(path, tmp_path, response=True, point={"frequency": "1"})
 
 
+@pytest.mark.usefixtures("folder", "solver")
+def test_the_worn_joint_of_a_sample_has_the_scene_of_the_sample(sliding, capsys):
+    """Its pairs lie where the depths are from, and nothing is said of another scene than that of the file."""
+    given = {"axes.P": [2e4, 1e4], "axes.scheme": "implicit", "wear.surfaces": {"flat": 1.0, "cylinder": 0.5}}
+    drawn = {name: {"lognormal": {"factor": 1.2}} for name in ("R", "wear_coefficient")}
+    scatter = {"samples": 2, **drawn, "surfaces": {"flat": {"lognormal": {"factor": 1.2}}}}
+    run_study(sliding, "w.nc", overrides=given | {"scatter": scatter}, progress=False).close()
+    capsys.readouterr()
+    point = {"P": "10000", "sample": "1"}
+    found = compute_worn_joint("w.nc", ".", loops=[0], point=point)
+    assert "another scene" not in capsys.readouterr().err
+    assert found["loops"].cycle.values.tolist() == [2000.0]
+    own = results("w.nc").sel(P=1e4, sample=1)
+    np.testing.assert_array_equal(results("worn_joint_loops.nc").contact_x, own.contact_x)
+
+
 # --- room for wear ---
 
 SLIDING = """
