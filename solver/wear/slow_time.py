@@ -147,9 +147,11 @@ class Course:
         found["wear_rate"] = self._volumes(found["depth_rate"])
         for name in self.nodes[-1].values:
             each = np.array([node.values[name] for node in self.nodes])
-            found[name] = each[end] if each.dtype.kind == "i" else between(each)
             if name in CERTIFIED:
+                # an unknown error is infinite
                 found[name] = np.fmax(each[start], each[end])
+            else:
+                found[name] = each[end] if each.dtype.kind == "i" else between(each)
         for values in found.values():
             values[counts > self.counts[-1]] = np.nan if values.dtype.kind in "fc" else 0
         return found

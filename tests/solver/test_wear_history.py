@@ -227,6 +227,12 @@ def test_what_is_no_length_or_force_holds_through_a_step():
     assert found["local"] == pytest.approx([0.5, 0.58, 1.0, 1.725])
 
 
+def test_an_unknown_error_at_both_ends_is_unknown_between_them():
+    course = Course(AREAS).after(node(0.0, [0.0, 0.0], [0.1, 0.0], 0.0, response_error=np.inf))
+    course = course.after(node(10.0, [1.0, 1.0], [0.0, 100.0], 1.0, response_error=np.inf))
+    assert course.read(np.array([5.0]))["response_error"].tolist() == [np.inf]
+
+
 def test_within_a_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume():
     found = taken([5.0, 14.0]).read(np.array([5.0, 14.0]))
     # t^2 is a cubic
