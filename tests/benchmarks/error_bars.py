@@ -2,9 +2,11 @@
 
     python -m tests.benchmarks.error_bars --mesh 1 2 --random 200
     python -m tests.benchmarks.error_bars --mesh 1 --diameter 3 7 --frequency -0.25 0.25
+    python -m tests.benchmarks.error_bars --mesh --loads 60
 
 The truth of a dovetail is the adaptive scheme with a tolerance ten times smaller and harmonics given, from the start
-state of a sweep in steps five times as fine; that of a random joint the same with 13 harmonics for its five. Wanted: at
+state of a sweep in steps five times as fine; that of a random joint the same with 13 harmonics for its five, and that
+of random loads (adaptive histories of mesh 1 near its resonance, 5e4 to 6e5 cycles) with 13 harmonics. Wanted: at
 least half the true error everywhere, in the median not more than ten times it. Where both are below `FLOOR` of the
 volume nothing is compared: the truth is not known better. Columns: relative errors of the worn volume at the end, and
 their ratio; the smallest ratio of volumes and of responses on the way; that of the depths of all pairs that have a
@@ -66,8 +68,8 @@ def compare(history: WearHistory, truth: WearHistory) -> list[float]:
 def add_row(
     table: Table, name: str, truth: WearHistory, model: ReducedModel, friction: float, start: StartState, *asked: object
 ) -> None:
-    """A row for a history from a start state; asked: the arguments of `march_wear` from the step on."""
-    found = measure(lambda: march_wear(model, friction, start, WEAR, *asked))
+    """A row for a history from a start state; asked: the arguments of `march_wear` from the wear coefficient on."""
+    found = measure(lambda: march_wear(model, friction, start, *asked))
     table.row(f"{name} {found.result.outcome.meaning}", *compare(found.result, truth), found.seconds)
 
 
@@ -83,11 +85,13 @@ def summarise(table: Table) -> None:
         print(f"{outside.sum():.0f} of {pairs.sum():.0f} depths outside")
 
 
-def fine_starts(model: ReducedModel, omegas: list[float], settings: SolverSettings) -> list[StartState]:
+def fine_starts(
+    model: ReducedModel, friction: float, load: float, omegas: list[float], settings: SolverSettings, sweep: str = "up"
+) -> list[StartState]:
     """Start states of a sweep whose steps change the vibration by 3 %."""
     before, path.CHANGE_LIMITS = path.CHANGE_LIMITS, (0.03, 0.03)
     try:
-        return branch_states(model, 0.5, 0.5, omegas, settings)
+        return branch_states(model, friction, load, omegas, settings, sweep)
     finally:
         path.CHANGE_LIMITS = before
 
@@ -99,11 +103,34 @@ def dovetail(title: str, model: ReducedModel, steps: list[float], frequencies: F
     runs += [(scheme, step) for scheme in ("implicit", "explicit") for step in steps]
     exact, settings = SolverSettings(harmonics=9, samples=128, rtol=1e-3), SolverSettings()
     starts = branch_states(model, 0.5, 0.5, omegas, settings)
-    for frequency, fine, start in zip(frequencies, fine_starts(model, omegas, exact), starts, strict=True):
+    for frequency, fine, start in zip(frequencies, fine_starts(model, 0.5, 0.5, omegas, exact), starts, strict=True):
         truth = march_wear(model, 0.5, fine, WEAR, 1000.0, "adaptive", cycles, exact)
         for scheme, step in runs:
             name = f"{frequency:.7g} Hz, {scheme} {step:g}"
-            add_row(table, name, truth, model, 0.5, start, step, scheme, cycles, settings)
+            add_row(table, name, truth, model, 0.5, start, WEAR, step, scheme, cycles, settings)
+    summarise(table)
+
+
+def random_loads(n: int) -> None:
+    """Adaptive histories of the coarse dovetail near its resonance under random loads; those that wear."""
+    table, model = Table("random loads", *COLUMNS), scene("dovetail_sector", HARMONICS, mesh=1)
+    settings, exact = SolverSettings(), SolverSettings(harmonics=13, samples=256, rtol=1e-3)
+    first = glued_frequency(model)
+    for seed in range(n):
+        random = np.random.default_rng(1000 + seed)
+        frequency = first * random.uniform(0.9955, 1.0008)
+        load, friction = float(np.exp(random.uniform(*np.log([0.4, 1.3])))), random.uniform(0.3, 0.6)
+        wear = float(np.exp(random.uniform(*np.log([2e-12, 5e-11]))))
+        cycles = np.linspace(0.0, 10.0 ** random.uniform(4.7, 5.8), 41)
+        asked = model, friction, load, [2.0 * np.pi * frequency]
+        sweep = str(random.choice(["up", "down", "ramp"]))
+        (start,), (fine,) = branch_states(*asked, settings, sweep), fine_starts(*asked, exact, sweep)
+        if start.state is None or fine.state is None:
+            continue
+        truth = march_wear(model, friction, fine, wear, 1000.0, "adaptive", cycles, exact)
+        if np.nanmax(truth.worn_volume) > 0.0:
+            name = f"{seed}, {frequency:.7g} Hz, {load:.3g} N, {sweep}"
+            add_row(table, name, truth, model, friction, start, wear, 1000.0, "adaptive", cycles, settings)
     summarise(table)
 
 
@@ -125,12 +152,12 @@ def random_joints(n: int) -> None:
         truth = march_wear(model, 0.4, fine, WEAR, step, "adaptive", cycles, exact)
         for scheme in ("implicit", "explicit", "adaptive"):
             name = f"joint {seed}, {scheme} {step / limit:.2g} of the limit"
-            add_row(table, name, truth, model, 0.4, start, step, scheme, cycles, settings)
+            add_row(table, name, truth, model, 0.4, start, WEAR, step, scheme, cycles, settings)
     summarise(table)
 
 
 def main() -> None:
-    given = arguments(__doc__, mesh=[1], diameter=[0], random=0, step=STEPS, frequency=[0.0])
+    given = arguments(__doc__, mesh=[1], diameter=[0], random=0, loads=0, step=STEPS, frequency=[0.0])
     for mesh, diameter in product(given.mesh, given.diameter):
         model = scene("dovetail_sector", HARMONICS, mesh=mesh, nodal_diameter=diameter)
         frequencies = np.array(given.frequency if any(given.frequency) else OFFSETS if diameter else FREQUENCIES[mesh])
@@ -138,6 +165,8 @@ def main() -> None:
         dovetail(f"mesh {mesh}, d {diameter}", model, given.step, first + frequencies)
     if given.random:
         random_joints(given.random)
+    if given.loads:
+        random_loads(given.loads)
 
 
 if __name__ == "__main__":
