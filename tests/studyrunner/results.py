@@ -111,7 +111,7 @@ def as_result(dataset: xr.Dataset, path: Path) -> Result:
 
 def flank_positions(n_along: int = 4, n_across: int = 3) -> NDArray[np.float64]:
     """Two flanks as of a dovetail, (pairs, 3), m."""
-    along, across = np.meshgrid(np.linspace(-0.02, 0.02, n_along), np.linspace(0.0, 0.005, n_across), indexing="ij")
+    along, across = np.meshgrid(np.linspace(-0.02, 0.02, n_along), np.linspace(0.0, 0.006, n_across), indexing="ij")
     sides = [np.stack([0.245 - across, side * (0.0055 + across), along], axis=-1) for side in (1.0, -1.0)]
     return np.concatenate([side.reshape(-1, 3) for side in sides])
 
