@@ -113,7 +113,7 @@ def test_the_scar_is_symmetric_and_that_of_the_pairs(model, row):
 
 def test_the_measured_profile_is_drawn_beside_it(tmp_path):
     path = tmp_path / "scar.csv"
-    path.write_text("depth (um),x (mm),note\n1.5,0.02,a\n\n0.5,-0.02,b\n", encoding="utf-8")
+    path.write_text("depth (um),x (mm),note\n1.5,0.02,a,\n\n0.5,-0.02,b,\n", encoding="utf-8")
     profile = read_profile(path)
     np.testing.assert_allclose(profile.x, [-2e-5, 2e-5])
     np.testing.assert_allclose(profile.depth, [0.5e-6, 1.5e-6])
@@ -127,7 +127,8 @@ def test_the_measured_profile_is_drawn_beside_it(tmp_path):
     ("text", "place"),
     [
         ("x,depth\n1,2\n", "line 1"),
-        ("x_mm,depth_um\n1,deep\n", "finite"),
+        ("x_mm,depth_um\n0,1\n1,deep\n", "row 3"),
+        ("x_mm;depth_um\n1;2\n", "x_mm,depth_um"),
         ("x_mm,depth_um\n", "row"),
         ("x_mm,depth_um\n1,nan\n", "finite"),
     ],
