@@ -34,8 +34,9 @@ def _names_model(model: str) -> bool:
 
 
 def _names_file(model: str) -> bool:
-    """Whether the text under `scene.model` names a scene file: a path, or a name with an HDF5 ending."""
-    return "/" in model or "\\" in model or Path(model).suffix.lower() in (".h5", ".hdf5", ".he5")
+    """Whether the text under `scene.model` names a scene file: an HDF5 ending, or a path that names no model."""
+    named = "/" in model or "\\" in model or Path(model).suffix.lower() in (".h5", ".hdf5", ".he5")
+    return named and not _names_model(model)
 
 
 class SceneFileParameters(Section):

@@ -63,6 +63,13 @@ def check_same(found, expected, tolerance=1e-8):
 # --- a deck of a root ---
 
 
+def test_a_deck_may_lie_in_another_folder():
+    Path("decks").mkdir()
+    shutil.move("lap.inp", "decks/lap.inp")
+    Path("lap.toml").write_text(LAP_JOINT.replace('"lap.inp"', '"decks/lap.inp"'))
+    assert main(["lap.toml", "--plan"]) == 0
+
+
 @pytest.mark.slow
 def test_from_deck_to_worn_volume():
     result = compute("wear.toml", "wear.nc")
