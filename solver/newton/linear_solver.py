@@ -27,6 +27,10 @@ MOST_CORRECTED = 60
 """Most directions in which a factorisation is corrected. With 0, 60, 120: 17.4, 12.0, 11.4 products of a solve and 52,
 42, 42 CPU s with 160 pairs; 6.3, 6.0, 6.0 s with 48."""
 
+FEWEST_CORRECTED = 3
+"""Fewest products of a solve that a correction is made of. With 1, two histories of 44 under random loads (16 pairs,
+1 N) lose their branch early, 21 and 46 mm3 worn for 107 and 239; with 1, 3, 6 usual ones are equally fast."""
+
 MOST_PRODUCTS = 80
 """Most products of a solve, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32."""
 
@@ -157,7 +161,7 @@ class JacobianSolver:
 
         solution, found, basis, hessenberg = solve_gmres(product, active(right.copy()), residual, most)
         n_new = hessenberg.shape[1]
-        if n_new:
+        if n_new >= FEWEST_CORRECTED:
             n_corrected = n_new + sum(len(images) for images, _ in corrections)
             own = build_correction(basis, hessenberg) if n_corrected <= MOST_CORRECTED else None
             # where the directions become too many all are dropped
