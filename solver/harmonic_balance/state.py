@@ -37,7 +37,7 @@ class State:
 @packable
 @dataclass(frozen=True)
 class Failure:
-    """Why there is no state, or how a history ends, also a regular one. message: addition to the outcome."""
+    """Why there is no state, or why a history ends early. message: addition to the outcome."""
 
     outcome: Outcome
     message: str = ""
