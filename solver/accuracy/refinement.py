@@ -23,6 +23,7 @@ from solver.accuracy.resolved_state import (
     reach,
     shifted,
     shortest_contact,
+    with_highest,
 )
 from solver.harmonic_balance.state import State
 from solver.newton.linear_solver import SMALL_JOINT
@@ -35,8 +36,12 @@ TWO_LEVELS_SAFETY = 1.5
 """Error over the difference to the state two levels up, 2 to 1.2 where it falls as 1/H to 1/H^3, and to the state with
 twice the samples, 2 to 1.3 for an error as the time step or its square."""
 
-ONE_LEVEL_SAFETY = 2.5
-"""Error over the difference to the state one level up: 3.4 to 1.5 for an error as 1/H to 1/H^3."""
+STEP_SAFETY = 2.0
+"""Error over the change by one Newton step towards a series with more harmonics. 16 friction oscillators with a higher
+mode near an odd multiple of the excitation, with 3 to 79 harmonics: TABLE."""
+
+FEWEST_OF_SERIES = 27
+"""Fewest harmonics of the longer series of this step."""
 
 TRIPLE_SAMPLES_SAFETY = 2.0
 """Error over the difference to three times the samples: 1.5 to 1.1, but the errors of single events scatter."""
@@ -56,11 +61,11 @@ NODE_UNKNOWNS = 1600
 """Most unknowns of a node of a sweep, those of the dovetail of 48 pairs with five harmonics. Also of a small joint:
 impacts couple all harmonics, and no preconditioner helps."""
 
+MOST_OF_NODE = 39
+"""Highest harmonic of a node of a sweep: the point itself takes what it needs."""
+
 MOST_UNKNOWNS = 8000
 """Most unknowns of a balance of 48 pairs in a history with "auto"."""
-
-COMPARED_UNKNOWNS = 3 * MOST_UNKNOWNS // 2
-"""Most unknowns of a balance that is solved to estimate an error."""
 
 FAR_UNKNOWNS = 400
 """Most unknowns of a balance that only resolves a short contact, or the structure at higher harmonics."""
@@ -106,11 +111,10 @@ class _Search:
                     return here
             if settings.harmonics == "auto":
                 here = here.with_its_symmetry(self.run)
-            by_samples, finer = self._samples_error(here)
-            by_harmonics, richer = self._harmonics_error(here)
+            by_samples, by_harmonics = self._samples_error(here), self._harmonics_error(here)
             estimate = by_samples + by_harmonics
             if not settings.automatic:
-                return replace(here, estimate=estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan))
+                return replace(here, estimate=estimate)
             holds = here.holds()
             if holds and estimate.largest <= settings.rtol:
                 return self._relaxed(here, estimate)
@@ -122,7 +126,7 @@ class _Search:
                 samples = above.samples if settings.samples == "auto" else samples
             if settings.samples == "auto" and by_samples.largest > 0.5 * settings.rtol:
                 samples = 2 * here.case.resolution.samples
-            following = self._next(here, Resolution(orders, samples), finer, richer)
+            following = self._next(here, Resolution(orders, samples))
             if following is None:
                 # slip that only many samples show is no reason to reject an accurate motion
                 judged = estimate.response if faint else estimate.largest
@@ -150,53 +154,43 @@ class _Search:
                 return level, True
         return finest, True
 
-    def _samples_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
-        """Estimated error by missing samples, and the state with more samples that gave it: 3 N + 2, as an event may
-        stay next to the same one of 2 N samples. Many unknowns mean many events: then 2 N suffice.
+    def _samples_error(self, here: ResolvedState) -> Estimate:
+        """Estimated error by missing samples, by a state with 3 N + 2, as an event may stay next to the same one of 2 N
+        samples. Many unknowns mean many events: then 2 N suffice. Unknown where this state is not found.
         """
         orders, samples = here.case.resolution.orders, here.case.resolution.samples
         few = here.unknowns(here.case.resolution) <= EXPENSIVE_UNKNOWNS
-        finer = self._compared(here, Resolution(orders, 3 * samples + 2 if few else 2 * samples))
+        run = self.run.with_tolerance(here.case.settings.rough_tolerance)
+        finer = here.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), run)
         if finer is None:
-            return UNKNOWN, None
-        return here.difference(finer).times(TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY), finer
+            return UNKNOWN
+        return here.difference(finer).times(TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY)
 
-    def _harmonics_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
-        """Estimated error by missing harmonics, by a state with more, else with fewer; and the state with more."""
-        resolution, higher = here.case.resolution, _richer(here)
-        richer, found = self._compared(here, higher[-1]) if higher else None, len(higher)
-        above, below = shifted(resolution, 1), shifted(resolution, -1)
-        seen = 2 * above.highest < resolution.samples and self._allowed(here, above)
-        if richer is None and here.case.settings.harmonics == "auto" and seen:
-            # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
-            richer, found = here.solve_at(above, self.run, with_tail=True), 1
-        other = richer
-        if other is None and below.highest < resolution.highest:
-            other, found = self._compared(here, below), 2
-        if other is None:
-            return UNKNOWN, None
-        return here.difference(other).times(ONE_LEVEL_SAFETY if found == 1 else TWO_LEVELS_SAFETY), richer
-
-    def _compared(self, here: ResolvedState, resolution: Resolution) -> ResolvedState | None:
-        """The state with other harmonics and samples, as accurately as a comparison needs; None where not found."""
-        return here.solve_at(resolution, self.run.with_tolerance(here.case.settings.rough_tolerance))
-
-    def _next(
-        self, here: ResolvedState, wanted: Resolution, finer: ResolvedState | None, richer: ResolvedState | None
-    ) -> ResolvedState | None:
-        """The state with the wanted resolution, or else `richer`; None where none is found.
-
-        finer, richer: known states with more samples and with more harmonics.
+    def _harmonics_error(self, here: ResolvedState) -> Estimate:
+        """Estimated error by missing harmonics: the largest change in one Newton step towards series with more. Unknown
+        where the model has no more. No solution is needed: with many more harmonics it may not be found from here, and
+        a solution with a few more may agree with the state by chance.
         """
+        series = _longer_series(here, node=self.node)
+        changes = [here.difference(here.step_to(each, self.run)) for each in series]
+        worst = max(changes, key=lambda each: each.largest, default=UNKNOWN)
+        return UNKNOWN if np.isnan(worst.largest) else worst.times(STEP_SAFETY)
+
+    def _next(self, here: ResolvedState, wanted: Resolution) -> ResolvedState | None:
+        """The state with the wanted resolution, or with one more level of harmonics; None where none is found."""
         limit = self.begun + REFINEMENT_WORK / here.unknowns(shifted(here.case.resolution, 2))
-        if wanted == here.case.resolution or not self._allowed(here, wanted) or self.run.budget.iterations >= limit:
+        if wanted == here.case.resolution or self.run.budget.iterations >= limit:
             return None
-        exact = next((each for each in (finer, richer) if each and each.case.resolution == wanted), None)
-        found = (exact or here).solve_at(wanted, self.run)
-        both = here.case.settings.harmonics == here.case.settings.samples == "auto"
-        if found is None and richer and not exact and both and self._allowed(here, richer.case.resolution):
-            return richer
-        return found
+        more = wanted.orders != here.case.resolution.orders
+        for resolution in (wanted, shifted(wanted, 1)) if more else (wanted,):
+            # impacts: Newton's method diverges from a start without force in the new harmonics
+            for with_tail in (False, True) if more else (False,):
+                if not self._allowed(here, resolution):
+                    return None
+                found = here.solve_at(resolution, self.run, with_tail=with_tail)
+                if found is not None:
+                    return found
+        return None
 
     def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
@@ -208,6 +202,8 @@ class _Search:
             return False
         if here.joint.component_index.size <= SMALL_JOINT:
             most = min(most, NODE_UNKNOWNS)
+        if self.node and resolution.highest > MOST_OF_NODE:
+            return False
         if resolution.highest > MOST_MIXED_HARMONICS:
             # more harmonics for friction without impacts only, whose harmonics are odd
             most = min(most, EXPENSIVE_UNKNOWNS) if all(order % 2 for order in resolution.orders) else 0
@@ -231,18 +227,20 @@ class _Search:
         return replace(here, estimate=estimate)
 
 
-def _richer(here: ResolvedState) -> list[Resolution]:
-    """Resolutions with more harmonics, level by level, up to that of a comparison, two levels up or, where cheap, one
-    that resolves the shortest contact and beyond which structure and penalty agree.
+def _longer_series(here: ResolvedState, *, node: bool) -> list[Resolution]:
+    """Resolutions with more harmonics by which the error of a state is estimated; none where the model lacks them.
+
+    Two levels up, and `FEWEST_OF_SERIES` or three times as many; for a point also as many as resolve the shortest
+    contact and beyond which structure and penalty agree, where this is cheap.
     """
     resolution, at, model = here.case.resolution, here.point.evaluation, here.case.model
-    levels = enumerate(shifted(resolution, level) for level in range(1, len(HARMONIC_LEVELS)))
-    most = here.most_unknowns(COMPARED_UNKNOWNS), FAR_UNKNOWNS
-    found = [
-        each for place, each in levels if model.has_harmonics(each.highest) and here.unknowns(each) <= most[place > 1]
-    ]
-    if len(found) <= 2:
-        return found
-    contact = shortest_contact(at.status_t, at.force_t[:, 0], FAINT_SHARE * here.case.settings.rtol)
-    wanted = max(1.0 / contact, reach(model, here.joint.omega, resolution.highest))
-    return found[: max(2, 1 + sum(each.highest < wanted for each in found))]
+    two_up = shifted(resolution, 2).highest
+    longest = max(two_up, FEWEST_OF_SERIES, 3 * resolution.highest)
+    series = {two_up, next((each for each in range(longest, two_up, -1) if model.has_harmonics(each)), two_up)}
+    if not node:
+        contact = shortest_contact(at.status_t, at.force_t[:, 0], FAINT_SHARE * here.case.settings.rtol)
+        wanted = max(1.0 / contact, reach(model, here.joint.omega, resolution.highest))
+        far = [level for level in HARMONIC_LEVELS if here.unknowns(with_highest(resolution, level)) <= FAR_UNKNOWNS]
+        series |= set([level for level in far if level >= wanted][:1] or far[-1:])
+    known = [each for each in sorted(series) if each >= two_up and model.has_harmonics(each)]
+    return [with_highest(resolution, each) for each in known]

@@ -18,7 +18,7 @@ from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import State, first_response, largest_responses
+from solver.harmonic_balance.state import State, first_response, largest_responses, transfer
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.packing import packable
@@ -90,10 +90,26 @@ class ResolvedState:
     def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedState | None:
         """The state with other harmonics and samples; None where it is not found. with_tail: as in `transfer`."""
         case = self.case.at(resolution)
-        joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
+        joint = self._joint_of(case)
         point = run.move(self.case, joint, self.point, with_tail=with_tail)
         # the mean position of a mass depends a little on the harmonics
         return None if point is None else ResolvedState(case, joint, point).at_rest(run)
+
+    def step_to(self, resolution: Resolution, run: Run) -> ResolvedState:
+        """The state after one Newton step with other harmonics and samples; no solution of them.
+
+        The step begins with the force of the samples in all harmonics and the motion that it causes.
+        """
+        case = self.case.at(resolution)
+        joint = self._joint_of(case)
+        balance, start = transfer(self.case, joint, self.point.evaluation, with_tail=True)
+        at = balance.evaluate(start)
+        (step,) = run.fresh().steps(balance, at, [-at.residual])
+        run.budget.iterations += 1
+        return ResolvedState(case, joint, State(balance.evaluate(start + step), balance.history))
+
+    def _joint_of(self, case: Case) -> Joint:
+        return case.joint(self.joint.omega, self.joint.excitation_amplitude)
 
     def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
@@ -163,13 +179,18 @@ class ResolvedState:
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:
-    """Resolution so many levels up, or one level down for -1, with enough samples; odd harmonics stay odd."""
+    """Resolution so many levels up, or one level down for -1, as `with_highest`."""
     if levels > 0:
         above = [highest for highest in HARMONIC_LEVELS if highest > resolution.highest]
         highest = above[levels - 1] if len(above) >= levels else (levels + 1) * resolution.highest
     else:
         below = (highest for highest in HARMONIC_LEVELS if highest < resolution.highest)
         highest = max(below, default=resolution.highest)
+    return with_highest(resolution, highest)
+
+
+def with_highest(resolution: Resolution, highest: int) -> Resolution:
+    """Resolution with harmonics up to a highest one and enough samples; odd harmonics stay odd."""
     orders = all_orders(highest)
     if resolution.highest > 1 and all(order % 2 for order in resolution.orders):
         orders = orders[::2]

@@ -12,7 +12,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC
+from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC, Resolution
 from solver.structure.condensation import build_structure
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
 from solver.structure.joint import Case, Joint
@@ -64,8 +64,13 @@ def vibration_size(evaluation: Evaluation) -> float:
 def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
     """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old`.
 
-    with_tail: new harmonics of the force are those of its samples, which contain impacts, instead of zeros.
+    with_tail: new harmonics of the force are those of its samples, as many as those of `joint`, instead of zeros; they
+        contain impacts. New harmonics of the motion are those that this force causes.
     """
+    if with_tail and old.resolution.samples != joint.basis.n_samples:
+        old = old.at(Resolution(old.resolution.orders, joint.basis.n_samples))
+        sampled, start = transfer(old, old.joint(joint.omega, joint.excitation_amplitude), evaluation)
+        evaluation = sampled.evaluate(start)
     balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
     orders, known = joint.basis.orders, old.resolution.orders
     motion_h, force_h = (
@@ -73,13 +78,13 @@ def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool
         for part in (evaluation.displacement_h, evaluation.force_h)
     )
     if with_tail:
-        force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
-        for place in np.flatnonzero(~np.isin(orders, known)):
-            both = slice(2 * place + 1, 2 * place + 3)
-            force_h[:, both] = force[:, both]
-            amplitude = to_complex(force)[:, place]
-            moved = -np.linalg.solve(joint.structure.dynamic_stiffness[place], amplitude)
-            motion_h[:, both] = np.stack([moved.real, -moved.imag], axis=1)
+        new = np.flatnonzero(~np.isin(orders, known))
+        tail = build_basis(tuple(np.array(orders)[new].tolist()), evaluation.force_t.shape[2]).analysis[:, 1:]
+        force = joint.to_relative(evaluation.force_t @ tail)
+        amplitudes = force[:, ::2] - 1j * force[:, 1::2]
+        moved = -np.linalg.solve(joint.structure.dynamic_stiffness[new], amplitudes.T[:, :, None])[:, :, 0].T
+        for part, found in ((force_h, amplitudes), (motion_h, moved)):
+            part[:, 2 * new + 1], part[:, 2 * new + 2] = found.real, -found.imag
     return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
 
 

@@ -128,10 +128,11 @@ class Sweep(Generic[S]):
         """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
 
         One harmonic can give a joint that slips and opens everywhere a state that does not exist: more harmonics change
-        it by more than half.
+        it by more than half, and no state with more is found.
         """
         self.path, self.passed, self.nodes = path, [state.parameter], (state,)
-        if self._choose_resolution() > SENSITIVE_ERROR:
+        error = self._choose_resolution()
+        if error > SENSITIVE_ERROR and self.path.case.resolution.highest <= path.case.resolution.highest:
             self.nodes, self.failure = (), Failure(Outcome.UNSETTLED)
             return False
         self.failure = None
