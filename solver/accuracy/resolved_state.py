@@ -63,6 +63,12 @@ class Estimate:
         weight = max(self.weight, other.weight)
         return Estimate(self.response + other.response, self.wear_rate + other.wear_rate, weight)
 
+    def larger(self, other: Estimate) -> Estimate:
+        """The larger one of each error; unknown where one is no number."""
+        pairs = ((self.response, other.response), (self.wear_rate, other.wear_rate))
+        response, wear_rate = (max(pair) if np.isfinite(pair).all() else np.inf for pair in pairs)
+        return Estimate(response, wear_rate, max(self.weight, other.weight))
+
     def times(self, factor: float) -> Estimate:
         """The errors times a safety factor."""
         return Estimate(factor * self.response, factor * self.wear_rate, self.weight)
@@ -95,18 +101,17 @@ class ResolvedState:
         # the mean position of a mass depends a little on the harmonics
         return None if point is None else ResolvedState(case, joint, point).at_rest(run)
 
-    def step_to(self, resolution: Resolution, run: Run) -> ResolvedState:
-        """The state after one Newton step with other harmonics and samples; no solution of them.
-
-        The step begins with the force of the samples in all harmonics and the motion that it causes.
-        """
-        case = self.case.at(resolution)
+    def steps_to(self, resolution: Resolution, run: Run) -> list[ResolvedState]:
+        """The state after each of two Newton steps with other harmonics and samples; no solutions of them."""
+        case, own, reached = self.case.at(resolution), run.fresh(), list[ResolvedState]()
         joint = self._joint_of(case)
-        balance, start = transfer(self.case, joint, self.point.evaluation, with_tail=True)
-        at = balance.evaluate(start)
-        (step,) = run.fresh().steps(balance, at, [-at.residual])
-        run.budget.iterations += 1
-        return ResolvedState(case, joint, State(balance.evaluate(start + step), balance.history))
+        balance, predicted = transfer(self.case, joint, self.point.evaluation)
+        at = balance.evaluate(predicted)
+        for _ in range(2):
+            at = balance.evaluate(at.predicted_h + own.steps(balance, at, [-at.residual])[0])
+            reached.append(ResolvedState(case, joint, State(at, balance.history)))
+        run.budget.iterations += 2
+        return reached
 
     def _joint_of(self, case: Case) -> Joint:
         return case.joint(self.joint.omega, self.joint.excitation_amplitude)
