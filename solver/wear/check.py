@@ -58,7 +58,7 @@ def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
     case, joint = wearing.case_and_joint(state)
     if state.hold is not None and creeps(joint, state.hold, state.at):
         return Failure(Outcome.ADRIFT)
-    if _vibrates_otherwise(state):
+    if vibrates_otherwise(state):
         if (unstable := find_instability(case, joint, state.at, wearing.run, False)) is not None:
             return unstable
         state = replace(state, judged_h=state.at.predicted_h)
@@ -97,7 +97,7 @@ def needs_new_choice(wearing: WearingJoint, state: WearState) -> bool:
         return True
     now, error = left_out(orders, state.at), state.estimate.largest
     if not np.isfinite(error):
-        return _vibrates_otherwise(state)
+        return vibrates_otherwise(state)
     if error == 0.0:
         # the last choice was for a joint without slip and separation
         return now > NEGLIGIBLE
@@ -115,7 +115,7 @@ def choose_anew(wearing: WearingJoint, state: WearState) -> WearState | Failure:
     return wearing.at_followed(wearing.with_rates(state))
 
 
-def _vibrates_otherwise(state: WearState) -> bool:
+def vibrates_otherwise(state: WearState) -> bool:
     """Whether the vibration differs from the vibration of the last stability check."""
     if state.judged_h.shape != state.at.predicted_h.shape:
         return True
@@ -125,7 +125,7 @@ def _vibrates_otherwise(state: WearState) -> bool:
 
 def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
-    if state.cycle == 0.0 and wearing.follow is None and not _vibrates_otherwise(state):
+    if state.cycle == 0.0 and wearing.follow is None and not vibrates_otherwise(state):
         return None
     case, joint = wearing.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off

@@ -33,7 +33,7 @@ from solver.settings import (
     ToTheEnd,
 )
 from solver.structure.joint import Case
-from solver.wear.check import full_check, is_final, report_only, unstable_at_end, wears_without_end
+from solver.wear.check import full_check, is_final, report_only, unstable_at_end, vibrates_otherwise, wears_without_end
 from solver.wear.jump import jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import (
@@ -191,12 +191,13 @@ class WearProblem(WearingJoint):
         return max(FOLD_RESOLUTION * state.cycle, SHORTEST_SLOW_STEP * state.first_length)
 
     def attempt(self, state: WearState, length: float, scheme: Scheme | None = None) -> WearState | None:
-        """As in SteppedProblem. scheme: another one than that of the steps. An Euler step ends in a stable state; a
-        followed resonance may be unstable at constant frequency.
+        """As in SteppedProblem. scheme: another one than that of the steps. A step ends in a stable state, which is
+        tested after each Euler step, and where the vibration has changed since the last test; a followed resonance may
+        be unstable at constant frequency.
         """
         scheme = scheme or self.steps.scheme
         end = attempt_step(self, state, length, scheme, self.parts)
-        if end is None or scheme == "adaptive" or self.follow is not None:
+        if end is None or self.follow is not None or (scheme == "adaptive" and not vibrates_otherwise(end)):
             return end
         return end if self.run.is_stable_finely(self.joint_of(end), end.at) else None
 

@@ -34,8 +34,9 @@ from dataclasses import replace
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, STICK
+from solver.continuation.natural import SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, vibration_size
 from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
 from solver.outcome import Outcome, in_digits
@@ -61,7 +62,7 @@ worn volume is a sufficient warning (27 % with 0.6)."""
 def attempt_step(
     wearing: WearingJoint, state: WearState, length: float, scheme: Scheme, parts: int
 ) -> WearState | None:
-    """The state after a step of `length` cycles by one balance; None where it is not found.
+    """The state after a step of `length` cycles by one balance; None where none is found near its prediction.
 
     parts: of the step, in each of which the pairs slide.
     """
@@ -74,8 +75,9 @@ def attempt_step(
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
     gain = wearing.gain(implicit_cycles)
     balance = Balance(wearing.joint_of(state), state.point.history, worn_before, gain, wearing.wearing_work)
-    end = wearing.solve(*first_guess(wearing, state, balance, length, parts), state)
-    if end is None:
+    balance, predicted = first_guess(wearing, state, balance, length, parts)
+    end = wearing.solve(balance, predicted, state)
+    if end is None or _surprise(state, end, predicted) > SMOOTH_CHANGE:
         return None
     error = 0.5 * length * (end.rate - rate)
     if w > 0.0:
@@ -84,6 +86,16 @@ def attempt_step(
         error = own / (own + other) * (end.depth - explicit_depth)
     last = LastStep(length, depth, state.at.predicted_h, state.omega, state.resolution)
     return replace(end, cycle=state.cycle + length, previous=last, error=float(np.abs(error) @ wearing.area))
+
+
+def _surprise(state: WearState, end: WearState, predicted: FloatArray) -> float:
+    """Distance of the vibration at the end of a step from its prediction (n_rel, 2H+1), N, over the vibration before.
+
+    Dovetail, 16 and 48 pairs: up to 0.08 in 50 adaptive histories under random loads, up to 0.2 in most given steps of
+    250 to 2000 cycles, and 0.25 to 0.53 where such a step lands on another branch.
+    """
+    apart = float(np.linalg.norm(end.at.predicted_h[:, 1:] - predicted[:, 1:]))
+    return apart / vibration_size(state.at)
 
 
 def first_guess(
