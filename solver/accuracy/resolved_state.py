@@ -64,10 +64,9 @@ class Estimate:
         return Estimate(self.response + other.response, self.wear_rate + other.wear_rate, weight)
 
     def larger(self, other: Estimate) -> Estimate:
-        """The larger one of each error; unknown where one is no number."""
-        pairs = ((self.response, other.response), (self.wear_rate, other.wear_rate))
-        response, wear_rate = (max(pair) if np.isfinite(pair).all() else np.inf for pair in pairs)
-        return Estimate(response, wear_rate, max(self.weight, other.weight))
+        """The larger one of each error."""
+        weight = max(self.weight, other.weight)
+        return Estimate(max(self.response, other.response), max(self.wear_rate, other.wear_rate), weight)
 
     def times(self, factor: float) -> Estimate:
         """The errors times a safety factor."""
@@ -107,9 +106,11 @@ class ResolvedState:
         joint = self._joint_of(case)
         balance, predicted = transfer(self.case, joint, self.point.evaluation)
         at = balance.evaluate(predicted)
-        for _ in range(2):
-            at = balance.evaluate(at.predicted_h + own.steps(balance, at, [-at.residual])[0])
-            reached.append(ResolvedState(case, joint, State(at, balance.history)))
+        # a step that goes too far ends by its values, without a warning of numpy
+        with np.errstate(over="ignore", invalid="ignore"):
+            for _ in range(2):
+                at = balance.evaluate(at.predicted_h + own.steps(balance, at, [-at.residual])[0])
+                reached.append(ResolvedState(case, joint, State(at, balance.history)))
         run.budget.iterations += 2
         return reached
 
@@ -156,7 +157,9 @@ class ResolvedState:
         return largest_responses(self.joint, self.point.evaluation)
 
     def difference(self, better: ResolvedState) -> Estimate:
-        """Relative differences of response and wear rate to a better state."""
+        """Relative differences of response and wear rate to a better state; unknown to one that is no number."""
+        if not np.isfinite(better.point.evaluation.residual).all():
+            return UNKNOWN
         mine, its = self.response(), better.response()
         # slip work whose error has less weight: a fraction of the work of the excitation
         least, work = better._least_response(), SMALL_WORK * max(self._input_work(), better._input_work())
