@@ -76,8 +76,8 @@ _SENTENCES = {
     Outcome.BRANCH_LOST: "The vibration could not be followed to this frequency or amplitude. A nonlinear mode may turn"
     " back before it (a fold), meet another mode, or end where the whole joint slides.",
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided.",
-    Outcome.INACCURATE: "The point was computed to the end, but the estimated error of a vibration, a wear rate, a"
-    " natural frequency or a damping ratio is above rtol: see the variables of these errors.",
+    Outcome.INACCURATE: "The point was computed to the end, but the error of a vibration, a wear rate, a natural"
+    " frequency or a damping ratio is above rtol, or an error is not known: see the variables of these errors.",
     Outcome.SENSITIVE: "The point was computed to the end, but its worn volume depends strongly on the step or on the"
     " start state: two computations of nearly the same case differ by more than half.",
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",
@@ -110,9 +110,11 @@ _SENTENCES = {
 
 
 def known_to(error: float, rtol: float) -> str:
-    """Text of a relative error above `rtol`, as "is known to 2.6 % only", with enough digits to show the excess."""
+    """Text of a relative error above `rtol`, as "is known to 2.6 % only", with enough digits to show the excess; or why
+    the error of a state, inf, is not known.
+    """
     if math.isinf(error):
-        return "is not known"
+        return "cannot be compared with that of more harmonics or samples: its error is not known"
     short = f"{100.0 * error:.2g}"
     return f"is known to {short if float(short) > 100.0 * rtol else f'{100.0 * error:.6g}'} % only"
 

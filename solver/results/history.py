@@ -175,17 +175,16 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
 def verdict(error: float, uncertain: str, inaccurate: str, cut_off: str, *notes: str) -> tuple[Outcome, str]:
     """Outcome of a complete history of wear or of missions, and its sentence.
 
-    error: of the last worn volume, relative; uncertain: sentence in case it is too large. The other sentences are ""
-    where there is nothing to say: about states above rtol, about a contact that is cut off, and additions.
+    error: of the last worn volume, relative; uncertain: sentence in case it is too large or not known. The other
+    sentences are "" where there is nothing to say: about states above rtol, about a contact that is cut off, additions.
     """
     if cut_off:
         return Outcome.CONTACT_CUT_OFF, cut_off
-    outcome, reason = Outcome.CONVERGED, ""
-    if error > SENSITIVE_ERROR:
-        outcome, reason = Outcome.SENSITIVE, uncertain
-    elif inaccurate:
-        outcome, reason = Outcome.INACCURATE, inaccurate
-    return outcome, "; ".join(filter(None, (reason, *notes)))
+    if SENSITIVE_ERROR < error < math.inf:
+        return Outcome.SENSITIVE, "; ".join(filter(None, (uncertain, *notes)))
+    reasons = (uncertain if math.isinf(error) else "", inaccurate)
+    outcome = Outcome.INACCURATE if any(reasons) else Outcome.CONVERGED
+    return outcome, "; ".join(filter(None, (*reasons, *notes)))
 
 
 def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: float) -> float:
@@ -202,11 +201,15 @@ def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: fl
 
 
 def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
-    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before."""
+    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before; or
+    why its error, inf, is not known.
+    """
+    if math.isinf(error):
+        why = "it depends on another one that is not known"
+        why = why if math.isfinite(other) else f"{coarser} the history does not go so far"
+        return f"the error of the worn volume is not known: {why}"
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
     volumes, others = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
-    if not math.isfinite(other):
-        return f"{volumes}, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:
         return f"{volumes}, {known}: {others}, but worn at other pairs or counts"
     return f"{volumes}, but {others}: {known}"
