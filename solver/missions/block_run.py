@@ -35,6 +35,7 @@ from solver.wear.wearing_joint import Adaptive, WearingJoint, WearRequest, WearS
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
 
+
 @packable
 @dataclass(frozen=True)
 class EarlierSweep:
