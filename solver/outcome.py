@@ -1,4 +1,7 @@
-"""How a computation ended. A failure is a value with a sentence; the caller decides whether to raise an exception."""
+"""How a computation ended. A failure is a value with a sentence; the caller decides whether to raise an exception.
+
+How well its result is known: an error that is not known is inf.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,9 @@ import math
 import traceback
 from enum import IntEnum
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 SENSITIVE_ERROR = 0.5
 """Limit of the relative error of the last worn volume. Above this limit the outcome is SENSITIVE."""
@@ -107,6 +113,12 @@ _SENTENCES = {
     Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give the"
     " structure damping or a support.",
 }
+
+
+def absolute(relative: ArrayLike, size: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Errors of sizes from relative ones, 0 where a size is not above 0: of nothing also where these are not known."""
+    whole = np.zeros(np.broadcast_shapes(np.shape(relative), size.shape))
+    return np.multiply(relative, size, out=whole, where=size > 0.0)
 
 
 def known_to(error: float, rtol: float) -> str:

@@ -18,11 +18,11 @@ from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
 from solver.newton.run import Run, guarded
-from solver.outcome import Outcome, known_to
+from solver.outcome import Outcome, absolute, known_to
 from solver.packing import Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import Passage
-from solver.wear.errors import Compared, HistoryError, absolute, compare, error_of_target
+from solver.wear.errors import Compared, HistoryError, compare, error_of_target
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Solution
 
 STEP_ERROR_FRACTION = 0.5

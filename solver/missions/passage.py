@@ -36,11 +36,10 @@ from solver.harmonic_balance.state import Failure, first_response, largest_respo
 from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
-from solver.outcome import Outcome
+from solver.outcome import Outcome, absolute
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.joint import friction_of_pairs
-from solver.wear.errors import absolute
 from solver.wear.slow_time import RTOL_RATIO, Guide
 from solver.wear.step import rate_slope
 

@@ -32,7 +32,7 @@ import numpy as np
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockResult
 from solver.model import FloatArray
-from solver.wear.errors import absolute
+from solver.outcome import absolute
 from solver.wear.slow_time import Node
 from solver.wear.step import allowed_error
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from solver.model import FloatArray
+from solver.outcome import absolute
 from solver.settings import WearTarget
 from solver.wear.slow_time import Solution
 
@@ -190,7 +191,7 @@ def _frequency_error(both: Compared, safety: float, known: FloatArray) -> FloatA
     of_states = both.values.get("excitation_frequency_error", np.zeros(len(both.counts)))
     if not both.follows:
         return np.asarray(of_states)
-    return np.maximum(of_states, _added(safety * _apart(both, "excitation_frequency"), known))
+    return np.asarray(np.maximum(of_states, _added(safety * _apart(both, "excitation_frequency"), known)))
 
 
 def _largest_before(at: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
@@ -242,12 +243,6 @@ def _rate_change(both: Compared) -> FloatArray:
 def _added(difference: FloatArray, error: FloatArray) -> FloatArray:
     """Difference to another solution (n, ...) and the error of that, which beyond its end has neither."""
     return np.where(np.isinf(difference), np.inf, difference + error)
-
-
-def absolute(relative: FloatArray | float, size: FloatArray) -> FloatArray:
-    """Errors of sizes from relative ones, 0 where a size is not above 0: of nothing also where these are not known."""
-    whole = np.zeros(np.broadcast_shapes(np.shape(relative), size.shape))
-    return np.asarray(np.multiply(relative, size, out=whole, where=size > 0.0))
 
 
 def _over(part: FloatArray, whole: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from solver.outcome import SENSITIVE_ERROR, Outcome
+from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
 from studyrunner.statistics.samples import SAMPLE
@@ -177,7 +177,7 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     both = np.where(amplitude[:, of] > NO_MOTION, amplitude[:, of], 0.0)
     wrong = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
     both = np.where((wrong > SENSITIVE_ERROR) & (both > 0.0), np.nan, both)
-    errors, name = wrong * both, result.responses[of]
+    errors, name = absolute(wrong, both), result.responses[of]
     new, worn = (_known(value, error, "m") for value, error in zip(both.tolist(), errors.tolist(), strict=True))
     values: dict[str, Any] = {"response": name, "amplitude": both.tolist(), "error": errors.tolist()}
     if result.followed and result.has("excitation_frequency"):

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from solver.outcome import Outcome
+from solver.outcome import Outcome, absolute
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import Drawn, FloatArray, Table
 from studyrunner.report.selection import (
@@ -91,7 +91,9 @@ def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: Choice, sc
             continue
         if result.has(f"{name}_error"):
             wrong = result.at(f"{name}_error", point).values
-            error = wrong * values if result.dataset[f"{name}_error"].attrs.get("units") == "1" else scale(wrong)
+            error = (
+                absolute(wrong, values) if result.dataset[f"{name}_error"].attrs.get("units") == "1" else scale(wrong)
+            )
         look = plot.line_style(number, 101) | {"label": label or "computed"}
         highest = max(highest, plot.add_line(panel, cycles(result.counts(point)), values, error, band=True, **look))
     panel.set_xlabel(slow_time(result, cycles))
@@ -150,7 +152,7 @@ def draw_final(result: Result) -> Drawn:
     for line, (label, values, error) in enumerate(zip(choice.labels, volumes[..., -1], errors, strict=True)):
         if not failed[line].all():
             look = course.line_style(line) | {"label": label or "computed"}
-            reach = plot.add_line(panel, course.values, scale(values), scale(error * values), **look)
+            reach = plot.add_line(panel, course.values, scale(values), scale(absolute(error, values)), **look)
             highest = max(highest, min(reach, 2.0 * top))
     _mark_care(panel, course, choice, scale(reached))
     plot.set_from_zero(panel, highest)
