@@ -107,7 +107,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
     error += min(lag * max(float(state.density @ area) for state in states), volume)
     ends, largest = (states[0], states[-1]), [max(each.response_error, each.wear_rate_error) for each in starts]
     # given harmonics are accurate enough, unless there was no state with others for a comparison
-    kept = [each.outcome is Outcome.CONVERGED and of < math.inf for each, of in zip(starts, largest, strict=True)]
+    bad = [of for each, of in zip(starts, largest, strict=True) if each.outcome is Outcome.INACCURATE or math.isinf(of)]
     return BlockResult(
         growth=growth,
         response=np.array([state.response for state in ends]),
@@ -115,7 +115,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         slope=slope if given.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
-        inaccurate=max((of for of, within in zip(largest, kept, strict=True) if not within), default=0.0),
+        inaccurate=max(bad, default=0.0),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start if given.is_continued else None,
         sweep=EarlierSweep(swept.needed),

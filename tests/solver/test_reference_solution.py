@@ -129,15 +129,12 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     assert "not known: with longer steps" in history.message
 
 
-@pytest.mark.parametrize(("scheme", "step"), [("implicit", 4000.0), ("adaptive", 0.0)])
-def test_a_history_whose_state_has_no_other_to_compare_with_says_so(scheme, step):
-    """Given harmonics, and a model that has no more."""
+@pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
+def test_a_history_whose_state_has_no_other_to_compare_with_says_so(scheme):
     found = replace(start()[1], response_error=np.inf, wear_rate_error=np.inf)
-    history = march_wear(start()[0], 0.5, found, WEAR, step, scheme, CYCLES[::4], GIVEN)
+    history = march_wear(start()[0], 0.5, found, WEAR, 4000.0, scheme, CYCLES[::4], GIVEN)
     assert history.outcome is Outcome.INACCURATE
-    assert history.message.endswith(
-        "the wear rate cannot be compared with that of more harmonics or samples: its error is not known"
-    )
+    assert "cannot be compared with that of more harmonics or samples: its error is not known" in history.message
     assert history.worn_volume_error.tolist() == [0.0, np.inf, np.inf]
     assert np.isinf([*history.response_error, *history.wear_rate_error]).all()
     np.testing.assert_array_equal(history.wear_depth_error, np.where(history.wear_depth > 0.0, np.inf, 0.0))

@@ -228,13 +228,12 @@ def test_what_is_no_length_or_force_holds_through_a_step():
 
 
 def test_an_unknown_error_at_an_end_is_unknown_within_the_step():
-    course = Course(AREAS).after(node(0.0, [0.0, 0.0], [0.1, 0.0], 0.0, response_error=np.inf, local=0.5))
-    course = course.after(node(10.0, [1.0, 1.0], [0.0, 100.0], 1.0, response_error=np.inf, local=np.inf))
-    found = course.after(node(20.0, [2.0, 2.0], [0.0, 1.0], 1.0, local=np.inf)).read(
-        np.array([0.0, 5.0, 15.0, 20.0, 25.0])
-    )
-    np.testing.assert_array_equal(found["response_error"], [np.inf, np.inf, np.inf, np.inf, np.nan])
-    np.testing.assert_array_equal(found["local"], [0.5, np.inf, np.inf, np.inf, np.nan])
+    unknown, course = {"response_error": np.inf, "local": np.inf}, Course(AREAS)
+    for count, errors in ((0.0, {"local": 0.5}), (10.0, unknown), (20.0, unknown)):
+        course = course.after(node(count, [count, count], [1.0, 1.0], 1.0, **errors))
+    found = course.read(np.array([0.0, 5.0, 15.0, 20.0, 25.0]))
+    for name, first in (("local", 0.5), ("response_error", 1.0)):
+        np.testing.assert_array_equal(found[name], [first, np.inf, np.inf, np.inf, np.nan])
 
 
 def test_within_a_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume():
