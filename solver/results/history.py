@@ -83,7 +83,7 @@ class WearHistory(Presented):
     - error_estimate: `worn_volume_error` at the last count that was reached; NaN at 0 where the joint wears.
     - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end.
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
-      certificate of the states, all relative; NaN where not estimated. harmonics_used, samples_used (n_output,): int.
+      certificate of the states, all relative; errors inf where unknown. harmonics_used, samples_used (n_output,): int.
     - last_cycle: count up to which the point was computed; NaN where there is no state.
     - jump_cycle: first count at which the branch was lost, NaN if never.
     - cycles_to_target, cycles_to_target_error: count at which the target was reached, and its error; NaN if never. The
