@@ -1,4 +1,7 @@
-"""How a computation ended. A failure is a value with a sentence; the caller decides whether to raise an exception."""
+"""How a computation ended. A failure is a value with a sentence; the caller decides whether to raise an exception.
+
+How well its result is known: an error that is not known is inf.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,9 @@ import math
 import traceback
 from enum import IntEnum
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 SENSITIVE_ERROR = 0.5
 """Limit of the relative error of the last worn volume. Above this limit the outcome is SENSITIVE."""
@@ -76,8 +82,8 @@ _SENTENCES = {
     Outcome.BRANCH_LOST: "The vibration could not be followed to this frequency or amplitude. A nonlinear mode may turn"
     " back before it (a fold), meet another mode, or end where the whole joint slides.",
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided.",
-    Outcome.INACCURATE: "The point was computed to the end, but the estimated error of a vibration, a wear rate, a"
-    " natural frequency or a damping ratio is above rtol: see the variables of these errors.",
+    Outcome.INACCURATE: "The point was computed to the end, but the error of a vibration, a wear rate, a natural"
+    " frequency or a damping ratio is above rtol, or an error is not known: see the variables of these errors.",
     Outcome.SENSITIVE: "The point was computed to the end, but its worn volume depends strongly on the step or on the"
     " start state: two computations of nearly the same case differ by more than half.",
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",
@@ -109,10 +115,18 @@ _SENTENCES = {
 }
 
 
+def absolute(relative: ArrayLike, size: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Errors of sizes from relative ones, 0 where a size is not above 0: of nothing also where these are not known."""
+    whole = np.zeros(np.broadcast_shapes(np.shape(relative), size.shape))
+    return np.multiply(relative, size, out=whole, where=size > 0.0)
+
+
 def known_to(error: float, rtol: float) -> str:
-    """Text of a relative error above `rtol`, as "is known to 2.6 % only", with enough digits to show the excess."""
+    """Text of a relative error above `rtol`, as "is known to 2.6 % only", with enough digits to show the excess; or why
+    the error of a state, inf, is not known.
+    """
     if math.isinf(error):
-        return "is not known"
+        return "cannot be compared with that of more harmonics or samples: its error is not known"
     short = f"{100.0 * error:.2g}"
     return f"is known to {short if float(short) > 100.0 * rtol else f'{100.0 * error:.6g}'} % only"
 

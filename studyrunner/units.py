@@ -119,6 +119,13 @@ def show_percent(fraction: float, rtol: float | None = None) -> str:
     return f"{shown:.12g} %"
 
 
+def show_known(error: float) -> str:
+    """A relative error behind a number: " ± 2.6 %"; nothing where there is none, as of what has not worn."""
+    if not math.isfinite(error):
+        return " (error not known)"
+    return f" ± {show_percent(error)}" if error > 0.0 else ""
+
+
 def show_rtol(rtol: float) -> str:
     """The error that was asked for, as it was given: "1 %"."""
     return f"{100.0 * rtol:.6g} %"

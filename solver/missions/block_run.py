@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
+from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
@@ -33,11 +34,6 @@ from solver.wear.wearing_joint import Adaptive, WearingJoint, WearRequest, WearS
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
-
-NEW_SWEEP_CHANGE = 0.5
-"""Largest change of the vibration at the end of such a sweep since the sweep that has chosen its nodes. Above, a new
-sweep chooses them and estimates its error. Without a sweep, which alone says on which branch a state lies, the limit is
-`SMOOTH_CHANGE`."""
 
 
 @packable
@@ -189,7 +185,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         response=values["response"],
         response_peak=values["response_peak"],
         slope=slope,
-        response_error=float(np.fmax.reduce(values["response_error"])),
+        response_error=float(values["response_error"].max()),
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
         inaccurate=state.worst.largest if state.inaccurate_from <= counts[-1] else 0.0,
         held=state.held_from <= counts[-1],
@@ -240,7 +236,9 @@ def _by_earlier_sweep(given: BlockInput, earlier: EarlierSweep) -> StartState | 
     jumped over a fold, there is no stable state, or the sweep may lead to another branch.
 
     With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
-    Where each pair slips or opens within the period, the state follows from the depths alone.
+    Above `VIBRATION_RECHECK` of the vibration with which nodes, harmonics and errors were chosen, a new sweep chooses
+    them. Where each pair slips or opens within the period, the state follows from the depths alone; without a sweep,
+    which alone says on which branch a state lies, the limit is `SMOOTH_CHANGE`.
     """
     start, run = earlier.start, Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
     if start is None or start.state is None or start.branch > 0:
@@ -253,7 +251,7 @@ def _by_earlier_sweep(given: BlockInput, earlier: EarlierSweep) -> StartState | 
         state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if state is None or not path.forgets(state):
             stride = 1 if given.guide is None else STEPS_OF_REFERENCE
-            state, most = _through_nodes(path, earlier, target, stride, run), NEW_SWEEP_CHANGE
+            state, most = _through_nodes(path, earlier, target, stride, run.fresh()), VIBRATION_RECHECK
         if state is None or vibration_change(unworn.at, state.evaluation) > most:
             return None
         joint = path.joint_at(target)

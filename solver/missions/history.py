@@ -18,7 +18,7 @@ from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
 from solver.newton.run import Run, guarded
-from solver.outcome import Outcome, known_to
+from solver.outcome import Outcome, absolute, known_to
 from solver.packing import Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import Passage
@@ -220,7 +220,7 @@ def _compare(solution: Solution, chosen: slice, counts: FloatArray) -> tuple[Com
     both, error = compare(solution, counts, part=partial(_of_blocks, chosen, course.area))
     # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
     local = np.where(counts[:, None] > 0.0, course.read(counts)["local"], 0.0)
-    return both, replace(error, wear_depth=np.fmax(error.wear_depth, local))
+    return both, replace(error, wear_depth=np.maximum(error.wear_depth, local))
 
 
 def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[str, Any]:
@@ -228,10 +228,8 @@ def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[
     n = len(values["local"])
     growth, rates = (values[name].reshape(n, -1, area.size) for name in ("wear_depth", "depth_rate"))
     rates = rates[:, chosen]
-    volumes = np.nan_to_num(rates @ area)
-    errors = np.nan_to_num(values["growth_error"][:, chosen], posinf=np.inf)
-    # the error of a block that wears nothing may be unknown
-    weighted = np.where(volumes > 0.0, errors * np.fmax(volumes, 1e-300), 0.0).sum(axis=1)
+    volumes = rates @ area
+    weighted = absolute(values["growth_error"][:, chosen], volumes).sum(axis=1)
     whole, worn = volumes.sum(axis=1), growth.sum(axis=2)
     share = np.divide(worn[:, chosen].sum(axis=1), worn.sum(axis=1), out=np.ones(n), where=worn.sum(axis=1) > 0.0)
     rate_error = np.divide(weighted, whole, out=np.zeros_like(whole), where=whole > 0.0)
@@ -243,10 +241,10 @@ def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[
         "depth_rate": rates.sum(axis=1),
         "wear_rate": rates.sum(axis=1) @ area,
         "wear_rate_error": rate_error,
-        "local": np.fmax(share * (values["local"] @ area) - first * (depth @ area), 0.0),
+        "local": np.maximum(absolute(values["local"] @ area, share) - first * (depth @ area), 0.0),
         "response": values["response"][:, chosen].reshape(n, -1),
         "response_peak": values["response_peak"][:, chosen].reshape(n, -1),
-        "response_error": np.fmax.reduce(values["response_error"][:, chosen], axis=1),
+        "response_error": values["response_error"][:, chosen].max(axis=1),
     }
 
 

@@ -98,7 +98,7 @@ class MissionHistory(Presented):
     - last_mission: number of missions that were computed. steps (n_step,): missions in each step.
     - missions_to_target, missions_to_target_error: number at which the target was reached, and its error; NaN if never.
     - newton_iterations, run_time, CPU seconds: of history and reference solution.
-    - outcome, message: how the computation ended, and additions.
+    - outcome, message: how the computation ended, and additions. An unknown error is inf, and `message` says why.
     """
 
     OVER = ("missions", "mission")

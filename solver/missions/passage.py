@@ -36,7 +36,7 @@ from solver.harmonic_balance.state import Failure, first_response, largest_respo
 from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
-from solver.outcome import Outcome
+from solver.outcome import Outcome, absolute
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.joint import friction_of_pairs
@@ -102,10 +102,12 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
     volume = float(parts.sum(axis=0) @ area)
     growth, slope = wear_in_order(states, (_slope_of(given, state) for state in states))
     sweep_rate, lag = delay_of(given, ascending)
-    error = swept.error + float((parts @ area) @ [start.wear_rate_error for start in starts])
+    error = swept.error + float(absolute(np.array([start.wear_rate_error for start in starts]), parts @ area).sum())
     error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
     error += min(lag * max(float(state.density @ area) for state in states), volume)
-    ends, inaccurate = (states[0], states[-1]), [each for each in starts if each.outcome is Outcome.INACCURATE]
+    ends, largest = (states[0], states[-1]), [max(each.response_error, each.wear_rate_error) for each in starts]
+    # given harmonics are accurate enough, unless there was no state with others for a comparison
+    bad = [of for each, of in zip(starts, largest, strict=True) if each.outcome is Outcome.INACCURATE or math.isinf(of)]
     return BlockResult(
         growth=growth,
         response=np.array([state.response for state in ends]),
@@ -113,7 +115,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         slope=slope if given.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
-        inaccurate=max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0),
+        inaccurate=max(bad, default=0.0),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start if given.is_continued else None,
         sweep=EarlierSweep(swept.needed),

@@ -22,6 +22,7 @@ last node is a part of the error of the step.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +32,7 @@ import numpy as np
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockResult
 from solver.model import FloatArray
+from solver.outcome import absolute
 from solver.wear.slow_time import Node
 from solver.wear.step import allowed_error
 
@@ -89,11 +91,11 @@ def attempt_step(
     growth = base + (factor + 1.0) * rates
     most = allowed_error(share, float(depth_now @ area), float(growth.sum(axis=0) @ area), now.count, length)
     values = values_of(results)
-    # the error of a block that wears nothing may be unknown
-    of_blocks = np.where(rates > 0.0, values["growth_error"][:, None] * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
+    of_blocks = absolute(values["growth_error"][:, None], rates).sum(axis=0)
     values["local"] = now.values["local"] + error + length * of_blocks
     end = Node(now.count + length, growth.ravel(), rates.ravel(), values, tuple(each.guide for each in results))
-    return MissionStep(end, results, float(np.nan_to_num(error @ area / most, nan=np.inf)))
+    ratio = float(error @ area) / most
+    return MissionStep(end, results, math.inf if math.isnan(ratio) else ratio)
 
 
 def values_of(results: tuple[BlockResult, ...]) -> dict[str, Any]:

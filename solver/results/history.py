@@ -83,7 +83,7 @@ class WearHistory(Presented):
     - error_estimate: `worn_volume_error` at the last count that was reached; NaN at 0 where the joint wears.
     - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end.
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
-      certificate of the states, all relative; NaN where not estimated. harmonics_used, samples_used (n_output,): int.
+      certificate of the states, all relative; errors inf where unknown. harmonics_used, samples_used (n_output,): int.
     - last_cycle: count up to which the point was computed; NaN where there is no state.
     - jump_cycle: first count at which the branch was lost, NaN if never.
     - cycles_to_target, cycles_to_target_error: count at which the target was reached, and its error; NaN if never. The
@@ -175,17 +175,16 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
 def verdict(error: float, uncertain: str, inaccurate: str, cut_off: str, *notes: str) -> tuple[Outcome, str]:
     """Outcome of a complete history of wear or of missions, and its sentence.
 
-    error: of the last worn volume, relative; uncertain: sentence in case it is too large. The other sentences are ""
-    where there is nothing to say: about states above rtol, about a contact that is cut off, and additions.
+    error: of the last worn volume, relative; uncertain: sentence in case it is too large or not known. The other
+    sentences are "" where there is nothing to say: about states above rtol, about a contact that is cut off, additions.
     """
     if cut_off:
         return Outcome.CONTACT_CUT_OFF, cut_off
-    outcome, reason = Outcome.CONVERGED, ""
-    if error > SENSITIVE_ERROR:
-        outcome, reason = Outcome.SENSITIVE, uncertain
-    elif inaccurate:
-        outcome, reason = Outcome.INACCURATE, inaccurate
-    return outcome, "; ".join(filter(None, (reason, *notes)))
+    if SENSITIVE_ERROR < error < math.inf:
+        return Outcome.SENSITIVE, "; ".join(filter(None, (uncertain, *notes)))
+    reasons = (uncertain if math.isinf(error) else "", inaccurate)
+    outcome = Outcome.INACCURATE if any(reasons) else Outcome.CONVERGED
+    return outcome, "; ".join(filter(None, (*reasons, *notes)))
 
 
 def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: float) -> float:
@@ -202,11 +201,15 @@ def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: fl
 
 
 def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
-    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before."""
+    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before; or
+    why its error, inf, is not known.
+    """
+    if math.isinf(error):
+        why = "it depends on another one that is not known"
+        why = why if math.isfinite(other) else f"{coarser} the history does not go so far"
+        return f"the error of the worn volume is not known: {why}"
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
     volumes, others = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
-    if not math.isfinite(other):
-        return f"{volumes}, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:
         return f"{volumes}, {known}: {others}, but worn at other pairs or counts"
     return f"{volumes}, but {others}: {known}"

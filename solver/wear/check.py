@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, Certificate, certify
 from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine
-from solver.accuracy.resolved_state import UNKNOWN, lacks_even, left_out
+from solver.accuracy.resolved_state import lacks_even, left_out
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome, in_digits
@@ -48,12 +48,9 @@ def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
         state, certificate = chosen, _certificate(wearing, chosen)
     if certificate is None:
         return Failure(Outcome.CERTIFICATE_FAILED)
-    # NaN for given harmonics and samples, where no state with others was found for a comparison
-    unknown = np.isnan(state.estimate.largest)
-    if unknown or not state.accurate:
-        worst = state.worst
-        if not state.estimate.largest < worst.largest:
-            worst = UNKNOWN if unknown else state.estimate
+    # given harmonics and samples are accurate enough, unless there was no state with others for a comparison
+    if not (state.accurate and np.isfinite(state.estimate.largest)):
+        worst = max(state.worst, state.estimate, key=lambda each: each.largest)
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
     case, joint = wearing.case_and_joint(state)
     if state.hold is not None and creeps(joint, state.hold, state.at):

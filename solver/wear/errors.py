@@ -1,6 +1,8 @@
 """Estimated errors of a history of wear or of missions, from its difference to another solution.
 
-An adaptive history is compared with its reference solution, a history with given steps with the adaptive history.
+An adaptive history is compared with its reference solution, a history with given steps with the adaptive history. An
+error is inf where it is not known: where the other solution has no value, or an error that enters is not known. It is
+NaN where the history has no value.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.model import BoolArray, FloatArray
+from solver.model import FloatArray
+from solver.outcome import absolute
 from solver.settings import WearTarget
 from solver.wear.slow_time import Solution
 
@@ -32,7 +35,7 @@ Later differences are not used: an error does not depend on the length of the st
 
 @dataclass(frozen=True)
 class HistoryError:
-    """Estimated errors of a history at its counts; inf where nothing confirms it, NaN beyond the end of the history.
+    """Estimated errors of a history at its counts; inf where not known, NaN beyond the end of the history.
 
     worn_volume, response, wear_rate (n_output,): relative; of the volume 0 where nothing has worn.
     wear_depth (n_output, n_contact): m. excitation_frequency (n_output,): Hz.
@@ -101,60 +104,57 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
         return HISTORY_SAFETY * _largest_before(steps.counts, differences, outputs.counts)
 
     def largest(change: Callable[[Compared], FloatArray]) -> FloatArray:
-        return np.fmax(HISTORY_SAFETY * change(outputs), crossing(change(steps)))
+        return np.maximum(HISTORY_SAFETY * change(outputs), crossing(change(steps)))
 
     depth, volume = values["wear_depth"], values["wear_depth"] @ area
-    difference = HISTORY_SAFETY * _depth_change(outputs)
-    error = np.fmax(difference @ area, crossing(_depth_change(steps) @ area))
+    error = largest(lambda both: _apart(both, "wear_depth") @ area)
     # the error of the start state remains, even where later states agree by chance: its rates, pair by pair
     rate, other = (rates[0] * area for rates in (values["depth_rate"], outputs.other("depth_rate")))
     known = rate.sum() > 0.0 and np.isfinite(other).all()
-    at_start = np.fmax(np.abs(rate - other).sum() / rate.sum() if known else 0.0, values["wear_rate_error"][0])
+    at_start = max(np.abs(rate - other).sum() / rate.sum() if known else 0.0, values["wear_rate_error"][0])
     # start state and steps have nothing to do with each other: the worst case is their sum
-    error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume + values["local"])
+    error = np.maximum(error, absolute(at_start, volume) + values["local"])
     # a pair that agrees with the reference solution better than the volume does so by chance (dovetail, 211.25 Hz: else
     # 5 of 24 deep pairs are outside of their errors, by seven times); the error of the volume is smaller than that of
     # its independent pairs by the root of the number of equal pairs that would share the volume
     squares = ((depth * area) ** 2).sum(axis=1)
     n_equal = np.divide(volume**2, squares, out=np.ones_like(squares), where=squares > 0.0)
     of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(n_equal)) * _over(error, volume)
-    with np.errstate(invalid="ignore"):
-        of_pairs = np.fmax(largest(_depth_change), np.where(depth > 0.0, of_pair[:, None] * depth, 0.0))
-    unknown = np.asarray(~np.isfinite(difference).all(axis=1))
-    response = np.fmax(largest(_response_change), _change_within(volume, error, steps, area))
-    frequency = _frequency_error(outputs, HISTORY_SAFETY, 0.0)
-    return _completed(outputs, HistoryError(error, of_pairs, response, largest(_rate_change), frequency), unknown, area)
+    of_pairs = np.maximum(largest(lambda both: _apart(both, "wear_depth")), absolute(of_pair[:, None], depth))
+    response = np.maximum(largest(_response_change), _change_within(volume, error, steps, area))
+    frequency = _frequency_error(outputs, HISTORY_SAFETY, np.zeros_like(volume))
+    return _completed(outputs, HistoryError(error, of_pairs, response, largest(_rate_change), frequency), area)
 
 
 def error_of_given_steps(outputs: Compared, adaptive: HistoryError, area: FloatArray) -> HistoryError:
     """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter."""
-    apart, other = _depth_change(outputs), outputs.other("wear_depth") @ area
+    apart, other = _apart(outputs, "wear_depth"), outputs.other("wear_depth") @ area
     error = HistoryError(
-        apart @ area + adaptive.worn_volume * other,
-        apart + adaptive.wear_depth,
+        _added(apart @ area, absolute(adaptive.worn_volume, other)),
+        _added(apart, adaptive.wear_depth),
         # both relative errors of the adaptive history are nearly those of this one: their values are as large
-        _response_change(outputs) + adaptive.response,
-        _rate_change(outputs) + adaptive.wear_rate,
+        _added(_response_change(outputs), adaptive.response),
+        _added(_rate_change(outputs), adaptive.wear_rate),
         _frequency_error(outputs, 1.0, adaptive.excitation_frequency),
     )
-    return _completed(outputs, error, ~np.isfinite(error.worn_volume), area)
+    return _completed(outputs, error, area)
 
 
-def _completed(outputs: Compared, error: HistoryError, unknown: BoolArray, area: FloatArray) -> HistoryError:
-    """Errors whose worn volume, m3, becomes relative: inf where unknown (n,), NaN beyond the end of the history."""
+def _completed(outputs: Compared, error: HistoryError, area: FloatArray) -> HistoryError:
+    """Errors whose worn volume, m3, becomes relative; NaN beyond the end of the history."""
     values, depth = outputs.values, outputs.values["wear_depth"]
-    volume = depth @ area
+    volume, unknown = depth @ area, np.isinf(error.worn_volume)
     reached, unworn = np.isfinite(volume), (outputs.counts == 0.0) | (volume <= 0.0)
 
     def of_state(name: str, change: FloatArray) -> FloatArray:
-        # an unworn state has errors of its own, from states with more harmonics
-        larger = np.where(unworn, values[name], np.where(unknown, np.inf, np.fmax(values[name], change)))
+        # an unworn state has errors of its own, from states with more harmonics; a worn one is as unknown as its depths
+        larger = np.where(unworn, values[name], np.where(unknown, np.inf, np.maximum(values[name], change)))
         return np.where(reached, larger, np.nan)
 
-    relative = np.where(unknown & (volume > 0.0), np.inf, _over(error.worn_volume, volume))
+    # what has not worn is known to have worn nothing
     of_pairs = np.where(unknown[:, None], np.where(depth > 0.0, np.inf, 0.0), error.wear_depth)
     return HistoryError(
-        np.where(reached, relative, np.nan),
+        np.where(reached, _over(error.worn_volume, volume), np.nan),
         np.where(reached[:, None], of_pairs, np.nan),
         of_state("response_error", error.response),
         of_state("wear_rate_error", error.wear_rate),
@@ -186,23 +186,19 @@ def error_of_target(
     return max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0) + by_interpolation
 
 
-def _frequency_error(both: Compared, safety: float, known: FloatArray | float) -> FloatArray:
+def _frequency_error(both: Compared, safety: float, known: FloatArray) -> FloatArray:
     """Error (n,), Hz, of the frequency of the excitation: its difference times `safety`, and the error of the other."""
-    name = "excitation_frequency"
     of_states = both.values.get("excitation_frequency_error", np.zeros(len(both.counts)))
     if not both.follows:
         return np.asarray(of_states)
-    whole = np.maximum(of_states, safety * np.abs(both.values[name] - both.other(name)) + known)
-    return np.where(np.isfinite(both.values["wear_rate"]) & np.isnan(whole), np.inf, whole)
+    return np.asarray(np.maximum(of_states, _added(safety * _apart(both, "excitation_frequency"), known)))
 
 
 def _largest_before(at: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
     """Largest difference (n_output, ...) from `CROSSING_WINDOW` times each count up to this count; 0 if none.
 
-    at (n,): ascending counts of the differences (n, ...), NaN beyond the end of the reference solution.
+    at (n,): ascending counts of the differences (n, ...).
     """
-    known = np.isfinite(differences).all(axis=tuple(range(1, differences.ndim)))
-    at, differences = at[known], differences[known]
     first = np.searchsorted(at, CROSSING_WINDOW * counts, "left")
     last = np.searchsorted(at, counts, "right")
     return np.array([differences[one:other].max(axis=0, initial=0.0) for one, other in zip(first, last, strict=True)])
@@ -224,23 +220,29 @@ def _change_within(volume: FloatArray, error: FloatArray, steps: Compared, area:
     return change
 
 
-def _depth_change(both: Compared) -> FloatArray:
-    """Difference (n, n_contact) of the depths, m."""
-    return np.asarray(np.abs(both.values["wear_depth"] - both.other("wear_depth")))
+def _apart(both: Compared, name: str) -> FloatArray:
+    """Difference (n, ...) of a value; inf where the other solution has none, NaN beyond the end of the history."""
+    own, other = both.values[name], both.other(name)
+    return np.where(np.isnan(other) & ~np.isnan(own), np.inf, np.abs(own - other))
 
 
 def _response_change(both: Compared) -> FloatArray:
     """Relative difference (n,) of the responses: the larger one of first harmonic and peak."""
     one, other = (
-        _over(np.linalg.norm(both.values[name] - both.other(name), axis=1), np.linalg.norm(both.values[name], axis=1))
+        _over(np.linalg.norm(_apart(both, name), axis=1), np.linalg.norm(both.values[name], axis=1))
         for name in ("response", "response_peak")
     )
-    return np.fmax(one, other)
+    return np.maximum(one, other)
 
 
 def _rate_change(both: Compared) -> FloatArray:
     """Relative difference (n,) of the wear rates."""
-    return _over(np.abs(both.values["wear_rate"] - both.other("wear_rate")), both.values["wear_rate"])
+    return _over(_apart(both, "wear_rate"), both.values["wear_rate"])
+
+
+def _added(difference: FloatArray, error: FloatArray) -> FloatArray:
+    """Difference to another solution (n, ...) and the error of that, which beyond its end has neither."""
+    return np.where(np.isinf(difference), np.inf, difference + error)
 
 
 def _over(part: FloatArray, whole: FloatArray) -> FloatArray:

@@ -24,14 +24,7 @@ from solver.model import FloatArray, ReducedModel
 from solver.newton.run import SHORTEST_STEP
 from solver.outcome import Outcome
 from solver.results.history import StartState
-from solver.settings import (
-    FIRST_HARMONICS,
-    ROUND_OFF,
-    Resolution,
-    Scheme,
-    SolverSettings,
-    ToTheEnd,
-)
+from solver.settings import FIRST_HARMONICS, ROUND_OFF, Resolution, Scheme, SolverSettings, ToTheEnd
 from solver.structure.joint import Case
 from solver.wear.check import full_check, is_final, report_only, unstable_at_end, vibrates_otherwise, wears_without_end
 from solver.wear.jump import jump

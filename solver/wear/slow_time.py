@@ -141,15 +141,18 @@ class Course:
         fraction = np.divide(part, grown, out=fraction, where=grown > 0.0)
 
         def between(each: FloatArray) -> FloatArray:
-            return np.asarray(each[start] + fraction.reshape(-1, *[1] * (each.ndim - 1)) * (each[end] - each[start]))
+            first, last = each[start], each[end]
+            # an error that is not known is inf from its first step on: no difference of two of them
+            rise = np.subtract(last, first, out=np.zeros_like(last), where=last != first)
+            part = fraction.reshape(-1, *[1] * (each.ndim - 1))
+            return np.asarray(first + np.multiply(part, rise, out=np.zeros_like(last), where=part != 0.0))
 
         found = {"wear_depth": depth, "depth_rate": between(self.rates)}
         found["wear_rate"] = self._volumes(found["depth_rate"])
         for name in self.nodes[-1].values:
             each = np.array([node.values[name] for node in self.nodes])
             if name in CERTIFIED:
-                # an unknown error is infinite
-                found[name] = np.fmax(each[start], each[end])
+                found[name] = np.maximum(each[start], each[end])
             else:
                 found[name] = each[end] if each.dtype.kind == "i" else between(each)
         for values in found.values():

@@ -109,8 +109,8 @@ def _read_samples(dataset: xr.Dataset, name: str) -> tuple[SampleValues, tuple[s
     """Samples of a variable of a result, and the dimensions before them: worn_volume, m3, wear_depth_max, m, or
     wear_depth, m, of which the deepest pair counts, with the largest error of any pair.
 
-    What was not computed lies above the last value that was, without upper bound. What is `sensitive` lies within its
-    error. An error that was never estimated is infinite.
+    What was not computed lies above the last value that was, without upper bound. What is `sensitive`, or known to have
+    no known error, lies within its error, which may be infinite. An error that is not in the file is infinite.
     """
     values = dataset[name].astype(float)
     errors = dataset.get(f"{name}_error", xr.full_like(values, np.inf))
@@ -130,7 +130,8 @@ def _read_samples(dataset: xr.Dataset, name: str) -> tuple[SampleValues, tuple[s
         # its error is relative
         error *= low
     sensitive = (outcome == words.get("sensitive", -1)).broadcast_like(values).transpose(*values.dims).values
-    found = SampleValues(low, high, error).widened(sensitive & ~missing)
+    unknown = np.isinf(error) & (f"{name}_error" in dataset)
+    found = SampleValues(low, high, error).widened((sensitive | unknown) & ~missing)
     return replace(found, low=np.maximum(found.low, 0.0)), tuple(map(str, values.dims[:-1]))
 
 

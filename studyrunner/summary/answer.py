@@ -215,8 +215,8 @@ def _too_few_counts(result: Result) -> str:
 def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
     """How well worn volumes, or where nothing wore responses, or modes are known; None where the file has no errors.
 
-    Values: n_known to rtol, n_less and n_unknown, never estimated, of the points computed to the end; worst: the
-    largest relative error, NaN without one; rtol: NaN where it is an axis.
+    Values: n_known to rtol, n_less and n_unknown, inf or without an estimate, of the points computed to the end; worst:
+    the largest relative error, NaN without one; rtol: NaN where it is an axis.
     """
     responses = result.has("response_error") and result.blocks is None
     has_errors = result.has("error_estimate") and np.isfinite(result.rtol).any() and result.computed.any()
@@ -229,7 +229,7 @@ def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
     else:
         return None
     known, above = result.computed & np.isfinite(errors), result.computed & (errors > result.rtol)
-    masks = {"n_known": known & ~above, "n_less": above, "n_unknown": result.computed & np.isnan(errors)}
+    masks = {"n_known": known & ~above, "n_less": known & above, "n_unknown": result.computed & ~np.isfinite(errors)}
     values: dict[str, Any] = {name: int(np.count_nonzero(mask)) for name, mask in masks.items()}
     aims = np.unique(result.rtol[np.isfinite(result.rtol)])
     values |= {"of": of, "rtol": float(aims[0]) if aims.size == 1 else math.nan}
@@ -239,7 +239,7 @@ def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
         point = result.largest(np.where(above if above.any() else known, errors, -1.0))
         worst = float(errors[result.place(point)])
         values |= {"worst": worst, "where": result.describe(point) if result.varying else ""}
-        if above.any():
+        if above.any() and worst < math.inf:
             in_volume = of == "worn volume"
             values["advice"] = _advise_error(result, result.place(point), worst) if in_volume else "a smaller rtol"
     return Finding("certainty", "certainty", _describe_certainty(result.computed.size, values), values)
@@ -260,7 +260,7 @@ def _describe_certainty(n_points: int, values: Mapping[str, Any]) -> str:
     text = f"{n_known} of {count(n_points, of)} are known within {aim}"
     text += f", {n_less} less well" if n_short and n_less else ""
     text += f", {n_short} not computed to the end" if n_short else ""
-    text += f", {n_unknown} without an estimate" if n_unknown else ""
+    text += f", {n_unknown} not known" if n_unknown else ""
     where = ", ".join(filter(None, (values["where"], within)))
     return f"{text}; least certain: {where}{advice}" if worst > 0.0 else text
 
@@ -271,7 +271,7 @@ def _errors_of_modes(result: Result) -> NDArray[np.float64]:
     for name in ("natural_frequency", "damping_ratio"):
         if result.has(name, f"{name}_error"):
             value, error = np.abs(result.dataset[name].values), result.dataset[f"{name}_error"].values
-            errors = np.fmax(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
+            errors = np.maximum(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
     return errors
 
 

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from solver.outcome import SENSITIVE_ERROR, Outcome
+from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
 from studyrunner.system.progress import count
-from studyrunner.units import scale_for, show_cycles, show_number, show_percent
+from studyrunner.units import scale_for, show_cycles, show_known, show_number, show_percent
 
 LEAST_ERROR = 1e-4
 """Relative error that is shown, of any smaller one."""
@@ -32,7 +32,7 @@ _SHARE = 0.5
 class Finding:
     """One line of a summary. name: of what it says. label, text: as printed. values: its numbers in SI, and words.
 
-    Errors are absolute, NaN where they were not estimated.
+    Errors are absolute, inf where not known, NaN where the file has none.
     """
 
     name: str
@@ -54,10 +54,8 @@ def _known(value: float, error: float, units: str) -> str:
     """A number with its error: "1.52 mm3 ± 1.3 %"."""
     if math.isnan(value):
         return "not known"
-    text = _show(value, units)
-    if math.isnan(error):
-        return f"{text} (error not known)"
-    return f"{text} ± {show_percent(max(error / value, LEAST_ERROR))}" if value > 0.0 else text
+    # of nothing only whether it is known
+    return _show(value, units) + show_known(max(error / value, LEAST_ERROR) if value > 0.0 else 0.0 * error)
 
 
 # --- wear and vibration ---
@@ -179,14 +177,14 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     both = np.where(amplitude[:, of] > NO_MOTION, amplitude[:, of], 0.0)
     wrong = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
     both = np.where((wrong > SENSITIVE_ERROR) & (both > 0.0), np.nan, both)
-    errors, name = wrong * both, result.responses[of]
+    errors, name = absolute(wrong, both), result.responses[of]
     new, worn = (_known(value, error, "m") for value, error in zip(both.tolist(), errors.tolist(), strict=True))
     values: dict[str, Any] = {"response": name, "amplitude": both.tolist(), "error": errors.tolist()}
     if result.followed and result.has("excitation_frequency"):
         start, end = result.at("excitation_frequency", point, ends).values.tolist()
         has_error = result.has("excitation_frequency_error")
         error = float(result.at("excitation_frequency_error", point, ends[1])) if has_error else math.nan
-        shown = f"{end:.6g}" + ("" if math.isnan(error) else f" ± {error:.2g}")
+        shown = f"{end:.6g}" + (f" ± {error:.2g}" if math.isfinite(error) else " (error not known)" * has_error)
         moved = f"moved from {start:.6g} to {shown} Hz" if wears else f"at {start:.6g} Hz"
         text = f"{moved}, response of {name} {new}" + (f" to {worn}" if wears else "")
         values |= {"frequency": [start, end], "frequency_error": error}
@@ -251,7 +249,7 @@ def shortest_life(result: Result) -> Finding | None:
     if not isinstance(until, dict) or not result.has("cycles_to_target"):
         return None
     (quantity, target), *_ = until.items()
-    ended = result.computed & ~result.ended(Outcome.SENSITIVE)
+    ended = result.computed & ~result.ended(Outcome.SENSITIVE) & ~np.isinf(result.errors)
     lives, errors = (result.dataset[name].values for name in ("cycles_to_target", "cycles_to_target_error"))
     unknown = ended & (errors > SENSITIVE_ERROR * lives)
     n_beyond, n_unsure = int(np.count_nonzero(ended & np.isnan(lives))), int(np.count_nonzero(unknown))
@@ -266,8 +264,8 @@ def shortest_life(result: Result) -> Finding | None:
         return Finding("life", "life", text, values)
     point = result.largest(-np.nan_to_num(lives, nan=np.inf))
     life, error = (float(each[result.place(point)]) for each in (lives, errors))
-    known = f"± {show_percent(error / life)}" if math.isfinite(error) and life > 0.0 else "(error not known)"
-    text = f"{show_cycles(round(life), result.counted)} {known} to {reaches} at {where_is(result, point)}"
+    known = show_known(error / life if life > 0.0 else math.nan)
+    text = f"{show_cycles(round(life), result.counted)}{known} to {reaches} at {where_is(result, point)}"
     text += f"; {unsure}" if unsure else ""
     text += f"; not reached by {count(n_beyond, 'point')}" if n_beyond else ""
     return Finding("life", "life", text, values | {"count": life, "error": error, "point": point})

@@ -10,19 +10,21 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from solver import Block, Outcome, Passage, SolverSettings, integrate_mission, march_wear
+from solver.accuracy.refinement import refine
+from solver.accuracy.resolved_state import UNKNOWN
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import Failure
 from solver.missions import history as integrating
-from solver.missions.block_run import BlockInput, BlockResult, run_block
+from solver.missions.block_run import BlockInput, BlockResult, find_start, run_block
 from solver.missions.history import integrate_missions, unworn_course
 from solver.missions.mission import MissionRequest
 from solver.missions.step import MissionStep, attempt_step
 from solver.packing import Packed
-from solver.settings import WearTarget
+from solver.settings import Resolution, WearTarget
 from solver.wear.slow_time import Guide
 from studies.scenes.sdof_slider import DenHartogSlider
 from studies.scenes.sdof_slider import Parameters as SliderParameters
-from tests.solver.models import assert_same, scene
+from tests.solver.models import assert_same, dovetail, scene
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)
 WEAR, FRICTION = 1.1e-11, 0.5
@@ -143,6 +145,35 @@ def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
     own, again = begun_again(slipping, 6e-5)
     assert again.iterations >= own.iterations
     np.testing.assert_array_equal(again.growth, own.growth)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("where", "cycles", "kept"), [((212.3, 1.4, 0.35), 1500.0, True), ((212.5, 0.5, 0.5), 5000.0, False)]
+)
+def test_an_earlier_sweep_serves_as_long_as_its_choices_do(where, cycles, kept):
+    """Also with other harmonics of its nodes; a vibration that differs by 0.35 needs errors of its own."""
+    unworn = BlockInput(MissionRequest((Block(dovetail(5), *where, cycles),), WEAR, (0, 2), SETTINGS), 0, np.zeros(16))
+    start, sweep = find_start(unworn)
+    worn = replace(unworn, depth=cycles * unworn.wearing_joint(start)[1].rate)
+    earlier = replace(sweep, resolution=Resolution((1, 2, 3, 4, 5), 64))
+    again, after = find_start(replace(worn, earlier=earlier))
+    assert again.outcome is Outcome.CONVERGED
+    assert (after is earlier) is (again.response_error == start.response_error) is kept
+
+
+@pytest.mark.parametrize(("frequency", "cycles"), [(160.0, 200.0), (Passage(150.0, 165.0, 2.0), None)])
+def test_the_error_of_a_mission_whose_states_have_no_other_to_compare_with_is_not_known(frequency, cycles, monkeypatch):
+    unknown = "solver.loading_history.start_states.refine", lambda *given: replace(refine(*given), estimate=UNKNOWN)
+    monkeypatch.setattr(*unknown)
+    sticking = Block(slider(), 160.0, 0.1, FRICTION, 200.0)
+    history = integrate((Block(slider(), frequency, 10.0, FRICTION, cycles), sticking), 1)
+    assert history.outcome is Outcome.INACCURATE
+    assert "the vibration cannot be compared with that of more harmonics or samples" in history.message
+    # of the second block it is known that nothing wears, not how it vibrates
+    assert history.block_volume_error.tolist() == [[0.0, 0.0], [np.inf, 0.0]]
+    assert history.worn_volume_error[1] == history.wear_depth_error[1, 0] == history.error_estimate == np.inf
+    assert np.isinf(history.response_error).all()
 
 
 @pytest.mark.slow
@@ -302,7 +333,8 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     assert np.array_equal(history.worn_volume, whole.worn_volume)
     assert history.worn_volume_error[1] == whole.worn_volume_error[1] < SETTINGS.rtol
     assert history.worn_volume_error[2] == history.error_estimate == np.inf
-    assert history.outcome is Outcome.SENSITIVE
+    assert history.outcome is Outcome.INACCURATE
+    assert "not known: in coarser steps the history" in history.message
 
 
 # --- what users may get wrong ---

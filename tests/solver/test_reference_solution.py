@@ -1,5 +1,6 @@
 """The reference solution, and the error of a worn volume against what the volume is wrong by."""
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -124,7 +125,19 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     assert np.array_equal(history.worn_volume_error[known], whole.worn_volume_error[known])
     assert np.isinf(history.worn_volume_error[~known]).all()
     assert np.isinf(history.wear_depth_error[-1][history.wear_depth[-1] > 0.0]).all()
-    assert history.outcome is Outcome.SENSITIVE
+    assert history.outcome is Outcome.INACCURATE
+    assert "not known: with longer steps" in history.message
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
+def test_a_history_whose_state_has_no_other_to_compare_with_says_so(scheme):
+    found = replace(start()[1], response_error=np.inf, wear_rate_error=np.inf)
+    history = march_wear(start()[0], 0.5, found, WEAR, 4000.0, scheme, CYCLES[::4], GIVEN)
+    assert history.outcome is Outcome.INACCURATE
+    assert "cannot be compared with that of more harmonics or samples: its error is not known" in history.message
+    assert history.worn_volume_error.tolist() == [0.0, np.inf, np.inf]
+    assert np.isinf([*history.response_error, *history.wear_rate_error]).all()
+    np.testing.assert_array_equal(history.wear_depth_error, np.where(history.wear_depth > 0.0, np.inf, 0.0))
 
 
 AREA = np.array([1.0, 2.0])
@@ -171,7 +184,7 @@ def test_an_error_adds_up_what_differs_at_each_pair():
     # of pairs of volumes 1 and 2 none is known better than the volume times the root of 9 / 5
     apart = safety * np.abs(np.subtract(DEPTH, other))
     least = LESS_KNOWN * np.outer(found.worn_volume * [0.0, 1.0, 2.0], [1.0, 1.0])
-    assert found.wear_depth == pytest.approx(np.fmax(apart, least))
+    assert found.wear_depth == pytest.approx(np.maximum(apart, least))
     assert (found.wear_depth[1:, 1] > apart[1:, 1]).all()
     assert found.response == pytest.approx(np.full(3, 1e-3))
     assert found.wear_rate == pytest.approx(np.zeros(3))

@@ -146,6 +146,8 @@ UNKNOWN = {"worn_volume": 1e-9 * np.arange(3.0), "worn_volume_error": np.array([
         (ALL, {**UNKNOWN, "inaccurate_from": 0.0}, Outcome.SENSITIVE, "worn volume 2 mm3"),
         (ALL, {**UNKNOWN, "cut_off_cycle": 4.0}, Outcome.CONTACT_CUT_OFF, "pairs at the edge"),
         (ALL, {**UNKNOWN, "cut_off_cycle": 11.0}, Outcome.SENSITIVE, "worn volume 2 mm3"),
+        # an unknown error is no large one
+        (ALL, {**UNKNOWN, "worn_volume_error": np.full(3, np.inf)}, Outcome.INACCURATE, "is not known: "),
         # a history that shares it and ends before is known
         ([0, 1], UNKNOWN, Outcome.CONVERGED, ""),
         # a joint that is held says so beside all else

@@ -226,6 +226,8 @@ def test_every_statistic_is_labelled_and_stands_over_the_other_dimensions():
     words = (f"128 samples wear {low:.3g} to {high:.3g} mm3, median {middle:.3g} mm3", "error 1 %", "ranked: gap")
     assert all(word in said(found) for word in (*words, "wear coefficient decides most"))
     assert "error not known" in said(worn_volume_statistics(dataset.drop_vars("worn_volume_error")))
+    lost = dataset["worn_volume_error"].where(dataset["sample"] != 3, np.inf)
+    assert "1 have no volume" in said(worn_volume_statistics(dataset.assign(worn_volume_error=lost)))
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,7 @@ def test_of_numerical_settings_the_best_known_is_shown():
         ("outcome", FAILED, 0),
         ("error_estimate", 0.7, 0.01),
         ("error_estimate", math.nan, 0.01),
+        ("error_estimate", math.inf, 0.01),
     ],
 )
 def test_what_is_not_known_is_no_result(name, value, known):
@@ -71,6 +72,8 @@ def test_what_is_not_known_is_no_result(name, value, known):
     found = summary(dataset)
     assert found.values["wear"]["worn_volume"] == pytest.approx(2e-9)
     assert found.values["wear"]["n_left_out"] == 1
+    unknown = dataset.assign({each: dataset[each] * 0.0 + math.inf for each in ("wear_depth_error", "response_error")})
+    assert "(error not known)" in dict(summary(unknown).rows)["deepest"]
     nothing = summary(dataset.assign(outcome=dataset["outcome"] * 0 + FAILED))
     assert ("wear" in nothing.values, nothing.n_complete) == (False, 0)
     assert not any("mm3" in line for line in nothing.lines)
@@ -207,12 +210,14 @@ def test_points_that_failed_or_were_never_estimated_are_not_known():
     made = wearing(
         *GRID,
         outcome=lambda p: outcomes.get(at(p), 0),
-        error_estimate=lambda p: errors.get(at(p), math.nan if at(p) == (1, 0) else 0.001),
+        error_estimate=lambda p: errors.get(at(p), (math.nan, math.inf, 0.001)[p[4]] if p[0] == 1 else 0.001),
         last_cycle=lambda p: 5000.0 if at(p) == (0, 0) else 20_000.0,
     )
     found = summary(made)
     known = found.values["certainty"]
-    assert [known[name] for name in ("n_known", "n_less", "n_unknown", "worst")] == [5, 2, 1, 1.2]
+    assert [known[name] for name in ("n_known", "n_less", "n_unknown", "worst")] == [4, 2, 2, math.inf]
+    # no setting is known to make an error known
+    assert known["advice"] == ""
     failures = [each for each in found.findings if each.label in ("failed", "uncertain")]
     assert [each.name for each in failures] == ["march_failed", "inaccurate", "others"]
     assert "computed up to 5000 cycles" in failures[0].values["reason"].replace("\N{NO-BREAK SPACE}", "")

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
-from solver.outcome import Outcome
+from solver.outcome import Outcome, absolute
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sentences
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
@@ -69,12 +69,12 @@ def _find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatAr
     quantities = []
     if result.has("worn_volume") and len(result.cycles) > 1:
         worn = np.where(result.computed, result.worn, np.nan)
-        quantities.append(("worn volume\nin the end", "m3", worn, result.errors * worn))
+        quantities.append(("worn volume\nin the end", "m3", worn, absolute(result.errors, worn)))
     if result.has("response_amplitude"):
         amplitude = np.where(result.computed, result.of_points("response_amplitude", -1)[..., 0], np.nan)
         error = result.of_points("response_error", -1) if result.has("response_error") else np.nan
         units = str(result.dataset["response_amplitude"].attrs.get("units", "m"))
-        quantities.append((f"response\nof {result.responses[0]}", units, amplitude, error * amplitude))
+        quantities.append((f"response\nof {result.responses[0]}", units, amplitude, absolute(error, amplitude)))
     return quantities
 
 

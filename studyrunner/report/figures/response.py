@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
+from solver.outcome import absolute
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray
 from studyrunner.report.selection import Course, choose, find_course, labelled
@@ -68,7 +69,7 @@ def draw_responses(result: Result) -> Drawn:
         first = line.values[:, 0]
         for number, panel in enumerate(panels[:, 0]):
             values = scale(line.values[:, number])
-            error = None if line.error is None else line.error * values
+            error = None if line.error is None else absolute(line.error, values)
             plot.add_line(panel, line.at, values, error, label=line.label, **line.look)
         if line.look is not _EXACT and np.isfinite(first).any():
             top = int(np.nanargmax(first))

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
-from solver.outcome import Outcome
+from solver.outcome import Outcome, absolute
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import Drawn, FloatArray, Table
 from studyrunner.report.selection import (
@@ -25,7 +25,7 @@ from studyrunner.report.selection import (
     slow_time,
 )
 from studyrunner.result.view import NO_VOLUME, Point, Result
-from studyrunner.units import Scale, scale_for, show_number, show_percent
+from studyrunner.units import Scale, scale_for, show_known, show_number, show_percent
 
 _MOST_LINES, _MOST_MAPS = 6, 4
 _LARGE: dict[str, Any] = {"linestyle": "none", "markersize": 9, "markerfacecolor": "none", "color": "black"}
@@ -91,7 +91,9 @@ def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: Choice, sc
             continue
         if result.has(f"{name}_error"):
             wrong = result.at(f"{name}_error", point).values
-            error = wrong * values if result.dataset[f"{name}_error"].attrs.get("units") == "1" else scale(wrong)
+            error = (
+                absolute(wrong, values) if result.dataset[f"{name}_error"].attrs.get("units") == "1" else scale(wrong)
+            )
         look = plot.line_style(number, 101) | {"label": label or "computed"}
         highest = max(highest, plot.add_line(panel, cycles(result.counts(point)), values, error, band=True, **look))
     panel.set_xlabel(slow_time(result, cycles))
@@ -117,8 +119,10 @@ def _mark_events(result: Result, panel: Axes, point: Point, cycles: Scale, scale
 def _with_error(result: Result, point: Point) -> str:
     """The error of a final worn volume in words: " ± 3 %", with what is to be said where it is above rtol."""
     place = result.place(point)
-    if not result.computed[place] or not 0.0 < result.errors[place] < np.inf:
+    if not result.computed[place] or not result.errors[place] > 0.0:
         return ""
+    if np.isinf(result.errors[place]):
+        return show_known(np.inf)
     remark = ", sensitive" if result.ended(Outcome.SENSITIVE)[place] else ", above rtol" if result.above[place] else ""
     return f" ± {result.show_error(point)}{remark}"
 
@@ -148,15 +152,14 @@ def draw_final(result: Result) -> Drawn:
     for line, (label, values, error) in enumerate(zip(choice.labels, volumes[..., -1], errors, strict=True)):
         if not failed[line].all():
             look = course.line_style(line) | {"label": label or "computed"}
-            reach = plot.add_line(panel, course.values, scale(values), scale(error * values), **look)
+            reach = plot.add_line(panel, course.values, scale(values), scale(absolute(error, values)), **look)
             highest = max(highest, min(reach, 2.0 * top))
     _mark_care(panel, course, choice, scale(reached))
     plot.set_from_zero(panel, highest)
     crosses = plot.mark_failed(panel, course.values, failed)
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume {_at_the_end(result)}"))
-    error = errors[number, place]
-    wrong = f" ± {show_percent(error)}" if error > 0.0 else ""
+    wrong = show_known(float(errors[number, place]))
     text = f"Largest: {scale.show(float(reached[number, place]), 4)}{wrong} at {course.at(place)}"
     return figure, labelled(text, choice.labels[number]), crosses, choice.sentence
 
@@ -212,8 +215,7 @@ def list_blocks(result: Result) -> Drawn:
     scale, total = scale_for("m3", worn), float(worn.sum())
     for name, *values in zip(blocks["block"].values, *(blocks[name].values for name in LISTED), strict=True):
         begin, end, cycles, rate, volume, error = map(float, values)
-        amount = scale.show(volume, 4) if reached.size else "-"
-        amount += f" ± {show_percent(error)}" if error > 0.0 else ""
+        amount = scale.show(volume, 4) + show_known(error) if reached.size else "-"
         share = show_percent(volume / total) if total > NO_VOLUME else "-"
         frequency = " to ".join(dict.fromkeys(map(show_number, (begin, end))))
         passage = f"{rate:.2g}" if rate > 0.0 else "-"
