@@ -129,7 +129,7 @@ def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
         return None
     case, joint = wearing.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, state.at) is None and not wearing.run.is_stable_finely(wearing.joint_of(state), state.at):
+    if free_slide(joint, state.at) is None and not wearing.run.is_stable(wearing.joint_of(state), state.at):
         return Failure(Outcome.UNSTABLE)
     return find_instability(case, joint, state.at, wearing.run, True)
 
