@@ -106,6 +106,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
     error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
     error += min(lag * max(float(state.density @ area) for state in states), volume)
     ends, inaccurate = (states[0], states[-1]), [each for each in starts if each.outcome is Outcome.INACCURATE]
+    worst = max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0)
     return BlockResult(
         growth=growth,
         response=np.array([state.response for state in ends]),
@@ -113,7 +114,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         slope=slope if given.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
-        inaccurate=max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0),
+        inaccurate=math.inf if any(start.message for start in starts) else worst,
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start if given.is_continued else None,
         sweep=EarlierSweep(swept.needed),

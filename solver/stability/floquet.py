@@ -253,7 +253,7 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
 
     # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=size)
-    values, residuals = ritz_values(passed, start, MOST_PRODUCTS, settled)
+    values, residuals = ritz_values(passed, start, m * MOST_PRODUCTS, settled)
     known = m * residuals < SMALLEST_GROWTH
     return (values[known] if settled(values, residuals) else values[:0]) ** m
 

@@ -54,7 +54,8 @@ def integrate_together(
         else:
             solution = _solve(integrator, case, start, request)
         history = _assembled(model, start, request, solution)
-        if history.outcome is Outcome.CONVERGED:
+        if history.outcome.complete:
+            history = replace(history, unjudged=history.message)
             rows = np.flatnonzero(np.isfinite(history.worn_volume))
             outcome, message = judge(history, rows, settings.rtol)
             history = replace(history, outcome=outcome, message=message)
