@@ -8,11 +8,10 @@ with the derivative of the contact law at each sample (`contact.law`), by BDF2: 
 suddenly, which needs damping at high rates. In N samples it damps a vibration at r times the frequency of the state by
 the fraction `(2 pi r)^4 / (4 N^3)`. Pairs that stick or are open during the whole period need no law.
 
-A disturbance of a travelling wave of nodal diameter d couples sectors: with phase theta = w t + 2 pi s d / N of sector s
-it is x(theta, t) = sum x_n(t) exp(i n theta), and its part n obeys the structure of nodal diameter n d. So m sectors at
-equal distances in theta are integrated, whose m parts are those with the smallest |n|; with m = N / gcd(N, d) these are
-all sectors that move differently, and all their disturbances. After a period over m each sector is where the next one
-was: seen from there, the disturbance is multiplied by the m-th root of a multiplier.
+A travelling wave of nodal diameter d couples sectors. With the phase theta = w t + 2 pi s d / N of sector s, a
+disturbance is the sum of x_n(t) exp(i n theta), whose part n obeys the structure of nodal diameter n d. So m sectors at
+equal distances in theta are integrated, with the m parts of smallest |n|; m = N / gcd(N, d) are all sectors that move
+differently. After a period over m each sector is where the next one was, with the m-th root of the multipliers.
 """
 
 from __future__ import annotations
@@ -134,7 +133,7 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
 
 
 def _of_sectors(model: ReducedModel, moves: BoolArray, n_sectors: int) -> Iterator[FloatArray]:
-    """Mass, damping, stiffness (m k, m k) of m sectors at equal distances in phase, in the k displacements that move."""
+    """Mass, damping, stiffness (m k, m k) of m sectors at equal distances in phase, in k displacements that move."""
     places = np.arange(n_sectors)
     harmonics = (places + n_sectors // 2) % n_sectors - n_sectors // 2
     waves = np.exp(2j * np.pi / n_sectors * np.outer(harmonics, places)) / np.sqrt(n_sectors)

@@ -13,7 +13,6 @@ import numpy as np
 from solver.accuracy.certificate import NOT_CERTIFIED
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
-from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import StartState, WearHistory, first_cut_off, judge, last_error
 from solver.results.state_report import LOOP_PHASES
