@@ -93,7 +93,7 @@ class Multipliers:
         growth = abs(self.values[0]) - 1.0 if self.values.size else np.inf
         if growth <= SMALLEST_GROWTH:
             return "stable"
-        if growth <= 2.0 * self.error:
+        if not self.values.size or growth <= 2.0 * self.error:
             return "unknown"
         if self.values[0].imag != 0.0:
             return "Neimark-Sacker"

@@ -23,7 +23,7 @@ from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.stability import floquet
 from solver.stability.disturbances import build_monodromy, switching_pairs
-from solver.stability.floquet import Multipliers, find_instability, multipliers_of
+from solver.stability.floquet import find_instability, multipliers_of
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import build_case
 from solver.structure.penalty import Penalty
@@ -173,11 +173,6 @@ def test_a_stability_that_is_not_known_is_said(monkeypatch):
         assert outcome is Outcome.INACCURATE
         assert "whether the vibration is stable is not known: more than 0 pairs slip" in message
     assert np.isfinite(history.worn_volume).all()
-
-
-def test_a_value_within_its_error_of_1_says_nothing():
-    kinds = [Multipliers(np.array([1.05 + 0j]), error).stability(odd=False) for error in (0.01, 0.04, np.inf)]
-    assert kinds == ["fold", "unknown", "unknown"]
 
 
 def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
