@@ -157,7 +157,9 @@ def _read(
         outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
     elif outcome is Outcome.INACCURATE:
         error, name = max((start.wear_rate_error, "wear rate"), (start.response_error, "response"))
-        message = f"the {name} {known_to(error, settings.rtol)}"
+        message = "; ".join(filter(None, (f"the {name} {known_to(error, settings.rtol)}", message)))
+    elif message:
+        outcome = Outcome.INACCURATE
     return first_response(joint, at), largest_responses(joint, at), outcome, message
 
 

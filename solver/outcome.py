@@ -83,7 +83,8 @@ _SENTENCES = {
     " back before it (a fold), meet another mode, or end where the whole joint slides.",
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided.",
     Outcome.INACCURATE: "The point was computed to the end, but the error of a vibration, a wear rate, a natural"
-    " frequency or a damping ratio is above rtol, or an error is not known: see the variables of these errors.",
+    " frequency or a damping ratio is above rtol (see the variables of these errors), or it is not known, or the"
+    " stability of a vibration is not (see the variable message).",
     Outcome.SENSITIVE: "The point was computed to the end, but its worn volume depends strongly on the step or on the"
     " start state: two computations of nearly the same case differ by more than half.",
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",

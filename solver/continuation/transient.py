@@ -30,7 +30,7 @@ from solver.settings import ROUND_OFF
 from solver.structure.condensation import condense, whole_motion
 from solver.structure.fourier import from_complex, with_static
 from solver.structure.harmonic_stiffness import DenseStiffness
-from solver.structure.joint import Joint
+from solver.structure.joint import Joint, held
 
 TRANSIENT_CUT = 0.35
 """Factor of the length of a refused step. Half the value takes 2.5 times the iterations of a jump at a fold."""
@@ -84,7 +84,7 @@ class Transient:
             moving=DenseStiffness(stiffness[1:]),
             force_h=from_complex(np.real(force[0]), force[1:].T),
         )
-        return replace(self.joint, structure=structure)
+        return replace(self.joint, structure=held(structure, self.joint.hold))
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
         """Motion at the end of a step, from the solution of the balance of the step."""

@@ -200,7 +200,7 @@ class LoadingPath(Path[State]):
         """As in Path."""
         balance = self.balance_at(state.parameter, history)
         found = run.state(balance, predicted_h, state.parameter, NEAR_ITERATIONS)
-        return found if found is not None and run.is_stable_finely(balance.joint, found.evaluation) else None
+        return found if found is not None and run.is_stable(balance.joint, found.evaluation) else None
 
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Failure:
         """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the

@@ -236,7 +236,8 @@ class FrequencySweep:
         joint, at, estimate = found.joint, found.point.evaluation, found.estimate
         if not found.holds():
             return Failure(Outcome.CERTIFICATE_FAILED)
-        if unstable := find_instability(found.case, joint, at, self.run, self.with_switching):
+        unstable = find_instability(found.case, joint, at, self.run, self.with_switching)
+        if unstable is not None and not unstable.outcome.complete:
             return unstable
         reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
         if reference is not None:
@@ -252,6 +253,7 @@ class FrequencySweep:
             wear_rate_error=estimate.wear_rate,
             branch=present.branch + len(folds),
             fold_frequency=float(fold),
+            message="" if unstable is None else unstable.message,
             reference=None if reference is None else periodic_state(joint, reference),
         )
 

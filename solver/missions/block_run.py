@@ -58,7 +58,7 @@ class BlockResult:
     response, response_peak (2, n_response): complex first harmonic and largest magnitude at start and end, m.
     slope (n_contact, n_contact): derivative of the growth by the depth before, 1; None if not asked for.
     response_error, growth_error: estimated relative errors.
-    inaccurate: largest relative error of a state above rtol, 0 where there is none.
+    inaccurate: largest relative error of a state above rtol, 0 where there is none, inf where stability is not known.
     held, cut_off: whether a joint that slides as a whole was held, or a pair at an edge of the contact carries load.
     guide, sweep: what the reference solution takes over, and the next mission (None for a block that continues).
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
@@ -169,8 +169,9 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
     else:
         problem = reference_of(case, start, given.request, given.guide, counts)
     solution = Integrator(given.deadline - computing_time()).integrate(problem)
-    if solution.failure is not None:
-        return solution.failure
+    failure = solution.failure
+    if failure is not None and not failure.outcome.complete:
+        return failure
     state, values, slope = solution.state, solution.course.read(counts), None
     depth = values["wear_depth"]
     volume = float(depth[-1] @ given.mission.area)
@@ -187,7 +188,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         slope=slope,
         response_error=float(values["response_error"].max()),
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
-        inaccurate=state.worst.largest if state.inaccurate_from <= counts[-1] else 0.0,
+        inaccurate=math.inf if failure else state.worst.largest if state.inaccurate_from <= counts[-1] else 0.0,
         held=state.held_from <= counts[-1],
         cut_off=not math.isnan(first_cut_off(given.model.contact, counts, values["mean_pressure"], depth)),
         guide=Guide(state.resolutions, state.first_length),

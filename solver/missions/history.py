@@ -258,6 +258,8 @@ def _judged(mission: MissionRequest, state: MissionState, history: MissionHistor
     if inaccurate.any():
         name = mission.called(int(inaccurate.argmax()))
         about_state = f"in {name} the vibration {known_to(float(inaccurate.max()), rtol)}"
+        # an unknown stability is an infinite error, too
+        about_state += ", or whether it is stable" * bool(np.isinf(inaccurate.max()))
     if state.held_from < math.inf:
         about_hold = (
             f"from mission {state.held_from:.0f} on only friction holds the joint in one direction: it is held there"

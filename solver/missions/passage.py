@@ -115,7 +115,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         slope=slope if given.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
-        inaccurate=max(bad, default=0.0),
+        inaccurate=math.inf if any(start.message for start in starts) else max(bad, default=0.0),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start if given.is_continued else None,
         sweep=EarlierSweep(swept.needed),

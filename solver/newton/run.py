@@ -258,22 +258,18 @@ class Run:
 
     def is_stable(self, joint: Joint, at: Evaluation) -> bool:
         """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`) at
-        its wear depth, as the vibration is fast and the wear is slow.
-        """
-        return bool(self.solver.determinant_sign(Balance(joint, at.history).linearise(at)) >= 0.0)
-
-    def is_stable_finely(self, joint: Joint, at: Evaluation) -> bool:
-        """As `is_stable`, but a state is unstable only where it is so with more samples, too: with too few the sign of
+        its wear depth, as the vibration is fast and the wear is slow. With more samples, too: with too few the sign of
         the determinant may turn where many pairs slip and open.
         """
-        if self.is_stable(joint, at):
+        if self.solver.determinant_sign(Balance(joint, at.history).linearise(at)) >= 0.0:
             return True
         # the predicted force of masses on rigid ground depends on the length of a sample
         if joint.law.rate_dependent:
             return False
         finer = replace(joint, basis=build_basis(joint.basis.orders, SAMPLES_OF_SIGN * joint.basis.n_samples))
-        sampled = Balance(finer, at.history, at.wear_depth).evaluate(at.predicted_h)
-        return self.fresh().is_stable(finer, sampled)
+        sampled = Balance(finer, at.history, at.wear_depth)
+        tangent = sampled.linearise(sampled.evaluate(at.predicted_h))
+        return bool(JacobianSolver().determinant_sign(tangent) >= 0.0)
 
     def move(self, old: Case, joint: Joint, state: State, *, with_tail: bool = False) -> State | None:
         """The state of a case with the harmonics and samples of another joint, as `transfer`; None where not found."""

@@ -50,7 +50,8 @@ class StartState:
     run_time: CPU seconds of the computing thread since the last frequency.
     branch, fold_frequency: number of folds that the sweep has jumped over, 0 on its first branch, and frequency of the
         last one, Hz; NaN if none, and for a ramp, whose folds are load factors.
-    message: sentence of an unexpected error (`Outcome.EXCEPTION`), or how far a sweep came.
+    message: sentence of an unexpected error (`Outcome.EXCEPTION`), or how far a sweep came; of a state, why it is not
+        known whether the state is stable.
     reference: state of the reference sweep, solved with the resolution of the state; None where there is none.
     """
 
@@ -93,6 +94,7 @@ class WearHistory(Presented):
     - inaccurate_from, inaccurate_in, inaccurate_error: count from which on the error of a state is above rtol, inf if
       never; name of the result, and its largest error from there on.
     - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
+    - unjudged: why it is not known whether the first or the last vibration is stable; "" where both are.
     - step_limit: largest stable explicit step at the first state that wears, cycles; or inf.
     - newton_iterations, run_time, CPU seconds: both with those of the start state. branch, fold_frequency: of it.
     - outcome, message: how the history ended, and a sentence about it.
@@ -143,6 +145,7 @@ class WearHistory(Presented):
     inaccurate_in: str = ""
     inaccurate_error: float = 0.0
     held_from: float = math.inf
+    unjudged: str = ""
 
 
 def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0) -> tuple[Outcome, str]:
@@ -169,7 +172,8 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
             f"from cycle {in_digits(history.held_from / slower)} on every pair slips and only friction holds the joint"
             f" in one direction: its mean position is held there, by at most {HELD_FORCE:g} of the friction"
         )
-    return verdict(error, uncertain, inaccurate, cut_off, held)
+    outcome, message = verdict(error, uncertain, inaccurate, cut_off, held, history.unjudged)
+    return Outcome.INACCURATE if history.unjudged and outcome is Outcome.CONVERGED else outcome, message
 
 
 def verdict(error: float, uncertain: str, inaccurate: str, cut_off: str, *notes: str) -> tuple[Outcome, str]:

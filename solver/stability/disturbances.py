@@ -7,10 +7,16 @@ The monodromy integrates a disturbance (dy, dlambda) of displacements and contac
 with the derivative of the contact law at each sample (`contact.law`), by BDF2: the contact holds displacements
 suddenly, which needs damping at high rates. In N samples it damps a vibration at r times the frequency of the state by
 the fraction `(2 pi r)^4 / (4 N^3)`. Pairs that stick or are open during the whole period need no law.
+
+A travelling wave of nodal diameter d couples sectors. With the phase theta = w t + 2 pi s d / N of sector s, a
+disturbance is the sum of x_n(t) exp(i n theta), whose part n obeys the structure of nodal diameter n d. So m sectors at
+equal distances in theta are integrated, with the m parts of smallest |n|; m = N / gcd(N, d) are all sectors that move
+differently. After a period over m each sector is where the next one was, with the m-th root of the multipliers.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -21,7 +27,7 @@ from scipy.linalg import eigvals
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.law import SampledLaw, sampled_law
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, ReducedModel
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
 
@@ -49,7 +55,9 @@ class Monodromy(NamedTuple):
     - inverse (N, 3p, 3p): contact forces from the right-hand side of the law.
     - past (N, p, 3, 12): right-hand side of the law from `du` without contact forces, `du'`, known velocity, `dv'`.
     - places (12p,): rows of these four motions, and 4n for a displacement that does not exist.
+    - turn (4n,): rows of a disturbance as seen from the next sector. n_sectors: m.
 
+    n and p count the displacements and pairs of all m sectors, N the samples of a period over m.
     A disturbance (4n, j) has displacements and velocities (m per sample), both now and at the sample before.
     """
 
@@ -58,11 +66,13 @@ class Monodromy(NamedTuple):
     inverse: FloatArray
     past: FloatArray
     places: IntArray
+    turn: IntArray
+    n_sectors: int
 
 
 @njit(cache=True)
 def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
-    """Disturbances (4n, j) a period later. Compiled: for small joints a tenth of the time."""
+    """Disturbances (4n, j) a period over m later. Compiled: for small joints a tenth of the time."""
     n, n_rows = of.response.shape[0], of.inverse.shape[1]
     now, before = disturbance[:n].copy(), disturbance[n : 2 * n].copy()
     speed, speed_before = disturbance[2 * n : 3 * n].copy(), disturbance[3 * n :].copy()
@@ -81,29 +91,35 @@ def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
                         right[row] += of.past[sample, row // 3, row % 3, m] * past[place]
             after -= np.dot(of.spread, np.dot(of.inverse[sample], right))
         now, before, speed, speed_before = after, now, 1.5 * after + known, speed
-    return np.concatenate((now, before, speed, speed_before))
+    return np.concatenate((now, before, speed, speed_before))[of.turn]
 
 
-def build_monodromy(joint: Joint, at: Evaluation, n_samples: int) -> Monodromy:
-    """Monodromy of a state at a fixed wear depth in the real structure, with samples of the contact law.
+def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int = 1) -> Monodromy:
+    """Monodromy of a state at a fixed wear depth, with samples of the contact law, a multiple of the m = `n_sectors`
+    sectors of a travelling wave; otherwise of the real structure.
 
     Raises numpy.linalg.LinAlgError where the structure is singular.
     """
-    fine = replace(joint, basis=build_basis(joint.basis.orders, n_samples))
+    steps = -(-n_samples // n_sectors)
+    fine = replace(joint, basis=build_basis(joint.basis.orders, steps * n_sectors))
     state = Balance(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
-    (switching, stuck), linear = switching_pairs(state), joint.model.linear[0]
+    switching, stuck = switching_pairs(state)
     dofs, moves = joint.contact.dofs, moving(joint, stuck)
-    mass, damping, stiffness = (
-        np.ascontiguousarray(np.real(part)[np.ix_(moves, moves)])
-        for part in (linear.mass, linear.damping, linear.stiffness)
-    )
+    mass, damping, stiffness = _of_sectors(joint.model, moves, n_sectors)
     inertia, drag = mass / fine.law.sample_step**2, damping / fine.law.sample_step
     compliance = np.asarray(np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness), np.float64)
     # displacements of the switching pairs among those that move, -1 for none
-    place = np.where(dofs[switching] >= 0, (np.cumsum(moves) - 1)[dofs[switching]], -1).reshape(-1, 1, 3)
-    there, rows, n = place.ravel() >= 0, place.ravel(), len(mass)
+    n, first = len(mass), np.count_nonzero(moves) * np.arange(n_sectors)[:, None, None]
+    place = np.where(dofs[switching] >= 0, first + (np.cumsum(moves) - 1)[dofs[switching]], -1).reshape(-1, 1, 3)
+    there, rows = place.ravel() >= 0, place.ravel()
     spread = np.where(there, compliance[rows].T, 0.0)
-    law = sampled_law(fine.law, state, np.flatnonzero(switching))
+    # each sector goes through its own part of the period
+    law = SampledLaw(
+        *(
+            part.reshape(n_sectors, steps, -1, 3, 3).swapaxes(0, 1).reshape(steps, -1, 3, 3)
+            for part in vars(sampled_law(fine.law, state, np.flatnonzero(switching))).values()
+        )
+    )
     parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)
     return Monodromy(
         response=-compliance @ np.hstack([inertia, drag]),
@@ -111,7 +127,21 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int) -> Monodromy:
         inverse=_inverse_of_law(law, np.where(there[:, None], spread[rows], 0.0)),
         past=np.concatenate(parts, axis=3),
         places=np.where(place < 0, 4 * n, place + n * np.arange(4)[:, None]).ravel(),
+        turn=np.roll(np.arange(4 * n).reshape(4, n_sectors, -1), 1, axis=1).ravel(),
+        n_sectors=n_sectors,
     )
+
+
+def _of_sectors(model: ReducedModel, moves: BoolArray, n_sectors: int) -> Iterator[FloatArray]:
+    """Mass, damping, stiffness (m k, m k) of m sectors at equal distances in phase, in k displacements that move."""
+    places = np.arange(n_sectors)
+    harmonics = (places + n_sectors // 2) % n_sectors - n_sectors // 2
+    waves = np.exp(2j * np.pi / n_sectors * np.outer(harmonics, places)) / np.sqrt(n_sectors)
+    structures = [model.harmonic_structure(harmonic) for harmonic in harmonics.tolist()]
+    for name in ("mass", "damping", "stiffness"):
+        each = (getattr(linear, name)[np.ix_(moves, moves)] for linear in structures)
+        whole = sum(np.kron(np.outer(wave, wave.conj()), part) for wave, part in zip(waves, each, strict=True))
+        yield np.ascontiguousarray(np.real(whole))
 
 
 def _inverse_of_law(law: SampledLaw, flexibility: FloatArray) -> FloatArray:

@@ -13,12 +13,17 @@ The multipliers of reported states come from the first method that serves:
 1. the exponents of the linear structure, where no pair slips, opens or closes;
 2. the exponents of Hill's equation, for a small joint that opens and closes;
 3. time integration, with all multipliers of a small joint and the largest ones of a large joint.
+
+Disturbances of a travelling wave are those of m sectors (`disturbances`): all of a ring, where they are few or small,
+otherwise those of the nodal diameters 0 and d. Other waves beside the excited one are not tested.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -58,7 +63,7 @@ OTHER_BRANCH = 0.05
 harmonics change means and first harmonics by up to 3 %."""
 
 MOST_ROWS = 600
-"""Largest number of displacements of switching pairs: 200 such pairs take 0.4 GB and 10 s."""
+"""Largest number of displacements of switching pairs in all sectors: 200 pairs take 0.4 GB and 10 s."""
 
 SMALLEST_GROWTH = 1e-3
 """Growth in a period, beyond 1, that counts, and residual below which a multiplier has converged."""
@@ -74,39 +79,43 @@ in each period, or one with a second frequency."""
 class Multipliers:
     """Multipliers of a state, largest modulus first; of a large joint the largest ones only; none where not computed.
 
-    error: estimated error of the first value by the time steps.
+    error: estimated error of the first value by the time steps. unknown: why its side of 1 may not be known.
     """
 
     values: ComplexArray
     error: float
+    unknown: str = "the growth of a small disturbance is not known well enough"
 
     def stability(self, odd: bool) -> Stability:
         """Kind of stability; odd: whether Hill's determinant shows an odd number of real multipliers beyond +1."""
         if odd:
             return "fold"
-        if not self.values.size:
-            return "unknown"
-        if abs(self.values[0]) - 1.0 <= max(self.error, SMALLEST_GROWTH):
+        growth = abs(self.values[0]) - 1.0 if self.values.size else np.inf
+        if growth <= SMALLEST_GROWTH:
             return "stable"
+        if not self.values.size or growth <= 2.0 * self.error:
+            return "unknown"
         if self.values[0].imag != 0.0:
             return "Neimark-Sacker"
         return "fold" if self.values[0].real > 0.0 else "period doubling"
 
 
 def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, with_switching: bool = True) -> Failure | None:
-    """Why a state is unstable at a fixed wear depth; None where it is stable, or where stability is not known.
+    """Why a state is unstable at a fixed wear depth, or INACCURATE where that is not known; None where it is stable.
 
     with_switching: False, within a wear history, leaves out joints that switch, but for small ones that open and close.
     Raises OutOfTimeError.
     """
     switches = bool(switching_pairs(at)[0].any())
     left_out = switches and not with_switching and not _bounces(joint, at)
-    if left_out or (not switches and _is_passive(joint.model.harmonic_structure(1))):
+    if left_out or (not switches and all(map(_is_passive, _structures(joint, at)))):
         return None
     found = find_multipliers(case, joint, at, run, growing_only=True)
     kind = found.stability(odd=False)
-    if kind in ("stable", "unknown"):
+    if kind == "stable":
         return None
+    if kind == "unknown":
+        return Failure(Outcome.INACCURATE, f"whether the vibration is stable is not known: {found.unknown}")
     said = f"a small disturbance grows by the factor {abs(found.values[0]):.3g} in each period of the excitation"
     if not switches:
         said = f"{said}, in the linear structure alone"
@@ -120,41 +129,63 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, with_sw
 def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, *, growing_only: bool = False) -> Multipliers:
     """Multipliers of a state at a fixed wear depth; none where they are not known:
 
-    - in a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
     - for a joint with more than `MOST_ROWS` displacements of switching pairs;
-    - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
+    - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch;
+    - where Arnoldi's method does not converge.
 
     growing_only: without the error of multipliers that do not grow. Raises OutOfTimeError.
     """
-    switching, stuck = switching_pairs(at)
+    (switching, stuck), nothing = switching_pairs(at), np.empty(0, np.complex128)
     if not switching.any():
-        exponents = linear_exponents(joint.model.harmonic_structure(1), moving(joint, stuck))
+        exponents = np.concatenate([linear_exponents(each, moving(joint, stuck)) for each in _structures(joint, at)])
         return Multipliers(_sorted(np.exp(exponents * 2.0 * np.pi / joint.omega)), 0.0)
-    travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
-    bounces = _bounces(joint, at)
-    if not travels and 3 * np.count_nonzero(switching) <= MOST_ROWS:
-        sharp = _sharper(case, joint, at, run) if bounces else (joint, at)
-        if sharp is not None and bounces and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
-            return Multipliers(_sorted(values), 0.0)
-        if sharp is not None:
-            return _integrated(*sharp, case.settings.rtol, growing_only)
-    return Multipliers(np.empty(0, np.complex128), np.inf)
+    n_sectors = _sectors(joint, at)
+    most = MOST_ROWS // (3 * n_sectors)
+    if np.count_nonzero(switching) > most:
+        return Multipliers(nothing, np.inf, f"more than {most} pairs slip or open in a part of the period")
+    if not _bounces(joint, at):
+        return _integrated(joint, at, case.settings.rtol, growing_only)
+    sharp = _sharper(case, joint, at, run)
+    if sharp is None:
+        return Multipliers(nothing, np.inf, f"no vibration with {OPENING_HARMONICS} harmonics is found near")
+    if n_sectors == 1 and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
+        return Multipliers(_sorted(values), 0.0)
+    return _integrated(*sharp, case.settings.rtol, growing_only)
 
 
-def _is_small(joint: Joint, at: Evaluation) -> bool:
-    return int(moving(joint, switching_pairs(at)[1]).sum()) <= SMALL_JOINT
+def _moving(joint: Joint, at: Evaluation) -> int:
+    """Number of displacements of a sector that move."""
+    return int(np.count_nonzero(moving(joint, switching_pairs(at)[1])))
+
+
+def _sectors(joint: Joint, at: Evaluation) -> int:
+    """Sectors of a travelling wave in which disturbances are integrated; 1 for other structures."""
+    model = joint.model
+    if not model.nodal_diameter:
+        return 1
+    apart = model.n_sectors // math.gcd(model.n_sectors, model.nodal_diameter)
+    most = min(max(SMALL_JOINT // max(_moving(joint, at), 1), 3), 2 * joint.basis.orders[-1] + 1)
+    # an odd number, as the harmonics of a disturbance come in pairs
+    return min(apart, most - 1 + most % 2)
+
+
+def _structures(joint: Joint, at: Evaluation) -> list[LinearModel]:
+    """The structures in which disturbances move."""
+    return [joint.model.harmonic_structure(harmonic) for harmonic in range(_sectors(joint, at) // 2 + 1)]
 
 
 def _bounces(joint: Joint, at: Evaluation) -> bool:
     """Whether a joint is small, and a pair is open in a part of the period."""
     opens = at.status_t == SEPARATED
-    return bool((opens.any(axis=1) & ~opens.all(axis=1)).any()) and _is_small(joint, at)
+    return bool((opens.any(axis=1) & ~opens.all(axis=1)).any()) and _moving(joint, at) <= SMALL_JOINT
 
 
 def _sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint, Evaluation] | None:
     """The state with at least `OPENING_HARMONICS`; None where no such state is found on the same branch."""
     if case.resolution.highest >= OPENING_HARMONICS:
         return joint, at
+    if not joint.model.has_harmonics(OPENING_HARMONICS):
+        return None
     samples = max(case.resolution.samples, samples_for(OPENING_HARMONICS))
     sharp = case.at(Resolution(all_orders(OPENING_HARMONICS), samples))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
@@ -177,52 +208,60 @@ def _sorted(values: ComplexArray) -> ComplexArray:
 
 def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -> Multipliers:
     """Multipliers by integration in time; samples are doubled until the first one is known, or its side of 1."""
-    small, error = _is_small(joint, at), np.inf
-    n_samples, values = _samples(joint, at, small) // (1 if growing_only else 2), np.empty(0, np.complex128)
-    while n_samples <= 8 * SMALL_SAMPLES:
-        coarse, values = values[:1], _sorted(multipliers_of(build_monodromy(joint, at, n_samples), small))
+    n_sectors, error, sizes = _sectors(joint, at), np.inf, list[float]()
+    every = n_sectors * _moving(joint, at) <= SMALL_JOINT
+    n_samples = _samples(joint, at) // (1 if growing_only else 2)
+    most = 8 * (n_samples if every else min(n_samples, SMALL_SAMPLES))
+    while True:
+        values = _sorted(multipliers_of(build_monodromy(joint, at, n_samples, n_sectors), every))
         if not values.size:
             return Multipliers(values, np.inf)
         # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
         largest = float(abs(values[0]))
-        error = abs(largest - float(abs(coarse[0]))) if coarse.size else np.inf
-        if error <= rtol or abs(largest - 1.0) > 2.0 * error or (growing_only and largest <= 1.0 + SMALLEST_GROWTH):
-            break
+        sizes, grows = [*sizes[-2:], largest], largest > 1.0 + SMALLEST_GROWTH
+        error = float(np.ptp(sizes)) if len(sizes) > 1 else np.inf
+        known = abs(largest - 1.0) > 2.0 * error or (error <= rtol and not grows)
+        # where all pairs slip and open, values scatter, and two of them may agree by chance
+        enough = known and len(sizes) > (2 if grows else 1)
+        if enough or (growing_only and not grows and len(sizes) == 1) or 2 * n_samples > most:
+            return Multipliers(values, error)
         n_samples *= 2
-    return Multipliers(values, error)
 
 
-def _samples(joint: Joint, at: Evaluation, small: bool) -> int:
+def _samples(joint: Joint, at: Evaluation) -> int:
     """Samples of a period: up to eight times as many for vibrations that grow in the structure alone."""
-    (switching, stuck), linear, fastest = switching_pairs(at), joint.model.linear[0], 0.0
-    for pairs in () if _is_passive(linear) else (stuck, stuck | switching):
+    (switching, stuck), fastest = switching_pairs(at), 0.0
+    driven = [linear for linear in _structures(joint, at) if not _is_passive(linear)]
+    for linear, pairs in product(driven, (stuck, stuck | switching)):
         found = linear_exponents(linear, moving(joint, pairs))
         # round-off of a fast vibration is no growth
         grows = found.real > found.size * _EPS * np.abs(found).max(initial=0.0)
         fastest = max(fastest, float(np.abs(found.imag[grows]).max(initial=0.0)))
     wanted = 2 ** int(np.ceil(np.log2(max(SAMPLES_A_VIBRATION * fastest / joint.omega, 1.0))))
-    return int(np.clip(wanted, SMALL_SAMPLES if small else SMALL_SAMPLES // 4, 8 * SMALL_SAMPLES))
+    fewest = SMALL_SAMPLES if _moving(joint, at) <= SMALL_JOINT else SMALL_SAMPLES // 4
+    return int(np.clip(wanted, fewest, 8 * SMALL_SAMPLES))
 
 
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
-    """All multipliers, or the largest ones, as far as Arnoldi's method has converged."""
-    size = 4 * len(monodromy.response)
+    """All multipliers, or the largest ones; none where the largest one has not converged by Arnoldi's method."""
+    size, m = 4 * len(monodromy.response), monodromy.n_sectors
     if every:
-        return np.asarray(np.linalg.eigvals(pass_period(monodromy, np.eye(size))), np.complex128)
+        return np.asarray(np.linalg.eigvals(pass_period(monodromy, np.eye(size))), np.complex128) ** m
 
-    def product(vector: FloatArray) -> FloatArray:
+    def passed(vector: FloatArray) -> FloatArray:
         return pass_period(monodromy, vector[:, None])[:, 0]
 
     def settled(values: ComplexArray, residuals: FloatArray) -> bool:
-        return bool(residuals[np.argmax(np.abs(values))] < SMALLEST_GROWTH)
+        return bool(m * residuals[np.argmax(np.abs(values))] < SMALLEST_GROWTH)
 
     # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=size)
-    values, residuals = ritz_values(product, start, MOST_PRODUCTS, settled)
-    return values[residuals < SMALLEST_GROWTH]
+    values, residuals = ritz_values(passed, start, m * MOST_PRODUCTS, settled)
+    known = m * residuals < SMALLEST_GROWTH
+    return (values[known] if settled(values, residuals) else values[:0]) ** m
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def _is_passive(linear: LinearModel) -> bool:
     """Whether mass, damping and stiffness are positive semidefinite: such a structure only loses energy."""
     parts = linear.mass, linear.damping, linear.stiffness

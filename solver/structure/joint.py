@@ -19,7 +19,10 @@ from solver.structure.penalty import Penalty, build_penalty
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint at one frequency omega, rad/s, and excitation amplitude, N. friction_coefficient: (n_contact,)."""
+    """A joint at one frequency omega, rad/s, and excitation amplitude, N. friction_coefficient: (n_contact,).
+
+    structure: with the spring of the hold, if there is one (`held`).
+    """
 
     model: ReducedModel
     omega: float
@@ -28,6 +31,7 @@ class Joint:
     structure: CondensedStructure
     basis: FourierBasis
     penalty: Penalty
+    hold: Hold | None = None
 
     @property
     def contact(self) -> ContactInterface:
@@ -88,6 +92,16 @@ class Hold:
         return self.stiffness * (float(self.direction @ motion) - self.position)
 
 
+def held(structure: CondensedStructure, hold: Hold | None) -> CondensedStructure:
+    """A condensed structure with the spring of a hold, if there is one, on its mean position."""
+    if hold is None:
+        return structure
+    force_h = structure.force_h.copy()
+    force_h[:, 0] += hold.stiffness * hold.position * hold.direction
+    spring = hold.stiffness * np.outer(hold.direction, hold.direction)
+    return replace(structure, static_stiffness=structure.static_stiffness + spring, force_h=force_h)
+
+
 @dataclass(frozen=True)
 class Case:
     """What all states of one computation share. friction_coefficient: (n_contact,).
@@ -109,15 +123,10 @@ class Case:
 
         Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular at a harmonic.
         """
-        hold, (orders, samples) = self.hold, (self.resolution.orders, self.resolution.samples)
-        structure = build_structure(self.model, omega, excitation_amplitude, orders)
-        if hold is not None:
-            spring = hold.stiffness * np.outer(hold.direction, hold.direction)
-            force_h = structure.force_h.copy()
-            force_h[:, 0] += hold.stiffness * hold.position * hold.direction
-            structure = replace(structure, static_stiffness=structure.static_stiffness + spring, force_h=force_h)
-        friction, basis = self.friction_coefficient, build_basis(orders, samples)
-        return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, self.penalty)
+        orders = self.resolution.orders
+        structure = held(build_structure(self.model, omega, excitation_amplitude, orders), self.hold)
+        friction, basis = self.friction_coefficient, build_basis(orders, self.resolution.samples)
+        return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, self.penalty, self.hold)
 
     def at(self, resolution: Resolution) -> Case:
         """The case with another resolution, and the penalty for its harmonics."""

@@ -56,7 +56,8 @@ def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
     if state.hold is not None and creeps(joint, state.hold, state.at):
         return Failure(Outcome.ADRIFT)
     if vibrates_otherwise(state):
-        if (unstable := find_instability(case, joint, state.at, wearing.run, False)) is not None:
+        unstable = find_instability(case, joint, state.at, wearing.run, False)
+        if unstable is not None and not unstable.outcome.complete:
             return unstable
         state = replace(state, judged_h=state.at.predicted_h)
     report = report_state(joint, state.at, certificate, wearing.request.loops, with_resonance=wearing.shifts)
@@ -121,14 +122,17 @@ def vibrates_otherwise(state: WearState) -> bool:
 
 
 def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
-    """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
+    """Instability of the last state of a history, None if stable; INACCURATE where its stability, or that of the start
+    state, which the sweep has judged already, is not known.
+    """
+    unknown = Failure(Outcome.INACCURATE, wearing.start.message) if wearing.start.message else None
     if state.cycle == 0.0 and wearing.follow is None and not vibrates_otherwise(state):
-        return None
+        return unknown
     case, joint = wearing.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, state.at) is None and not wearing.run.is_stable_finely(wearing.joint_of(state), state.at):
+    if free_slide(joint, state.at) is None and not wearing.run.is_stable(wearing.joint_of(state), state.at):
         return Failure(Outcome.UNSTABLE)
-    return find_instability(case, joint, state.at, wearing.run, True)
+    return find_instability(case, joint, state.at, wearing.run, True) or unknown
 
 
 def is_final(state: WearState, final_share: float) -> bool:

@@ -13,7 +13,6 @@ import numpy as np
 from solver.accuracy.certificate import NOT_CERTIFIED
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
-from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import StartState, WearHistory, first_cut_off, judge, last_error
 from solver.results.state_report import LOOP_PHASES
@@ -54,7 +53,8 @@ def integrate_together(
         else:
             solution = _solve(integrator, case, start, request)
         history = _assembled(model, start, request, solution)
-        if history.outcome is Outcome.CONVERGED:
+        if history.outcome.complete:
+            history = replace(history, unjudged=history.message)
             rows = np.flatnonzero(np.isfinite(history.worn_volume))
             outcome, message = judge(history, rows, settings.rtol)
             history = replace(history, outcome=outcome, message=message)

@@ -192,7 +192,7 @@ class WearProblem(WearingJoint):
         end = attempt_step(self, state, length, scheme, self.parts)
         if end is None or self.follow is not None or (scheme == "adaptive" and not vibrates_otherwise(end)):
             return end
-        return end if self.run.is_stable_finely(self.joint_of(end), end.at) else None
+        return end if self.run.is_stable(self.joint_of(end), end.at) else None
 
     def ratio(self, state: WearState, end: WearState, length: float) -> float:
         """As in SteppedProblem: an Euler step counts whatever its error, the shortest adaptive step where the vibration

@@ -8,6 +8,7 @@ import pytest
 
 from solver import build_model
 from solver.contact.coulomb import SLIP, STICK
+from solver.continuation.transient import Transient
 from solver.harmonic_balance.dlft import Balance
 from solver.histories import march_wear as march_model
 from solver.outcome import Outcome
@@ -112,13 +113,18 @@ def test_a_hold_moves_no_state_and_takes_up_what_drives_it():
     hold = free_slide(joint, at)
     axial = hold.direction.reshape(-1, 3)
     np.testing.assert_allclose(np.abs(axial[:, 1]), 0.25, rtol=1e-6)
-    held = replace(case, hold=hold).joint(joint.omega, joint.excitation_amplitude).structure
+    sprung = replace(case, hold=hold).joint(joint.omega, joint.excitation_amplitude)
+    held, transient = sprung.structure, Transient(sprung)
     motion = joint.to_relative(at.displacement_h)
     elastic = at.residual - joint.to_relative(at.force_h)
     np.testing.assert_allclose(held.apply(motion) - held.force_h, elastic, atol=1e-6)
     before = joint.structure.static_stiffness @ hold.direction
     after = held.static_stiffness @ hold.direction
     np.testing.assert_allclose(after - before, hold.stiffness * hold.direction, atol=1e-3)
+    # an infinite step in time ends in the same balance
+    relaxed = transient.step(transient.periodic(at), 0.0).structure
+    np.testing.assert_allclose(relaxed.static_stiffness, held.static_stiffness, rtol=1e-12)
+    np.testing.assert_allclose(relaxed.force_h, held.force_h, rtol=1e-12, atol=1e-12)
     assert not creeps(joint, hold, at)
     # 100 N on each of 16 pairs, friction 0.3: 1e-5 of it is 4.8e-3 N
     assert not creeps(joint, replace(hold, position=hold.position + 4.7e-3 / hold.stiffness), at)

@@ -8,17 +8,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver import build_model, frequency_response
+from solver import march_wear as worn_model
+from solver.continuation.first_state import solve_first_state, state_at_rest
+from solver.continuation.transient import relax_to_periodic
+from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State
 from solver.loading_history import start_states
 from solver.loading_history.start_states import follow_branch
+from solver.newton.linear_solver import JacobianSolver
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
+from solver.stability import floquet
 from solver.stability.disturbances import build_monodromy, switching_pairs
 from solver.stability.floquet import find_instability, multipliers_of
+from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import build_case
+from solver.structure.penalty import Penalty
+from tests.rings import ring_of_sectors
 from tests.solver.exact_scenes import drawn
-from tests.solver.models import march_wear, random_balance, random_model
+from tests.solver.models import cyclic_model, march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
 
 SETTINGS = SolverSettings()
@@ -111,6 +122,70 @@ def test_the_largest_multiplier_by_products_is_that_of_all():
     monodromy = build_monodromy(balance.joint, at, 64)
     every, some = multipliers_of(monodromy, every=True), multipliers_of(monodromy, every=False)
     assert np.abs(some).max() == pytest.approx(np.abs(every).max(), rel=1e-3)
+
+
+@pytest.mark.parametrize(("n_sectors", "diameter", "apart"), [(5, 2, 5), (6, 2, 3)])
+def test_disturbances_of_a_wave_are_those_of_its_ring(n_sectors, diameter, apart):
+    model = cyclic_model(3, ("3d", "one_tangent"), n_sectors, diameter, apart)
+    balance, predicted = random_balance(model, SolverSettings(3, 24), 4, wear=False)
+    joint, at = balance.joint, balance.evaluate(predicted)
+    assert switching_pairs(at)[0].any()
+    settings = SolverSettings(3, 24)
+    case = build_case(ring_of_sectors(model), 0.4, joint.omega, settings)
+    case = replace(case, penalty=Penalty(*(np.tile(each, apart) for each in vars(joint.penalty).values())))
+    turns = np.exp(2j * np.pi * diameter / n_sectors * np.outer(np.arange(apart), joint.basis.orders))
+    moved = np.concatenate([from_complex(predicted[:, 0], to_complex(predicted) * turn) for turn in turns])
+    depth, ring = np.tile(balance.wear_depth, apart), case.joint(joint.omega, 60.0)
+    whole = Balance(ring, np.tile(balance.history, (apart, 1)), depth).evaluate(moved)
+    found, exact = (
+        np.sort(np.abs(multipliers_of(build_monodromy(*of, 24 * apart, m), every=True)))[::-1][:8]
+        for *of, m in ((joint, at, apart), (ring, whole, 1))
+    )
+    np.testing.assert_allclose(found, exact, rtol=1e-6)
+
+
+def two_masses_apart(damping, diameter):
+    """Two masses in each of 24 sectors that nothing couples; damping: to the ground, N s/m."""
+    mass, stiffness = np.diag([5.0, 0.05]), np.array([[2e5, -1e5], [-1e5, 1e5]])
+    drag = np.array([[damping + 5.0, -5.0], [-5.0, 5.0]])
+    more = {"load_harmonic": [1.0, 0.0], "normal_load": 50.0, "n_sectors": 24, "nodal_diameter": diameter}
+    parts = (dict.fromkeys(range(13), part) for part in (mass, drag, stiffness))
+    return build_model(*parts, [[-1, 1, -1]], 1e-4, **more)
+
+
+@pytest.mark.parametrize("damping", [-60.0, -150.0])
+def test_a_wave_of_uncoupled_sectors_is_as_stable_as_one_sector(damping):
+    one, wave = (
+        frequency_response(two_masses_apart(damping, diameter), [22.0], 200.0, 0.5, settings=SolverSettings(5, 64))
+        for diameter in (0, 3)
+    )
+    assert one.outcome == wave.outcome == (Outcome.UNSTABLE,)
+    assert one.message[0].split(" and ")[0] == wave.message[0].split(" and ")[0]
+
+
+def test_a_stability_that_is_not_known_is_said(monkeypatch):
+    monkeypatch.setattr(floquet, "MOST_ROWS", 2)
+    model = bundled("two_masses")
+    settings = SolverSettings(5, 64)
+    found = frequency_response(model, [0.05], 20.0, 0.5, settings=settings)
+    history = worn_model(model, 0.05, 20.0, 0.5, 1e-12, [0.0, 1.0], settings=settings)
+    for outcome, message in ((found.outcome[0], found.message[0]), (history.outcome, history.message)):
+        assert outcome is Outcome.INACCURATE
+        assert "whether the vibration is stable is not known: more than 0 pairs slip" in message
+    assert np.isfinite(history.worn_volume).all()
+
+
+def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
+    def sign(_, tangent):
+        return 1.0 if tangent.joint.basis.n_samples > 512 else -1.0
+
+    monkeypatch.setattr(JacobianSolver, "determinant_sign", sign)
+    model, settings = bundled("vibro_impact"), SolverSettings(5, 64)
+    case = build_case(model, 0.0, 1.2, settings)
+    first = solve_first_state(case, 1.2, 0.02, Run(settings.tolerance))
+    assert isinstance(first, State)
+    rest, joint = state_at_rest(case, 1.2, Run(settings.tolerance)), case.joint(1.2, 0.02)
+    assert isinstance(relax_to_periodic(joint, np.zeros(1), rest, case.joint(1.2, 0.0), Run(settings.tolerance)), State)
 
 
 def test_the_march_is_of_second_order_for_the_structure_alone():
