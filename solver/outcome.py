@@ -109,6 +109,21 @@ _SENTENCES = {
 }
 
 
+class Ended:
+    """What holds how a computation ended: any end but that of a result has a sentence.
+
+    Raises ValueError where it has none, which is a mistake of the program.
+    """
+
+    outcome: Outcome
+    message: str
+
+    def __post_init__(self) -> None:
+        """Check the sentence."""
+        if self.outcome is not Outcome.CONVERGED and not self.message:
+            raise ValueError(f"{self.outcome.meaning} without a sentence about the reason")
+
+
 def known_to(error: float, rtol: float) -> str:
     """Text of a relative error above `rtol`, as "is known to 2.6 % only", with enough digits to show the excess."""
     if math.isinf(error):
@@ -117,13 +132,21 @@ def known_to(error: float, rtol: float) -> str:
     return f"is known to {short if float(short) > 100.0 * rtol else f'{100.0 * error:.6g}'} % only"
 
 
+def describe_inaccurate(response_error: float, wear_rate_error: float, rtol: float) -> str:
+    """Sentence about the larger one of two relative errors of a state, which is above `rtol`."""
+    error, name = max((wear_rate_error, "wear rate"), (response_error, "response"))
+    return f"the {name} {known_to(error, rtol)}"
+
+
 def in_digits(value: float, digits: int = 6) -> str:
     """Text of a number with so many significant digits, without an exponent below 1e15: 2000 for "2e+03"."""
     return f"{float(f'{value:.{digits}g}'):.15g}"
 
 
 def describe_error(error: Exception) -> str:
-    """Text of an unexpected error with file and line of its origin, in one line for the result file."""
-    last = traceback.extract_tb(error.__traceback__)[-1:]
-    place = "".join(f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last)
+    """Text of an unexpected error in one line for the result file, with function, file and line where it was called."""
+    frames = traceback.extract_tb(error.__traceback__)
+    # libraries say what they were given, not what for
+    own = [frame for frame in frames if not {"numpy", "scipy", "numba"} & {*Path(frame.filename).parts}] or frames
+    place = "".join(f" ({each.name}, {Path(each.filename).name}, line {each.lineno})" for each in own[-1:])
     return " ".join(f"{type(error).__name__}: {error}{place}".split())

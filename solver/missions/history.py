@@ -70,7 +70,7 @@ class MissionProblem:
         self.last = mission.missions[-1] if history is None else int(history.course.ends[-1])
         # the sweep with which each block began last, and why a step was not found
         self._sweeps: list[EarlierSweep | None] = []
-        self._failure = Failure(Outcome.MARCH_FAILED)
+        self._failure = Failure(Outcome.MARCH_FAILED, "the error of a step over one mission is too large")
 
     def advance(self, state: MissionState | None, course: Course) -> Here | Failure | None:
         """As in SlowProblem."""

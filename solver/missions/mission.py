@@ -7,7 +7,7 @@ from typing import Literal
 
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ComplexArray, FloatArray, ReducedModel
-from solver.outcome import Outcome
+from solver.outcome import Ended, Outcome
 from solver.presentation import Presented
 from solver.settings import Direction, Passage, SolverSettings, WearTarget
 
@@ -80,7 +80,7 @@ class MissionRequest:
 
 
 @dataclass(frozen=True, repr=False)
-class MissionHistory(Presented):
+class MissionHistory(Ended, Presented):
     """A joint over its missions, at `n_output` numbers of missions. Values not reached are NaN, all errors estimated.
 
     - missions (n_output,); worn_volume (n_output,), m3, wear_depth (n_output, n_contact), m.

@@ -36,6 +36,7 @@ from solver.harmonic_balance.state import Failure, first_response, largest_respo
 from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
+from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
@@ -229,7 +230,7 @@ def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | 
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() > given.deadline:
-            return Failure(Outcome.TIME_LIMIT)
+            raise OutOfTimeError
         wearing, state = given.wearing_joint(start)
         joint, frequency = wearing.joint_of(state), float(frequencies[index])
         density = state.rate * frequency / given.passage.rate

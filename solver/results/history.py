@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray
-from solver.outcome import SENSITIVE_ERROR, Outcome, in_digits, known_to
+from solver.outcome import SENSITIVE_ERROR, Ended, Outcome, in_digits, known_to
 from solver.packing import packable
 from solver.presentation import Presented
 from solver.settings import NEGLIGIBLE, Resolution
@@ -39,7 +39,7 @@ class PeriodicState:
 
 @packable
 @dataclass(frozen=True)
-class StartState:
+class StartState(Ended):
     """Unworn state of one frequency of a sweep, or the reason why there is none.
 
     outcome: whether the state is a result. state: None where there is none.
@@ -50,7 +50,7 @@ class StartState:
     run_time: CPU seconds of the computing thread since the last frequency.
     branch, fold_frequency: number of folds that the sweep has jumped over, 0 on its first branch, and frequency of the
         last one, Hz; NaN if none, and for a ramp, whose folds are load factors.
-    message: sentence of an unexpected error (`Outcome.EXCEPTION`), or how far a sweep came.
+    message: why there is no state, or what is above rtol; or how far a sweep came.
     reference: state of the reference sweep, solved with the resolution of the state; None where there is none.
     """
 
@@ -69,7 +69,7 @@ class StartState:
 
 
 @dataclass(frozen=True, repr=False)
-class WearHistory(Presented):
+class WearHistory(Ended, Presented):
     """A point of a study on the slow time scale, at `n_output` cycle counts; not reached: NaN, whole numbers 0.
 
     - cycles (n_output,); worn_volume, m3, wear_rate, m3 per cycle; wear_depth (n_output, n_contact), m.

@@ -47,7 +47,8 @@ def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
             return chosen
         state, certificate = chosen, _certificate(wearing, chosen)
     if certificate is None:
-        return Failure(Outcome.CERTIFICATE_FAILED)
+        said = certify(wearing.joint_of(state), state.at).sentence(wearing.case.settings.tolerance)
+        return Failure(Outcome.CERTIFICATE_FAILED, f"at cycle {in_digits(state.cycle)}: {said}")
     # NaN for given harmonics and samples, where no state with others was found for a comparison
     unknown = np.isnan(state.estimate.largest)
     if unknown or not state.accurate:
@@ -57,7 +58,8 @@ def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
     case, joint = wearing.case_and_joint(state)
     if state.hold is not None and creeps(joint, state.hold, state.at):
-        return Failure(Outcome.ADRIFT)
+        said = "the friction on all pairs does not balance their mean force"
+        return Failure(Outcome.ADRIFT, f"at cycle {in_digits(state.cycle)} {said}")
     if _vibrates_otherwise(state):
         if (unstable := find_instability(case, joint, state.at, wearing.run, False)) is not None:
             return unstable
@@ -130,7 +132,8 @@ def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
     case, joint = wearing.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, state.at) is None and not wearing.run.is_stable_finely(wearing.joint_of(state), state.at):
-        return Failure(Outcome.UNSTABLE)
+        said = f"at cycle {in_digits(state.cycle)} a small disturbance grows and keeps its sign, as between two folds"
+        return Failure(Outcome.UNSTABLE, said)
     return find_instability(case, joint, state.at, wearing.run, True)
 
 
