@@ -78,8 +78,8 @@ _SENTENCES = {
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided.",
     Outcome.INACCURATE: "The point was computed to the end, but the estimated error of a vibration, a wear rate, a"
     " natural frequency or a damping ratio is above rtol: see the variables of these errors.",
-    Outcome.SENSITIVE: "The point was computed to the end, but its worn volume depends strongly on the step or on the"
-    " start state: two computations of nearly the same case differ by more than half.",
+    Outcome.SENSITIVE: "The point was computed to the end, but its worn volume is not known: two computations of nearly"
+    " the same case, with other steps and another start state, differ by more than half, or one of them ends early.",
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",
     Outcome.UNSTABLE: "Only an unstable periodic vibration was found. A real joint does not stay in it.",
     Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two or more periods of the excitation."

@@ -255,7 +255,7 @@ def _judged(mission: MissionRequest, state: MissionState, history: MissionHistor
     rtol, inaccurate, about_state, about_hold = mission.settings.rtol, np.asarray(state.inaccurate), "", ""
     last = np.flatnonzero(np.isfinite(history.worn_volume))[-1]
     volumes = history.worn_volume[last], history.reference_volume[last]
-    uncertain = describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps")
+    uncertain = describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps", history.reference_end)
     cut_off = describe_cut_off(state.cut_off_from, "mission") if state.cut_off_from < math.inf else ""
     if inaccurate.any():
         name = mission.called(int(inaccurate.argmax()))

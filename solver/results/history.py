@@ -81,7 +81,8 @@ class WearHistory(Ended, Presented):
     - worn_volume_error (n_output,), relative, wear_depth_error (n_output, n_contact), m: estimated errors by steps and
       their propagation, harmonics, samples and start state; 0 where nothing has worn.
     - error_estimate: `worn_volume_error` at the last count that was reached; NaN at 0 where the joint wears.
-    - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end.
+    - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end. reference_end: why it ends early,
+      or of what it is compared with; or "".
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
       certificate of the states, all relative; NaN where not estimated. harmonics_used, samples_used (n_output,): int.
     - last_cycle: count up to which the point was computed; NaN where there is no state.
@@ -139,6 +140,7 @@ class WearHistory(Ended, Presented):
     excitation_frequency: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     excitation_frequency_error: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     reference_volume: FloatArray = field(default_factory=lambda: np.array([math.nan]))
+    reference_end: str = ""
     inaccurate_from: float = math.inf
     inaccurate_in: str = ""
     inaccurate_error: float = 0.0
@@ -157,7 +159,8 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     last = int(rows[-1])
     at, error = history.cycles[last], float(history.worn_volume_error[last])
     volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
-    uncertain = describe_uncertain(*volumes, error, rtol, "with longer steps, fewer harmonics and a coarser sweep")
+    coarser = "with longer steps, fewer harmonics and a coarser sweep"
+    uncertain = describe_uncertain(*volumes, error, rtol, coarser, history.reference_end)
     cut_off = describe_cut_off(history.cut_off_cycle / slower) if at >= history.cut_off_cycle else ""
     inaccurate = held = ""
     # inf means "never", but is the count of a final state, too
@@ -201,12 +204,15 @@ def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: fl
     return float(error[reached[-1]])
 
 
-def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
-    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before."""
+def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str, reason: str) -> str:
+    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`. reason: why that, or what it is
+    compared with, has ended before; "" where it has not.
+    """
+    if math.isinf(error):
+        ends = f"{coarser} the history ends early: {reason}"
+        return f"its error is not known: {ends if reason else 'that of a vibration on the way is not known'}"
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
     volumes, others = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
-    if not math.isfinite(other):
-        return f"{volumes}, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:
         return f"{volumes}, {known}: {others}, but worn at other pairs or counts"
     return f"{volumes}, but {others}: {known}"

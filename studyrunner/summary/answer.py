@@ -39,10 +39,6 @@ _MOST_FAILURES, _MOST_MODES = 2, 4
 _WIDTH, _LONGEST = 12, 240
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
-
-_FAR = 10.0
-"""Errors of more than so many times `rtol` do not fall in proportion to it."""
-
 _AUTOMATIC = 'harmonics and samples of "auto", where numbers are given'
 ADVICE = {
     Outcome.TIME_LIMIT: "--retry-failed continues with a larger solver.time_limit",
@@ -50,11 +46,11 @@ ADVICE = {
     Outcome.START_FAILED: f"Try another axes.sweep, or {_AUTOMATIC}",
     Outcome.BRANCH_LOST: f"Try another axes.sweep, or {_AUTOMATIC}",
     Outcome.UNSTABLE: "Try another axes.sweep",
-    Outcome.MARCH_FAILED: f"Try a smaller solver.rtol or step, or {_AUTOMATIC}",
+    Outcome.MARCH_FAILED: f"Try {_AUTOMATIC}",
     Outcome.STEP_TOO_LONG: 'Try scheme = "adaptive", or a smaller step',
-    Outcome.SENSITIVE: "Try a smaller solver.rtol or step; if that fails, the joint is that sensitive: use [scatter]",
+    Outcome.SENSITIVE: "[scatter] shows how far the worn volume scatters",
     Outcome.INACCURATE: f"Try {_AUTOMATIC}",
-    Outcome.CERTIFICATE_FAILED: f"Try a smaller solver.tolerance, or {_AUTOMATIC}",
+    Outcome.CERTIFICATE_FAILED: f"Try {_AUTOMATIC}",
     Outcome.NO_FINAL_STATE: "Try an end in slow_time.cycles or slow_time.until",
 }
 """What may help, by outcome."""
@@ -150,8 +146,8 @@ def _first_ended(result: Result, number: int) -> tuple[dict[str, int], str]:
     """The first point that ended in this way, and what is to be added to its outcome, which may be nothing."""
     place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
     point = result.point_at(place)
-    if number == Outcome.SENSITIVE:
-        # what its message holds is no result
+    if number == Outcome.SENSITIVE and np.isfinite(result.errors[place]):
+        # the volumes in its message are no results
         return point, ""
     message = str(result.dataset["message"].values[place]) if result.has("message") else ""
     if result.has_values[place] and result.counted[:-1] not in message:
@@ -239,9 +235,11 @@ def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
         point = result.largest(np.where(above if above.any() else known, errors, -1.0))
         worst = float(errors[result.place(point)])
         values |= {"worst": worst, "where": result.describe(point) if result.varying else ""}
-        if above.any():
-            in_volume = of == "worn volume"
-            values["advice"] = _advise_error(result, result.place(point), worst) if in_volume else "a smaller rtol"
+        schemes = result.dataset["scheme"].values if of == "worn volume" and "scheme" in result.axes else OWN_STEPS
+        scheme = str(schemes[point.get("scheme", 0)])
+        if above.any() and math.isfinite(worst) and scheme not in OWN_STEPS:
+            # with which the history is compared, so that its error is smaller
+            values["advice"] = 'scheme = "adaptive"'
     return Finding("certainty", "certainty", _describe_certainty(result.computed.size, values), values)
 
 
@@ -273,18 +271,3 @@ def _errors_of_modes(result: Result) -> NDArray[np.float64]:
             value, error = np.abs(result.dataset[name].values), result.dataset[f"{name}_error"].values
             errors = np.fmax(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
     return errors
-
-
-def _advise_error(result: Result, place: tuple[int, ...], error: float) -> str:
-    """What to set so that the error of a worn volume is smaller. error: relative, above `rtol`."""
-    scheme, rtol = "adaptive", float(result.rtol[place])
-    if "scheme" in result.axes:
-        scheme = str(result.dataset["scheme"].values[place[result.axes.index("scheme")]])
-    if scheme not in OWN_STEPS:
-        by_depth = scheme == "explicit" and "largest_depth" in result.study.get("slow_time", {})
-        return f'scheme = "adaptive" or a smaller {"slow_time.largest_depth" if by_depth else "step"}'
-    if error >= _FAR * rtol:
-        return "a smaller solver.rtol"
-    # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
-    digits, exponent = f"{rtol**2 / error:.12e}".split("e")
-    return f"solver.rtol = {float(f'{digits[:3]}e{exponent}'):g}"

@@ -55,7 +55,7 @@ def _known(value: float, error: float, units: str) -> str:
     if math.isnan(value):
         return "not known"
     text = _show(value, units)
-    if math.isnan(error):
+    if not math.isfinite(error):
         return f"{text} (error not known)"
     return f"{text} ± {show_percent(max(error / value, LEAST_ERROR))}" if value > 0.0 else text
 

@@ -17,7 +17,7 @@ from solver import build_model
 from solver.accuracy.certificate import certify
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import Failure, State
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.newton.run import Run
@@ -102,7 +102,7 @@ def run(case):
 
 
 def judge_start(case, start):
-    assert (start.state is None) == (start.outcome is not Outcome.CONVERGED)
+    assert (start.state is None) == (start.outcome is not Outcome.CONVERGED) == bool(start.message)
     if start.state is None:
         return
     joint = build_case(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
@@ -115,6 +115,7 @@ def judge_history(case, start, history):
     for name in (*numbers, "response", "response_peak"):
         assert np.isfinite(getattr(history, name)[known]).all(), name
         assert np.isnan(getattr(history, name)[~known]).all(), name
+    assert history.message or history.outcome is Outcome.CONVERGED
     if not history.outcome.complete:
         assert start.outcome is Outcome.CONVERGED or history.outcome is start.outcome
         return
@@ -230,6 +231,37 @@ def test_hundreds_of_pairs():
     case = Case(random_model(3, ("constant_load_one_tangent",) * 200), OMEGA, amplitude=20.0, settings=settings)
     history = run_converged(case)
     assert 0 < (history.wear_depth[-1] > 0.0).sum() < 200
+
+
+def without_state():
+    """Outcome and case."""
+    few = SolverSettings(3, 64)
+    yield Outcome.CERTIFICATE_FAILED, Case(scene("vibro_impact", 3), 1.0, amplitude=2e3, settings=few)
+    soft = random_scene(178).model
+    linear = replace(soft.linear[0], stiffness=1e-12 * soft.linear[0].stiffness)
+    yield Outcome.START_FAILED, Case(replace(soft, linear={0: linear}), OMEGA, settings=few)
+    yield Outcome.STATIC_OPEN, block(preload=-100.0, ground=0.0)
+    pushed = block(ground=0.0)
+    linear = replace(pushed.model.linear[0], load_static=np.eye(9)[0] * 100.0 + np.eye(9)[1] * 500.0)
+    yield Outcome.STATIC_SLIDING, replace(pushed, model=replace(pushed.model, linear={0: linear}))
+    yield Outcome.TIME_LIMIT, replace(elastic(), settings=replace(SETTINGS, time_limit=1e-9))
+    yield Outcome.UNSETTLED, replace(block(ground=0.0, lift=0.3), amplitude=1e3, settings=few)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("outcome_and_case", list(without_state()), ids=lambda each: each[0].meaning)
+def test_where_there_is_no_state_a_sentence_says_why(outcome_and_case):
+    outcome, case = outcome_and_case
+    start, history = run(case)
+    assert start.outcome is history.outcome is outcome
+    assert start.message == history.message
+
+
+@pytest.mark.parametrize("outcome", Outcome)
+def test_no_end_can_be_without_a_sentence(outcome):
+    if outcome is not Outcome.CONVERGED:
+        with pytest.raises(ValueError, match=outcome.meaning):
+            Failure(outcome, "")
 
 
 # --- random scenes ---

@@ -13,6 +13,7 @@ from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import FIRST_ITERATIONS, follow_branch
+from solver.newton.run import guarded
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import Resolution, SolverSettings, all_orders
@@ -146,6 +147,20 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
     starts = dict(follow_branch(model, 0.5, 20.0, np.array([frequency]), "up", SolverSettings(3, 64)))
     assert starts[0].outcome is Outcome.SINGULAR
     assert starts[0].state is None
+    assert f"at {frequency:.6g} Hz" in starts[0].message
+
+
+@pytest.mark.parametrize(
+    "fails", [lambda: np.linalg.inv(np.zeros((2, 2))), lambda: np.linalg.eigvals(np.full((2, 2), np.nan))]
+)
+def test_what_else_fails_in_linear_algebra_is_named(fails):
+    def multipliers():
+        return fails()
+
+    found = guarded(multipliers)
+    assert found.outcome is Outcome.EXCEPTION
+    assert found.message.startswith("LinAlgError: ")
+    assert "test_sweep.py" in found.message
 
 
 def test_a_curve_of_a_slider_takes_few_iterations():

@@ -111,7 +111,7 @@ class FakedBlocks:
         rate = rate * (1.0 if case.guide is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
         response = 1e-6 * block.excitation_amplitude * (1.0 + case.depth.sum() + np.array([[0.0], [1.0]]))
         if block.name in self.fails:
-            return Failure(self.fails[block.name])
+            return Failure(self.fails[block.name], "lost")
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
         return BlockResult(
             cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, guide=Guide((), 1.0), iterations=7
