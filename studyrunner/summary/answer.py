@@ -28,12 +28,15 @@ from studyrunner.summary.findings import (
     where_is,
 )
 from studyrunner.system.progress import count
-from studyrunner.units import show_cycles, show_percent, show_rtol
+from studyrunner.units import scale_for, show_cycles, show_percent, show_rtol
 
 MOST_LINES = 9
 
 SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
+
+_LARGEST = 100.0
+"""Size, m, of a model without a mesh: masses on springs that are usual in textbooks move by some 10 m."""
 
 _MOST_FAILURES, _MOST_MODES = 2, 4
 _WIDTH, _LONGEST = 12, 240
@@ -104,9 +107,9 @@ def summarise(result: Result) -> Summary:
             *wear_and_response(result, resonance),
             *filter(None, (shortest_life(result), compare_meshes(result))),
         ]
-        doubts += filter(None, (_not_small(result), _in_radians(result, resonance), _too_few_counts(result)))
+        doubts += [_not_small(result), _too_far(result), _in_radians(result, resonance), _too_few_counts(result)]
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
-    findings += [*_failures(result), *(Finding("doubt", "beware", doubt) for doubt in doubts[:1])]
+    findings += [*(Finding("doubt", "beware", doubt) for doubt in doubts if doubt), *_failures(result)]
     if certainty := certainty_of(result, wore=wore):
         findings.append(certainty)
     return Summary(result.computed.size, int(result.computed.sum()), tuple(findings))
@@ -173,14 +176,34 @@ def _not_small(result: Result) -> str:
         return ""
     pairs = contact_pairs(result, result.shown)
     areas = [float(np.nansum(pairs.area[pairs.surface == surface])) for surface in np.unique(pairs.surface)]
-    width = math.sqrt(min((area for area in areas if area > 0.0), default=math.inf))
-    ratios = np.nan_to_num(np.where(result.computed, result.dataset["largest_wear_depth"].values, 0.0) / width)
+    width = math.sqrt(min((area for area in areas if area > 0.0), default=_size(result) ** 2))
+    ratios = np.nan_to_num(np.where(result.has_values, result.dataset["largest_wear_depth"].values, 0.0) / width)
     if ratios.max() <= SMALL:
         return ""
     return (
         f"the method assumes shallow wear, but the depth is {ratios.max():.2g} of the contact width at"
         f" {where_is(result, result.largest(ratios))}: take fewer cycles, and check that wear_coefficient is in 1/Pa"
     )
+
+
+def _size(result: Result) -> float:
+    """Largest extent of the model along an axis, m; `_LARGEST` where the file has no mesh."""
+    nodes = [result.dataset[name].values for name in ("mesh_x", "mesh_y", "mesh_z") if result.has(name)]
+    return max((float(np.ptp(each)) for each in nodes), default=_LARGEST)
+
+
+def _too_far(result: Result) -> str:
+    """A response that is larger than the model: the displacements of a linear structure have no limit."""
+    if not result.has("response_amplitude"):
+        return ""
+    moved = result.over_points("response_amplitude", lambda values: np.nan_to_num(values).max(axis=-1))
+    moved, size = np.where(result.has_values, moved, 0.0), _size(result)
+    if moved.max() <= size:
+        return ""
+    by, large = (scale_for("m", each).show(each) for each in (float(moved.max()), size))
+    than = f"the {large} of the model" if result.has("mesh_x") else f"{large}: models are smaller"
+    at = where_is(result, result.largest(moved))
+    return f"a response moves by {by} at {at}, more than {than}: check the unit of the excitation, N, and of the model"
 
 
 def _in_radians(result: Result, first: float) -> str:

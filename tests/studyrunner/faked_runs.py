@@ -80,7 +80,7 @@ def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np
         "reference_volume": 1.5 * line,
     }
     totals = {"jump_cycle": np.nan, "error_estimate": 0.0, "newton_iterations": 7, "run_time": 0.5, "branch": 2}
-    totals |= {"last_cycle": float(cycles[-1]), "fold_frequency": 101.5, "step_limit": 250.0}
+    totals |= {"last_cycle": float(cycles[-1]), "fold_frequency": 101.5, "step_limit": 250.0, "message": "lost"}
     at = np.array(cycles)
     return WearHistory(outcome=outcome, cycles=at, loop_displacement=loops, loop_force=-loops, **of_cycles, **totals)
 

@@ -192,14 +192,32 @@ def test_every_point_is_compared_with_its_own_rtol():
     assert (known["n_known"], known["n_less"], known["worst"]) == (1, 1, 5e-3)
     assert math.isnan(known["rtol"])
     assert known["where"] == "rtol 0.001"
-    assert "solver.rtol = 0.0002" in known["advice"]
+    # no smaller rtol was tried
+    assert known["advice"] == ""
     assert summary(wearing(*study, error_estimate=lambda _: 5e-4)).values["certainty"]["n_known"] == 2
 
 
-@pytest.mark.parametrize(("more", "limit"), [((), "step"), (("slow_time.largest_depth=1e-7",), "largest_depth")])
-def test_what_limits_explicit_steps_is_to_be_smaller(more, limit):
-    made = wearing("axes.frequency=1", "axes.scheme=explicit", "axes.step=100", *more, error_estimate=lambda _: 0.1)
-    assert summary(made).values["certainty"]["advice"].endswith(limit)
+@pytest.mark.parametrize(
+    ("scheme", "error", "advice"),
+    [("explicit", 0.1, 'scheme = "adaptive"'), ("explicit", math.inf, ""), ("adaptive", 0.1, "")],
+)
+def test_what_was_not_tried_is_not_advised(scheme, error, advice):
+    """Given steps are compared with the adaptive history, whose error is part of theirs."""
+    found = summary(wearing("axes.frequency=1", f"axes.scheme={scheme}", error_estimate=lambda _: error))
+    assert found.values["certainty"]["advice"] == advice
+    assert "rtol = 0" not in found.lines[-1]
+
+
+@pytest.mark.parametrize(("error", "is_said"), [(math.inf, True), (0.6, False)])
+def test_of_an_error_that_is_not_known_the_reason_is_said(error, is_said):
+    """The volumes in the message of a point whose error is known are no results."""
+    made = wearing(
+        "axes.frequency=1", "axes.scheme=adaptive", outcome=lambda _: SENSITIVE, error_estimate=lambda _: error
+    )
+    made["message"][...] = "the reference solution ends"
+    (uncertain,) = (text for label, text in summary(made).rows if label == "uncertain")
+    assert ("reference solution ends" in uncertain) is is_said
+    assert "inf" not in str(summary(made))
 
 
 def test_points_that_failed_or_were_never_estimated_are_not_known():
@@ -282,6 +300,20 @@ def test_wear_that_is_not_small_is_pointed_out():
         doubts = [each.text for each in summary(made).findings if each.name == "doubt"]
         assert bool(doubts) is not is_small
         assert all("211.25 Hz" in doubt for doubt in doubts)
+
+
+@pytest.mark.parametrize("outcome", [0, FAILED])
+def test_depths_and_motions_that_no_model_has_are_asked_about(outcome):
+    absurd = wearing(
+        "axes.frequency=[1, 2]",
+        largest_wear_depth=lambda _: 4e13,
+        response_amplitude=lambda p: np.full((21, 1), 1e8 * p[0]),
+        outcome=lambda _: outcome,
+    )
+    found = [text for label, text in summary(absurd).rows if label == "beware"]
+    assert "4e+15 of the contact width" in found[0]
+    assert "at 2 Hz" in found[1]
+    assert "more than 100 m: models are smaller" in found[1]
 
 
 @pytest.mark.parametrize(("frequencies", "asked"), [("[150, 160]", True), ("[20, 25]", False), ("[400, 500]", False)])
