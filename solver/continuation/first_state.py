@@ -81,9 +81,7 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
             return raised
         unstable |= arrived
     settled = relax_to_periodic(whole.joint, whole.wear_depth, rest, quiet, run)
-    if unstable and isinstance(settled, Failure):
-        return Failure(Outcome.UNSTABLE, f"with the whole excitation; {settled.message}")
-    return settled
+    return Failure(Outcome.UNSTABLE, settled.message) if unstable and isinstance(settled, Failure) else settled
 
 
 def state_at_rest(case: Case, omega: float, run: Run) -> State | Failure:
@@ -185,6 +183,6 @@ def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Failure:
         return Failure(Outcome.STATIC_FAILED, f"the pairs do not come to rest in {VISCOUS_STEPS} viscous steps")
     # a motion without end
     opened, slid = -moved[:, 0, 0], np.linalg.norm(moved[:, 1:, 0], axis=1)
-    if opened.max() > slid.max():
-        return Failure(Outcome.STATIC_OPEN, f"contact pair {int(opened.argmax())} opens the most")
-    return Failure(Outcome.STATIC_SLIDING, f"contact pair {int(slid.argmax())} slides the most")
+    opens = opened.max() > slid.max()
+    outcome, most = (Outcome.STATIC_OPEN, opened) if opens else (Outcome.STATIC_SLIDING, slid)
+    return Failure(outcome, f"contact pair {int(most.argmax())} moves farthest")

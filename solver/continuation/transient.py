@@ -145,8 +145,7 @@ def relax_to_periodic(
         moved = np.abs(end.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > RUNAWAY * size:
-            drift = f"the mean position of contact pair {int(moved[:, :, 0].max(axis=1).argmax())} runs away"
-            return Failure(Outcome.ADRIFT, f"{at} {drift}")
+            return Failure(Outcome.ADRIFT, f"{at} contact pair {int(moved[:, :, 0].max(axis=1).argmax())} runs away")
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < 0.5 * tried or length >= longest
         if change < RELAXED_CHANGE and renewed:
@@ -164,8 +163,7 @@ def relax_to_periodic(
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(SMOOTH_CHANGE / max(change, 1e-300), 0.5, 2.0))
         length = min(max(length * growth, 1.0), longest)
-    spent = SEARCH_ITERATIONS - left
-    return Failure(Outcome.UNSETTLED, f"{at} it does not repeat after {spent} iterations of settling in time")
+    return Failure(Outcome.UNSETTLED, f"{at} it does not repeat after {SEARCH_ITERATIONS - left} iterations in time")
 
 
 def _change(before: Motion, after: Motion) -> float:

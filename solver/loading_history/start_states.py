@@ -235,8 +235,7 @@ class FrequencySweep:
     def _judged(self, found: ResolvedState, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
         """A state with all its errors, or why it is no result. folds: jumped over behind the last node."""
         joint, at, estimate = found.joint, found.point.evaluation, found.estimate
-        if not found.holds():
-            said = certify(joint, at).sentence(self.settings.tolerance)
+        if said := certify(joint, at).sentence(self.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED, said)
         if unstable := find_instability(found.case, joint, at, self.run, self.with_switching):
             return unstable

@@ -160,10 +160,6 @@ def bordered_step(
 class OutOfTimeError(Exception):
     """A computation has used up its CPU time."""
 
-    def __str__(self) -> str:
-        """The sentence for the user."""
-        return "the CPU time of solver.time_limit is over"
-
 
 @dataclass
 class Budget:
@@ -292,8 +288,8 @@ def guarded(compute: Callable[[], T]) -> T | Failure:
         return compute()
     except SingularStructureError as error:
         return Failure(Outcome.SINGULAR, str(error))
-    except OutOfTimeError as error:
-        return Failure(Outcome.TIME_LIMIT, str(error))
+    except OutOfTimeError:
+        return Failure(Outcome.TIME_LIMIT, "the CPU time of solver.time_limit is over")
     except Exception as error:
         # an error spoils one point only: the study goes on
         return Failure(Outcome.EXCEPTION, describe_error(error))

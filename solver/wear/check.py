@@ -39,15 +39,15 @@ Checked = tuple[WearState, dict[str, Any]]
 
 def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
     """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
-    certificate = None if (anew := needs_new_choice(wearing, state)) else _certificate(wearing, state)
+    settings, certificate = wearing.case.settings, _certificate(wearing, state)
     # more harmonics or samples may suffice
-    if anew or (certificate is None and state.accurate and wearing.case.settings.automatic):
+    more_may_do = certificate.failures(settings.tolerance) and state.accurate and settings.automatic
+    if more_may_do or needs_new_choice(wearing, state):
         chosen = choose_anew(wearing, state)
         if isinstance(chosen, Failure):
             return chosen
         state, certificate = chosen, _certificate(wearing, chosen)
-    if certificate is None:
-        said = certify(wearing.joint_of(state), state.at).sentence(wearing.case.settings.tolerance)
+    if said := certificate.sentence(settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED, f"at cycle {in_digits(state.cycle)}: {said}")
     # NaN for given harmonics and samples, where no state with others was found for a comparison
     unknown = np.isnan(state.estimate.largest)
@@ -68,13 +68,12 @@ def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
     return state, report | {"excitation_frequency_error": wearing.frequency_error(state)}
 
 
-def _certificate(wearing: WearingJoint, state: WearState) -> Certificate | None:
-    """The certificate of a state, with the errors of the last choice of its harmonics; None where it does not hold."""
+def _certificate(wearing: WearingJoint, state: WearState) -> Certificate:
+    """The certificate of a state, with the errors of the last choice of its harmonics."""
     estimate = state.estimate
     wear_rate_error = wearing.wearing_work.amplification(*worn_by(state.at)) * estimate.wear_rate
     certificate = certify(wearing.joint_of(state), state.at)
-    certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
-    return None if certificate.failures(wearing.case.settings.tolerance) else certificate
+    return replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
 
 
 def report_only(wearing: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...]) -> Checked:

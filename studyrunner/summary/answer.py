@@ -46,15 +46,12 @@ _AUTOMATIC = 'harmonics and samples of "auto", where numbers are given'
 ADVICE = {
     Outcome.TIME_LIMIT: "--retry-failed continues with a larger solver.time_limit",
     Outcome.RESONANCE_LOST: "Try another range in loading.between, or another axes.sweep",
-    Outcome.START_FAILED: f"Try another axes.sweep, or {_AUTOMATIC}",
-    Outcome.BRANCH_LOST: f"Try another axes.sweep, or {_AUTOMATIC}",
     Outcome.UNSTABLE: "Try another axes.sweep",
-    Outcome.MARCH_FAILED: f"Try {_AUTOMATIC}",
     Outcome.STEP_TOO_LONG: 'Try scheme = "adaptive", or a smaller step',
     Outcome.SENSITIVE: "[scatter] shows how far the worn volume scatters",
-    Outcome.INACCURATE: f"Try {_AUTOMATIC}",
-    Outcome.CERTIFICATE_FAILED: f"Try {_AUTOMATIC}",
     Outcome.NO_FINAL_STATE: "Try an end in slow_time.cycles or slow_time.until",
+    **dict.fromkeys((Outcome.START_FAILED, Outcome.BRANCH_LOST), f"Try another axes.sweep, or {_AUTOMATIC}"),
+    **dict.fromkeys((Outcome.MARCH_FAILED, Outcome.INACCURATE, Outcome.CERTIFICATE_FAILED), f"Try {_AUTOMATIC}"),
 }
 """What may help, by outcome."""
 
@@ -176,7 +173,7 @@ def _not_small(result: Result) -> str:
         return ""
     pairs = contact_pairs(result, result.shown)
     areas = [float(np.nansum(pairs.area[pairs.surface == surface])) for surface in np.unique(pairs.surface)]
-    width = math.sqrt(min((area for area in areas if area > 0.0), default=_size(result) ** 2))
+    width = math.sqrt(min((area for area in areas if area > 0.0), default=math.inf))
     ratios = np.nan_to_num(np.where(result.has_values, result.dataset["largest_wear_depth"].values, 0.0) / width)
     if ratios.max() <= SMALL:
         return ""
@@ -186,22 +183,17 @@ def _not_small(result: Result) -> str:
     )
 
 
-def _size(result: Result) -> float:
-    """Largest extent of the model along an axis, m; `_LARGEST` where the file has no mesh."""
-    nodes = [result.dataset[name].values for name in ("mesh_x", "mesh_y", "mesh_z") if result.has(name)]
-    return max((float(np.ptp(each)) for each in nodes), default=_LARGEST)
-
-
 def _too_far(result: Result) -> str:
     """A response that is larger than the model: the displacements of a linear structure have no limit."""
     if not result.has("response_amplitude"):
         return ""
     moved = result.over_points("response_amplitude", lambda values: np.nan_to_num(values).max(axis=-1))
-    moved, size = np.where(result.has_values, moved, 0.0), _size(result)
+    moved, mesh = np.where(result.has_values, moved, 0.0), [f"mesh_{axis}" for axis in "xyz" if result.has("mesh_x")]
+    size = max((float(np.ptp(result.dataset[name].values)) for name in mesh), default=_LARGEST)
     if moved.max() <= size:
         return ""
     by, large = (scale_for("m", each).show(each) for each in (float(moved.max()), size))
-    than = f"the {large} of the model" if result.has("mesh_x") else f"{large}: models are smaller"
+    than = f"the {large} of the model" if mesh else f"{large}: models are smaller"
     at = where_is(result, result.largest(moved))
     return f"a response moves by {by} at {at}, more than {than}: check the unit of the excitation, N, and of the model"
 
