@@ -204,7 +204,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
 
 def _last(state: WearState, start: StartState, rtol: float) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
-    at, known = state.at, (state.estimate.response, state.estimate.wear_rate)
+    at, known = state.at, state.estimate
     assert start.state is not None
     here = replace(start.state, displacement_h=at.displacement_h, contact_force_h=at.force_h)
     return replace(
@@ -212,9 +212,9 @@ def _last(state: WearState, start: StartState, rtol: float) -> StartState:
         outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
         state=replace(here, start_history=state.point.history),
         resolution=state.resolution,
-        response_error=known[0],
-        wear_rate_error=known[1],
-        message="" if state.accurate else describe_inaccurate(*known, rtol),
+        response_error=known.response,
+        wear_rate_error=known.wear_rate,
+        message="" if state.accurate else describe_inaccurate(known.response, known.wear_rate, rtol),
         reference=None,
     )
 

@@ -51,7 +51,7 @@ ADVICE = {
     Outcome.SENSITIVE: "[scatter] shows how far the worn volume scatters",
     Outcome.NO_FINAL_STATE: "Try an end in slow_time.cycles or slow_time.until",
     **dict.fromkeys((Outcome.START_FAILED, Outcome.BRANCH_LOST), f"Try another axes.sweep, or {_AUTOMATIC}"),
-    **dict.fromkeys((Outcome.MARCH_FAILED, Outcome.INACCURATE, Outcome.CERTIFICATE_FAILED), f"Try {_AUTOMATIC}"),
+    **dict.fromkeys((Outcome.INACCURATE, Outcome.CERTIFICATE_FAILED), f"Try {_AUTOMATIC}"),
 }
 """What may help, by outcome."""
 

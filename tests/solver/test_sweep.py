@@ -1,5 +1,6 @@
 """A start state is that of its own point, whatever else is asked for; folds; sweeps resumed, and sweeps in vain."""
 
+import re
 from dataclasses import replace
 from functools import partial
 
@@ -150,17 +151,11 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
     assert f"at {frequency:.6g} Hz" in starts[0].message
 
 
-@pytest.mark.parametrize(
-    "fails", [lambda: np.linalg.inv(np.zeros((2, 2))), lambda: np.linalg.eigvals(np.full((2, 2), np.nan))]
-)
-def test_what_else_fails_in_linear_algebra_is_named(fails):
-    def multipliers():
-        return fails()
-
-    found = guarded(multipliers)
+@pytest.mark.parametrize("fails", [np.linalg.inv, np.linalg.eigvals])
+def test_what_else_fails_in_linear_algebra_is_no_singular_structure(fails):
+    found = guarded(lambda: [fails(np.full((2, 2), value)) for value in (0.0, np.nan)])
     assert found.outcome is Outcome.EXCEPTION
-    assert found.message.startswith("LinAlgError: ")
-    assert "test_sweep.py" in found.message
+    assert re.match(r"LinAlgError: .* \(.*test_sweep.py, line", found.message)
 
 
 def test_a_curve_of_a_slider_takes_few_iterations():
