@@ -110,10 +110,7 @@ _SENTENCES = {
 
 
 class Ended:
-    """What holds how a computation ended: any end but that of a result has a sentence.
-
-    Raises ValueError where it has none, which is a mistake of the program.
-    """
+    """How a computation ended. Raises ValueError where no sentence says why: only the program can make this mistake."""
 
     outcome: Outcome
     message: str

@@ -28,7 +28,7 @@ from studyrunner.summary.findings import (
     where_is,
 )
 from studyrunner.system.progress import count
-from studyrunner.units import scale_for, show_cycles, show_percent, show_rtol
+from studyrunner.units import scale_for, show_percent, show_rtol
 
 MOST_LINES = 9
 
@@ -145,18 +145,9 @@ def _failures(result: Result) -> Iterator[Finding]:
 def _first_ended(result: Result, number: int) -> tuple[dict[str, int], str]:
     """The first point that ended in this way, and what is to be added to its outcome, which may be nothing."""
     place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
-    point = result.point_at(place)
-    if number == Outcome.SENSITIVE and np.isfinite(result.errors[place]):
-        # the volumes in its message are no results
-        return point, ""
-    message = str(result.dataset["message"].values[place]) if result.has("message") else ""
-    if result.has_values[place] and result.counted[:-1] not in message:
-        last = show_cycles(float(result.last_cycle[place]), result.counted)
-        end = "" if result.computed[place] else f"computed up to {last}"
-        is_known = 0.0 < result.errors[place] <= SENSITIVE_ERROR
-        known = f"worn volume known within {result.show_error(point)}" if is_known else ""
-        message = ", ".join(filter(None, (end, known, message)))
-    return point, message
+    # the volumes in the message of a point whose error is known are no results
+    is_silent = not result.has("message") or (number == Outcome.SENSITIVE and np.isfinite(result.errors[place]))
+    return result.point_at(place), "" if is_silent else str(result.dataset["message"].values[place])
 
 
 # --- values that are hardly what was meant ---

@@ -120,7 +120,7 @@ def _with_error(result: Result, point: Point) -> str:
     if not result.computed[place] or not 0.0 < result.errors[place] < np.inf:
         return ""
     remark = ", sensitive" if result.ended(Outcome.SENSITIVE)[place] else ", above rtol" if result.above[place] else ""
-    return f" ± {result.show_error(point)}{remark}"
+    return f" ± {show_percent(float(result.errors[place]), float(result.rtol[place]))}{remark}"
 
 
 # --- over an axis of the study ---
