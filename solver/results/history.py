@@ -81,8 +81,8 @@ class WearHistory(Ended, Presented):
     - worn_volume_error (n_output,), relative, wear_depth_error (n_output, n_contact), m: estimated errors by steps and
       their propagation, harmonics, samples and start state; 0 where nothing has worn.
     - error_estimate: `worn_volume_error` at the last count that was reached; NaN at 0 where the joint wears.
-    - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end. reference_end: why it ends early,
-      or of what it is compared with; or "".
+    - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end. reference_end: why it, or what it
+      is compared with, ends early; or "".
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
       certificate of the states, all relative; NaN where not estimated. harmonics_used, samples_used (n_output,): int.
     - last_cycle: count up to which the point was computed; NaN where there is no state.
@@ -205,9 +205,7 @@ def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: fl
 
 
 def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str, reason: str) -> str:
-    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`. reason: why that, or what it is
-    compared with, has ended before; "" where it has not.
-    """
+    """About an uncertain worn volume, m3, beside that of a solution `coarser`; reason: why it ended, or ""."""
     if math.isinf(error):
         ends = f"{coarser} the history ends early: {reason}"
         return f"its error is not known: {ends if reason else 'that of a vibration on the way is not known'}"

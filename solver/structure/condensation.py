@@ -123,9 +123,8 @@ def build_structure(
     shares = 16 * len(orders) * n_rel**2 > DENSE_BYTES and n <= 2 * n_rel
     real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
     rates, load = omega * np.array(orders, np.float64), excitation_amplitude * first.load_harmonic
-    with regular("without vibration"):
+    with regular(f"at {omega / (2.0 * np.pi):.6g} Hz, at one of its harmonics, or at rest"):
         static_stiffness, static_force, static_response, static_offset = _static(still, tuple(relative.tolist()))
-    with regular(f"at {omega / (2.0 * np.pi):.6g} Hz, or at one of its harmonics"):
         if shares and real and not model.nodal_diameter:
             moving, force, rows, offset = _condense_shared(still, relative, rates, load)
         else:
