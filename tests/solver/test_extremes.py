@@ -57,12 +57,11 @@ def elastic(n_pairs=3):
     return Case(random_model(1, ("3d",) * n_pairs), OMEGA)
 
 
-def block(stiffness=(1e7, 2e7), *, ground=1e5, damping=0.02, preload=100.0, area=None, gap=0.0, lift=0.0):
+def block(stiffness=(1e7, 2e7), *, ground=1e5, preload=100.0, lift=0.0):
     """A rigid block of 1 kg on elastic pairs without mass, pressed on, pushed along both tangents.
 
     stiffness: N/m, of each pair, half as much along the tangents. ground: N/m, all that holds the block but friction.
-    damping: of critical, of the block on its pairs. preload: N, on the block. lift: vibrating force along the normal
-    over that along the first tangent.
+    preload: N, on the block. lift: vibrating force along the normal over that along the first tangent.
     """
     n_pairs = len(stiffness)
     n = 3 + 3 * n_pairs
@@ -77,9 +76,10 @@ def block(stiffness=(1e7, 2e7), *, ground=1e5, damping=0.02, preload=100.0, area
     mass[:3, :3] = np.eye(3)
     load_static[0] = preload
     load_harmonic[:3] = lift, 1.0, 0.5j
-    c, dofs = 2.0 * damping / np.sqrt(max(stiffness)) * k, 3 + np.arange(3 * n_pairs).reshape(n_pairs, 3)
-    loads = {"load_static": load_static, "load_harmonic": load_harmonic, "response": [1, 2], "gap": gap}
-    return Case(build_model(mass, c, k, dofs, 1e-4 if area is None else area, **loads), BLOCK)
+    # 2 % of critical damping, of the block on its pairs
+    c, dofs = 0.04 / np.sqrt(max(stiffness)) * k, 3 + np.arange(3 * n_pairs).reshape(n_pairs, 3)
+    loads = {"load_static": load_static, "load_harmonic": load_harmonic, "response": [1, 2]}
+    return Case(build_model(mass, c, k, dofs, 1e-4, **loads), BLOCK)
 
 
 def slider(stiffness=1e5, damping=0.0, force=10.0, omega=2 * np.pi * 160.0):
@@ -115,7 +115,6 @@ def judge_history(case, start, history):
     for name in (*numbers, "response", "response_peak"):
         assert np.isfinite(getattr(history, name)[known]).all(), name
         assert np.isnan(getattr(history, name)[~known]).all(), name
-    assert history.message or history.outcome is Outcome.CONVERGED
     if not history.outcome.complete:
         assert start.outcome is Outcome.CONVERGED or history.outcome is start.outcome
         return
