@@ -13,7 +13,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import first_response, largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.outcome import Outcome, known_to
+from solver.outcome import Ended, Outcome
 from solver.presentation import Presented
 from solver.results.history import StartState, describe_cut_off, first_cut_off
 from solver.results.state_report import PeriodicMotion, evaluated, periodic_motion
@@ -49,7 +49,7 @@ class FrequencyResponse(Presented):
 
 
 @dataclass(frozen=True)
-class HarmonicBalance:
+class HarmonicBalance(Ended):
     """The equations `residual(z) = 0` of the periodic states of a joint at one frequency and excitation amplitude.
 
     The unknown z (size,), N, has the predicted forces of the relative displacements (Eq. (10) in `solver/PHYSICS.md`),
@@ -155,11 +155,8 @@ def _read(
     pressure = state.contact_force_h[:, 0, 0] / model.contact.area
     if not math.isnan(first_cut_off(model.contact, np.zeros(1), pressure[None], np.zeros_like(pressure[None]))):
         outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
-    elif outcome is Outcome.INACCURATE:
-        error, name = max((start.wear_rate_error, "wear rate"), (start.response_error, "response"))
-        message = "; ".join(filter(None, (f"the {name} {known_to(error, settings.rtol)}", message)))
-    elif message:
-        outcome = Outcome.INACCURATE
+    elif start.unjudged:
+        outcome, message = Outcome.INACCURATE, "; ".join(filter(None, (message, start.unjudged)))
     return first_response(joint, at), largest_responses(joint, at), outcome, message
 
 
@@ -218,6 +215,6 @@ def functions_of(balance: Balance, predicted_h: FloatArray, outcome: Outcome, me
         n_samples=joint.basis.n_samples,
         state=predicted_h.ravel(),
         outcome=outcome,
-        message=message or ("" if outcome is Outcome.CONVERGED else outcome.sentence),
+        message=message,
         _balance=balance,
     )

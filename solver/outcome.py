@@ -85,8 +85,8 @@ _SENTENCES = {
     Outcome.INACCURATE: "The point was computed to the end, but the error of a vibration, a wear rate, a natural"
     " frequency or a damping ratio is above rtol (see the variables of these errors), or it is not known, or the"
     " stability of a vibration is not (see the variable message).",
-    Outcome.SENSITIVE: "The point was computed to the end, but its worn volume depends strongly on the step or on the"
-    " start state: two computations of nearly the same case differ by more than half.",
+    Outcome.SENSITIVE: "The point was computed to the end, but its worn volume is not known: two computations of nearly"
+    " the same case, with other steps and another start state, differ by more than half.",
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",
     Outcome.UNSTABLE: "Only an unstable periodic vibration was found. A real joint does not stay in it.",
     Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two or more periods of the excitation."
@@ -122,6 +122,18 @@ def absolute(relative: ArrayLike, size: NDArray[np.float64]) -> NDArray[np.float
     return np.multiply(relative, size, out=whole, where=size > 0.0)
 
 
+class Ended:
+    """How a computation ended. Raises ValueError where no sentence says why: only the program can make this mistake."""
+
+    outcome: Outcome
+    message: str
+
+    def __post_init__(self) -> None:
+        """Check the sentence."""
+        if self.outcome is not Outcome.CONVERGED and not self.message:
+            raise ValueError(f"{self.outcome.meaning} without a sentence about the reason")
+
+
 def known_to(error: float, rtol: float) -> str:
     """Text of a relative error above `rtol`, as "is known to 2.6 % only", with enough digits to show the excess; or why
     the error of a state, inf, is not known.
@@ -132,13 +144,21 @@ def known_to(error: float, rtol: float) -> str:
     return f"is known to {short if float(short) > 100.0 * rtol else f'{100.0 * error:.6g}'} % only"
 
 
+def describe_inaccurate(response_error: float, wear_rate_error: float, rtol: float) -> str:
+    """Sentence about the larger one of two relative errors of a state, which is above `rtol`."""
+    error, name = max((wear_rate_error, "wear rate"), (response_error, "response"))
+    return f"the {name} {known_to(error, rtol)}"
+
+
 def in_digits(value: float, digits: int = 6) -> str:
     """Text of a number with so many significant digits, without an exponent below 1e15: 2000 for "2e+03"."""
     return f"{float(f'{value:.{digits}g}'):.15g}"
 
 
 def describe_error(error: Exception) -> str:
-    """Text of an unexpected error with file and line of its origin, in one line for the result file."""
-    last = traceback.extract_tb(error.__traceback__)[-1:]
-    place = "".join(f" ({Path(frame.filename).name}, line {frame.lineno})" for frame in last)
+    """Text of an unexpected error in one line for the result file, with function, file and line where it was called."""
+    frames = traceback.extract_tb(error.__traceback__)
+    # libraries say what they were given, not what for
+    own = [frame for frame in frames if not {"numpy", "scipy", "numba"} & {*Path(frame.filename).parts}] or frames
+    place = "".join(f" ({each.name}, {Path(each.filename).name}, line {each.lineno})" for each in own[-1:])
     return " ".join(f"{type(error).__name__}: {error}{place}".split())

@@ -139,20 +139,26 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     for all. facts: of the scene, where it is built.
     """
     parts = [part for variant in study.variants or (study,) for part in (variant, *variant.block_studies)]
-    table, until = study.wear.as_law.table, (study.slow_time.until or {}).get("wear_depth", 0.0)
+    table, until = study.wear.as_law.table, study.slow_time.until or {}
     factors = [1.0] if table is None else [factor for row in table.factor for factor in row]
     wear = [value * factor for value in study.axes.wear_coefficient for factor in factors]
     of_wear = "wear_coefficient" if table is None else "wear_coefficient times wear.factor"
     worn = [depth for part in parts if part.scene.worn for state in part.scene.worn.depth for depth in state]
+    gap = [abs(value) for value in _numbers(parts, "gap")]
     amplitude = [value for part in parts for value in part.axes.excitation_amplitude]
     friction, speed = _numbers(parts, "friction_coefficient"), _numbers(parts, "rotation_speed")
-    depth, deep = ("m", 0.0, 1e-3, {"mm": 1e-3, "um": 1e-6}), "deeper than joints wear, some hundred um"
+    lengths, deep = {"mm": 1e-3, "um": 1e-6}, "deeper than joints wear, some hundred um"
+    depth, volume = ("m", 0.0, 1e-3, lengths), ("m3", 0.0, 1e-3, {"mm3": 1e-9})
     stuck, own = 0.0 if facts is None else facts.stuck_frequency, _frequencies(study, parts)
     found = [
         _question(of_wear, wear, ("1/Pa", *_PLAUSIBLE_WEAR, _UNITS_OF_WEAR), "a thousand times off what metals have"),
-        _question("slow_time.until.wear_depth", [until], depth, deep),
+        # 1600 years at 200 Hz
+        _question("slow_time.cycles", [study.slow_time.cycles], ("", 0.0, 1e13, {}), "more than machines live"),
+        _question("slow_time.until.wear_depth", [until.get("wear_depth", 0.0)], depth, deep),
+        _question("slow_time.until.worn_volume", [until.get("worn_volume", 0.0)], volume, "more than joints lose"),
         _question("slow_time.largest_depth", [study.slow_time.largest_depth or 0.0], depth, deep),
         _question("scene.worn", worn, depth, deep),
+        _question("gap", gap, ("m", 0.0, 1.0, lengths), "wider than joints are"),
         # a blade root of 280 mm2 bears 1e5 N
         _question("excitation_amplitude", amplitude, ("N", 0.0, 1e6, {"mN": 1e-3}), "more than joints bear"),
         _question("friction_coefficient", friction, ("", 0.0, 2.0, {"percent": 0.01}), "more than dry metals have"),
@@ -173,7 +179,7 @@ def _question(
     expected: unit of the key, the range that is not asked about, and factors of this unit, by name of another unit.
     """
     unit, low, high, units = expected
-    off = [value for value in values if value > 0.0 and not low <= value <= high]
+    off = [value for value in values if 0.0 < value < math.inf and not low <= value <= high]
     if not off:
         return ""
     worst = max(off, key=lambda value: max(value / high, low / value))

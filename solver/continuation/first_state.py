@@ -81,7 +81,7 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
             return raised
         unstable |= arrived
     settled = relax_to_periodic(whole.joint, whole.wear_depth, rest, quiet, run)
-    return Failure(Outcome.UNSTABLE) if unstable and isinstance(settled, Failure) else settled
+    return Failure(Outcome.UNSTABLE, settled.message) if unstable and isinstance(settled, Failure) else settled
 
 
 def state_at_rest(case: Case, omega: float, run: Run) -> State | Failure:
@@ -95,7 +95,8 @@ def state_at_rest(case: Case, omega: float, run: Run) -> State | Failure:
         return static
     balance, at, orders = Balance(quiet, static.history), static.evaluation, case.resolution.orders
     start = balance.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
-    return run.state(balance, start, 0.0) or Failure(Outcome.START_FAILED)
+    said = f"the static state is not found again with {case.resolution.highest} harmonics"
+    return run.state(balance, start, 0.0) or Failure(Outcome.START_FAILED, said)
 
 
 def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
@@ -178,8 +179,10 @@ def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Failure:
         if viscosity < NEGLIGIBLE and np.abs(moved).max() > far:
             break
         viscosity *= VISCOSITY_CUT
-    if np.abs(moved).max() <= far:
-        return Failure(Outcome.STATIC_FAILED)
+    if not np.abs(moved).max() > far:
+        return Failure(Outcome.STATIC_FAILED, f"the pairs do not come to rest in {VISCOUS_STEPS} viscous steps")
     # a motion without end
-    opened, slid = -moved[:, 0].min(initial=0.0), np.linalg.norm(moved[:, 1:], axis=1).max(initial=0.0)
-    return Failure(Outcome.STATIC_OPEN if opened > slid else Outcome.STATIC_SLIDING)
+    opened, slid = -moved[:, 0, 0], np.linalg.norm(moved[:, 1:, 0], axis=1)
+    opens = opened.max() > slid.max()
+    outcome, most = (Outcome.STATIC_OPEN, opened) if opens else (Outcome.STATIC_SLIDING, slid)
+    return Failure(outcome, f"contact pair {int(most.argmax())} moves farthest")

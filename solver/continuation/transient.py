@@ -112,7 +112,8 @@ def relax_to_periodic(
     not leave an unstable periodic state) or UNSETTLED (it does not settle within `SEARCH_ITERATIONS`).
     """
     budget = run.budget
-    budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
+    at = f"at {joint.omega / (2.0 * np.pi):.6g} Hz"
+    budget.report(f"{at}, where the vibration is left to settle in time")
     transient = Transient(joint)
     begun, history = Transient(start_joint).periodic(start.evaluation).displacement, start.history
     # amplitudes of a periodic motion that are constant at the frequency of this joint
@@ -136,7 +137,7 @@ def relax_to_periodic(
         # a step over more than the time in which a motion grows would damp this motion
         damped = grows and end is not None and not run.is_stable(balance.joint, end.evaluation)
         if damped and budget.iterations == before:
-            return Failure(Outcome.UNSTABLE)
+            return Failure(Outcome.UNSTABLE, f"{at} the vibration stays in an unstable state")
         if end is None or too_far or damped:
             length *= TRANSIENT_CUT
             continue
@@ -144,7 +145,7 @@ def relax_to_periodic(
         moved = np.abs(end.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > RUNAWAY * size:
-            return Failure(Outcome.ADRIFT)
+            return Failure(Outcome.ADRIFT, f"{at} contact pair {int(moved[:, :, 0].max(axis=1).argmax())} runs away")
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < 0.5 * tried or length >= longest
         if change < RELAXED_CHANGE and renewed:
@@ -162,7 +163,7 @@ def relax_to_periodic(
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(SMOOTH_CHANGE / max(change, 1e-300), 0.5, 2.0))
         length = min(max(length * growth, 1.0), longest)
-    return Failure(Outcome.UNSETTLED)
+    return Failure(Outcome.UNSETTLED, f"{at} it does not repeat after {SEARCH_ITERATIONS - left} iterations in time")
 
 
 def _change(before: Motion, after: Motion) -> float:

@@ -10,10 +10,10 @@ import numpy as np
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ComplexArray, FloatArray
-from solver.outcome import Outcome
+from solver.outcome import Ended, Outcome
 from solver.packing import packable
 from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC, Resolution
-from solver.structure.condensation import build_structure
+from solver.structure.condensation import SingularStructureError, build_structure
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
 from solver.structure.joint import Case, Joint
 
@@ -36,11 +36,11 @@ class State:
 
 @packable
 @dataclass(frozen=True)
-class Failure:
-    """Why there is no state, or why a history ends early. message: addition to the outcome."""
+class Failure(Ended):
+    """Why there is no state, or why a history ends early. message: what has failed, and where."""
 
     outcome: Outcome
-    message: str = ""
+    message: str
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
@@ -135,8 +135,7 @@ def _tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> Fl
     try:
         # the load acts in the first harmonic alone
         structure = build_structure(joint.model, joint.omega, 0.0, orders)
-    except np.linalg.LinAlgError:
-        # the structure with a stuck joint is singular at one of these harmonics
+    except SingularStructureError:
         return np.zeros((still.size, 2 * len(orders) + 1))
     force_h = joint.law.tail(evaluation, build_basis(orders, joint.basis.n_samples))
     force = to_complex(joint.to_relative(force_h)).T[:, :, None]

@@ -103,7 +103,7 @@ class Path(ABC, Generic[S]):
 
     def rescue(self, _: S, __: float, ___: Run) -> Step[S] | Failure:
         """State at a target that `solve` does not find, or why there is none: by default no path that turns back."""
-        return Failure(Outcome.BRANCH_LOST)
+        return Failure(Outcome.BRANCH_LOST, "Newton's method finds no state in the shortest step")
 
     @abstractmethod
     def change(self, before: S, after: S) -> float:
@@ -224,7 +224,8 @@ class LoadingPath(Path[State]):
             state = replace(settled, parameter=beyond)
             if beyond == target:
                 return Step(state, tuple(folds))
-        return Failure(Outcome.BRANCH_LOST)
+        at = self.describe(state)
+        return Failure(Outcome.BRANCH_LOST, f"the search ends {at}, after {run.budget.iterations} iterations")
 
     def change(self, before: State, after: State) -> float:
         """As in Path."""

@@ -18,6 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from solver.accuracy.certificate import certify
 from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import ResolvedState
 from solver.clock import computing_time
@@ -29,7 +30,7 @@ from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, cell
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run, guarded
-from solver.outcome import Outcome
+from solver.outcome import Outcome, describe_inaccurate
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
@@ -161,7 +162,7 @@ class FrequencySweep:
         return present
 
     def _next(self, frequencies: FloatArray | FollowedFrequency, index: int) -> StartState | Failure:
-        """State at the next frequency, with the harmonics it needs, or why there is none. Raises LinAlgError."""
+        """State at the next frequency, with the harmonics it needs, or why there is none. Raises as `guarded`."""
         if isinstance(frequencies, FollowedFrequency):
             frequency = find_resonance(self, frequencies)
             if isinstance(frequency, Failure):
@@ -234,14 +235,15 @@ class FrequencySweep:
     def _judged(self, found: ResolvedState, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
         """A state with all its errors, or why it is no result. folds: jumped over behind the last node."""
         joint, at, estimate = found.joint, found.point.evaluation, found.estimate
-        if not found.holds():
-            return Failure(Outcome.CERTIFICATE_FAILED)
+        if said := certify(joint, at).sentence(self.settings.tolerance):
+            return Failure(Outcome.CERTIFICATE_FAILED, said)
         unstable = find_instability(found.case, joint, at, self.run, self.with_switching)
         if unstable is not None and not unstable.outcome.complete:
             return unstable
         reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
+        known = estimate.response, estimate.wear_rate
         # folds of a ramp are load factors
         fold = (present.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
         return StartState(
@@ -249,11 +251,12 @@ class FrequencySweep:
             state=periodic_state(joint, found.point),
             penalty_omega=found.case.penalty_omega,
             resolution=found.case.resolution,
-            response_error=estimate.response,
-            wear_rate_error=estimate.wear_rate,
+            response_error=known[0],
+            wear_rate_error=known[1],
+            message="" if found.accurate else describe_inaccurate(*known, self.settings.rtol),
             branch=present.branch + len(folds),
             fold_frequency=float(fold),
-            message="" if unstable is None else unstable.message,
+            unjudged="" if unstable is None else unstable.message,
             reference=None if reference is None else periodic_state(joint, reference),
         )
 
@@ -263,7 +266,7 @@ def _lost(present: Sweep[State], failure: Failure) -> Failure:
     if present.last is None:
         return failure
     reason = Outcome.BRANCH_LOST if failure.outcome is Outcome.START_FAILED else failure.outcome
-    return Failure(reason, f"stable states end {present.path.describe(present.last)}")
+    return Failure(reason, f"stable states end {present.path.describe(present.last)}: {failure.message}")
 
 
 def find_resonance(sweeps: FrequencySweep, follow: FollowedFrequency) -> float | Failure:
@@ -283,7 +286,8 @@ def find_resonance(sweeps: FrequencySweep, follow: FollowedFrequency) -> float |
                 break
             present.advance_to(float(np.nextafter(end, present.sign * math.inf)))
         else:
-            return _lost(present, present.failure or Failure(Outcome.BRANCH_LOST))
+            assert present.failure is not None
+            return _lost(present, present.failure)
     within = f"between {follow.low:g} and {follow.high:g} Hz: give another range"
     return Failure(Outcome.RESONANCE_LOST, f"the sweep {sweeps.direction} meets no {follow.of} {within}")
 

@@ -88,7 +88,7 @@ class Sweep(Generic[S]):
         self.nodes: tuple[S, ...] = ()
         self.ahead: Step[S] | None = None
         self.passed: list[float] = []
-        self.failure: Failure | None = Failure(Outcome.START_FAILED)
+        self.failure: Failure | None = Failure(Outcome.START_FAILED, "no first state is known")
         self.length, self.rate = path.longest, 0.0
         self.checked: S | None = None
         self.error = 0.0
@@ -133,7 +133,8 @@ class Sweep(Generic[S]):
         self.path, self.passed, self.nodes = path, [state.parameter], (state,)
         error = self._choose_resolution()
         if error > SENSITIVE_ERROR and self.path.case.resolution.highest <= path.case.resolution.highest:
-            self.nodes, self.failure = (), Failure(Outcome.UNSETTLED)
+            said = f"more harmonics change the first state, {path.describe(state)}, by more than half"
+            self.nodes, self.failure = (), Failure(Outcome.UNSETTLED, said)
             return False
         self.failure = None
         self._save()
@@ -155,7 +156,8 @@ class Sweep(Generic[S]):
         run: of its own; the sweep must not depend on it.
         """
         if self.here is None or self.ahead is None:
-            return self.failure or Failure(Outcome.BRANCH_LOST)
+            assert self.failure is not None
+            return self.failure
         before, path = self.nodes[:-1], self.path
         near = before if self.ahead.folds else (*before[-1:], self.ahead.state)
         found = path.solve((*near, self.here), parameter, run)
@@ -182,7 +184,8 @@ class Sweep(Generic[S]):
         budget, path, before, self.rate = self.budget, self.path, self.rate, 0.0
         budget.report(path.describe(here))
         budget.most_iterations = budget.iterations + NODE_ITERATIONS
-        taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST)
+        most = f"the sweep has taken more than {SWEEP_ITERATIONS} iterations"
+        taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST, most)
         if budget.iterations <= SWEEP_ITERATIONS:
             taken = take_step(self, here, self.length, Lengths(1, AIMED_CHANGE, path.shortest, FREE_STEP))
         if isinstance(taken, Failure):

@@ -19,12 +19,13 @@ from solver.loading_history.sweep import LAST_NODES, STEPS_OF_REFERENCE
 from solver.missions.mission import Block, MissionRequest
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
-from solver.outcome import Outcome
+from solver.outcome import Outcome, describe_inaccurate
 from solver.packing import packable
 from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import periodic_state
 from solver.settings import Direction, Passage, Resolution
 from solver.stability.floquet import find_instability
+from solver.structure.condensation import SingularStructureError
 from solver.structure.joint import Case, build_case
 from solver.wear.errors import HISTORY_SAFETY
 from solver.wear.problem import WearProblem, reference_of
@@ -159,7 +160,7 @@ class BlockInput:
 
 
 def run_block(given: BlockInput) -> BlockResult | Failure:
-    """Compute a block of steady vibration, or why it does not come to its end. Raises OutOfTimeError, LinAlgError."""
+    """Compute a block of steady vibration, or why it does not come to its end. Raises as `guarded`."""
     start, sweep = find_start(given)
     if start.state is None:
         return Failure(start.outcome, start.message)
@@ -192,15 +193,15 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         held=state.held_from <= counts[-1],
         cut_off=not math.isnan(first_cut_off(given.model.contact, counts, values["mean_pressure"], depth)),
         guide=Guide(state.resolutions, state.first_length),
-        last=_last(state, start) if given.is_continued else None,
+        last=_last(state, start, given.mission.settings.rtol) if given.is_continued else None,
         sweep=sweep,
         iterations=start.newton_iterations + solution.iterations,
     )
 
 
-def _last(state: WearState, start: StartState) -> StartState:
+def _last(state: WearState, start: StartState, rtol: float) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
-    at = state.at
+    at, known = state.at, state.estimate
     assert start.state is not None
     here = replace(start.state, displacement_h=at.displacement_h, contact_force_h=at.force_h)
     return replace(
@@ -208,9 +209,9 @@ def _last(state: WearState, start: StartState) -> StartState:
         outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
         state=replace(here, start_history=state.point.history),
         resolution=state.resolution,
-        response_error=state.estimate.response,
-        wear_rate_error=state.estimate.wear_rate,
-        message="",
+        response_error=known.response,
+        wear_rate_error=known.wear_rate,
+        message="" if state.accurate else describe_inaccurate(known.response, known.wear_rate, rtol),
         reference=None,
     )
 
@@ -258,7 +259,7 @@ def _by_earlier_sweep(given: BlockInput, earlier: EarlierSweep) -> StartState | 
         joint = path.joint_at(target)
         if find_instability(wearing.case, joint, state.evaluation, run, given.with_switching):
             return None
-    except np.linalg.LinAlgError:
+    except SingularStructureError:
         return None
     return replace(start, state=periodic_state(joint, state), reference=None, newton_iterations=run.budget.iterations)
 
@@ -291,7 +292,7 @@ def _continued(given: BlockInput, before: StartState) -> StartState:
     """The state of a block that keeps the tangential history of the block before, or why there is none.
 
     before: state at the end of the block before, solved first at the depth before the block. Then amplitude and
-    frequency change, one after the other, the frequency at the smaller amplitude. Raises OutOfTimeError, LinAlgError.
+    frequency change, one after the other, the frequency at the smaller amplitude. Raises as `guarded`.
     """
     last, run = before.state, Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
     assert last is not None
@@ -300,7 +301,8 @@ def _continued(given: BlockInput, before: StartState) -> StartState:
     balance = wearing.balance_of(unworn)
     state = run.state(balance, unworn.at.predicted_h)
     if state is None:
-        return replace(before, state=None, outcome=Outcome.BRANCH_LOST)
+        said = "the last state of the block before is not found at the depth before this block"
+        return replace(before, state=None, outcome=Outcome.BRANCH_LOST, message=said)
     start = replace(before, state=periodic_state(balance.joint, State(state.evaluation, last.start_history)))
     along: Direction = "up" if 2.0 * np.pi * frequency > last.omega else "down"
     iterations, lower = run.budget.iterations, min(amplitude, last.excitation_amplitude)
@@ -318,7 +320,8 @@ def _continued(given: BlockInput, before: StartState) -> StartState:
         sweeps, (wearing, unworn) = given.sweeps(direction, load), given.wearing_joint(start)
         parameter = here.excitation_amplitude / load if direction == "ramp" else here.omega
         if not sweeps.go_on_from(wearing.case, replace(unworn.point, parameter=parameter), target):
-            return replace(start, state=None, outcome=Outcome.UNSETTLED)
+            said = "more harmonics change the last state of the block before by more than half"
+            return replace(start, state=None, outcome=Outcome.UNSETTLED, message=said)
         _, after = next(sweeps.states(np.array([target])))
         start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)
         iterations += after.newton_iterations

@@ -70,7 +70,7 @@ class MissionProblem:
         self.last = mission.missions[-1] if history is None else int(history.course.ends[-1])
         # the sweep with which each block began last, and why a step was not found
         self._sweeps: list[EarlierSweep | None] = []
-        self._failure = Failure(Outcome.MARCH_FAILED)
+        self._failure = Failure(Outcome.MARCH_FAILED, "the error of a step over one mission is too large")
 
     def advance(self, state: MissionState | None, course: Course) -> Here | Failure | None:
         """As in SlowProblem."""
@@ -253,7 +253,7 @@ def _judged(mission: MissionRequest, state: MissionState, history: MissionHistor
     rtol, inaccurate, about_state, about_hold = mission.settings.rtol, np.asarray(state.inaccurate), "", ""
     last = np.flatnonzero(np.isfinite(history.worn_volume))[-1]
     volumes = history.worn_volume[last], history.reference_volume[last]
-    uncertain = describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps")
+    uncertain = describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps", history.reference_end)
     cut_off = describe_cut_off(state.cut_off_from, "mission") if state.cut_off_from < math.inf else ""
     if inaccurate.any():
         name = mission.called(int(inaccurate.argmax()))

@@ -7,7 +7,7 @@ from typing import Literal
 
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import ComplexArray, FloatArray, ReducedModel
-from solver.outcome import Outcome
+from solver.outcome import Ended, Outcome
 from solver.presentation import Presented
 from solver.settings import Direction, Passage, SolverSettings, WearTarget
 
@@ -80,7 +80,7 @@ class MissionRequest:
 
 
 @dataclass(frozen=True, repr=False)
-class MissionHistory(Presented):
+class MissionHistory(Ended, Presented):
     """A joint over its missions, at `n_output` numbers of missions. Values not reached are NaN, all errors estimated.
 
     - missions (n_output,); worn_volume (n_output,), m3, wear_depth (n_output, n_contact), m.
@@ -91,7 +91,7 @@ class MissionHistory(Presented):
       block, in the mission that ends at the number, at 0 in the first one. response_peak_begin, response_peak_end:
       largest magnitude over a period there, m. response_error (n_output, n_block): relative, of these responses.
     - excitation_frequency (n_block, 2): Hz, at start and end of each block.
-    - reference_volume (n_output,): m3, worn volume of the reference solution.
+    - reference_volume (n_output,): m3, worn volume of the reference solution. reference_end: why it ends early, or "".
     - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, of the damping ratio of the joint at rest; 0 where
       nothing wears and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
     - error_estimate: `worn_volume_error` at the last number that was reached; NaN at 0 where the joint wears.
@@ -127,3 +127,4 @@ class MissionHistory(Presented):
     newton_iterations: int
     run_time: float
     message: str = ""
+    reference_end: str = ""

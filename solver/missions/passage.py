@@ -36,6 +36,7 @@ from solver.harmonic_balance.state import Failure, first_response, largest_respo
 from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
+from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, absolute
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
@@ -115,7 +116,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         slope=slope if given.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
-        inaccurate=math.inf if any(start.message for start in starts) else max(bad, default=0.0),
+        inaccurate=math.inf if any(start.unjudged for start in starts) else max(bad, default=0.0),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start if given.is_continued else None,
         sweep=EarlierSweep(swept.needed),
@@ -231,7 +232,7 @@ def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | 
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() > given.deadline:
-            return Failure(Outcome.TIME_LIMIT)
+            raise OutOfTimeError
         wearing, state = given.wearing_joint(start)
         joint, frequency = wearing.joint_of(state), float(frequencies[index])
         density = state.rate * frequency / given.passage.rate

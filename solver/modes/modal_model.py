@@ -20,6 +20,7 @@ import scipy.linalg
 
 from solver.model import BoolArray, FloatArray, LinearModel, Matrix, ReducedModel
 from solver.settings import NEGLIGIBLE
+from solver.structure.condensation import regular
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ def linear_mode(
     # shift and limit of a rigid motion: 1e-12 of the ratio of the traces is of the order of round-off
     shift = NEGLIGIBLE * float(np.real(np.trace(stiffness)) / max(np.real(np.trace(mass)), 1e-300))
     # eigenvalues 1 / (omega^2 + shift), largest first: a mass matrix may be singular, a stiffness as well
-    values, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass)
+    with regular("or its stiffness negative, at rest"):
+        values, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass)
     values, vectors = values[::-1], vectors[:, ::-1]
     with np.errstate(divide="ignore"):
         square = 1.0 / np.maximum(values, 0.0) - shift

@@ -25,7 +25,7 @@ from solver.loading_history.sweep import Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_rest
 from solver.newton.run import Budget, Run, guarded
-from solver.outcome import Outcome, known_to
+from solver.outcome import Ended, Outcome, known_to
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
 
 Direction = Literal["up", "down"]
@@ -38,7 +38,7 @@ _NO_FIRST = Failure(Outcome.START_FAILED, "the mode was not found at its first a
 
 
 @dataclass(frozen=True)
-class ModePoint:
+class ModePoint(Ended):
     """A point of a nonlinear mode, as `solver.Backbone` at one amplitude. Values are NaN where no state was found.
 
     - newton_iterations: of the way from rest to the point and of the point, as for this point alone.

@@ -18,6 +18,7 @@ from solver.harmonic_balance.state import Failure, State, final_history, transfe
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING, JacobianSolver
 from solver.outcome import Outcome, describe_error
+from solver.structure.condensation import SingularStructureError
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
 
@@ -281,10 +282,10 @@ def guarded(compute: Callable[[], T]) -> T | Failure:
     """Result of a computation, or its error as a failure."""
     try:
         return compute()
-    except np.linalg.LinAlgError:
-        return Failure(Outcome.SINGULAR)
+    except SingularStructureError as error:
+        return Failure(Outcome.SINGULAR, str(error))
     except OutOfTimeError:
-        return Failure(Outcome.TIME_LIMIT)
+        return Failure(Outcome.TIME_LIMIT, "the CPU time of solver.time_limit is over")
     except Exception as error:
         # an error spoils one point only: the study goes on
         return Failure(Outcome.EXCEPTION, describe_error(error))

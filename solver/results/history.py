@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray
-from solver.outcome import SENSITIVE_ERROR, Outcome, in_digits, known_to
+from solver.outcome import SENSITIVE_ERROR, Ended, Outcome, in_digits, known_to
 from solver.packing import packable
 from solver.presentation import Presented
 from solver.settings import NEGLIGIBLE, Resolution
@@ -39,7 +39,7 @@ class PeriodicState:
 
 @packable
 @dataclass(frozen=True)
-class StartState:
+class StartState(Ended):
     """Unworn state of one frequency of a sweep, or the reason why there is none.
 
     outcome: whether the state is a result. state: None where there is none.
@@ -50,8 +50,8 @@ class StartState:
     run_time: CPU seconds of the computing thread since the last frequency.
     branch, fold_frequency: number of folds that the sweep has jumped over, 0 on its first branch, and frequency of the
         last one, Hz; NaN if none, and for a ramp, whose folds are load factors.
-    message: sentence of an unexpected error (`Outcome.EXCEPTION`), or how far a sweep came; of a state, why it is not
-        known whether the state is stable.
+    message: why there is no state, or what is above rtol; or how far a sweep came.
+    unjudged: why it is not known whether the state is stable, else "".
     reference: state of the reference sweep, solved with the resolution of the state; None where there is none.
     """
 
@@ -66,11 +66,12 @@ class StartState:
     branch: int = 0
     fold_frequency: float = math.nan
     message: str = ""
+    unjudged: str = ""
     reference: PeriodicState | None = None
 
 
 @dataclass(frozen=True, repr=False)
-class WearHistory(Presented):
+class WearHistory(Ended, Presented):
     """A point of a study on the slow time scale, at `n_output` cycle counts; not reached: NaN, whole numbers 0.
 
     - cycles (n_output,); worn_volume, m3, wear_rate, m3 per cycle; wear_depth (n_output, n_contact), m.
@@ -82,7 +83,8 @@ class WearHistory(Presented):
     - worn_volume_error (n_output,), relative, wear_depth_error (n_output, n_contact), m: estimated errors by steps and
       their propagation, harmonics, samples and start state; 0 where nothing has worn.
     - error_estimate: `worn_volume_error` at the last count that was reached; NaN at 0 where the joint wears.
-    - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end.
+    - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end. reference_end: why it, or what it
+      is compared with, ends early; or "".
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
       certificate of the states, all relative; errors inf where unknown. harmonics_used, samples_used (n_output,): int.
     - last_cycle: count up to which the point was computed; NaN where there is no state.
@@ -141,6 +143,7 @@ class WearHistory(Presented):
     excitation_frequency: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     excitation_frequency_error: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     reference_volume: FloatArray = field(default_factory=lambda: np.array([math.nan]))
+    reference_end: str = ""
     inaccurate_from: float = math.inf
     inaccurate_in: str = ""
     inaccurate_error: float = 0.0
@@ -160,7 +163,8 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     last = int(rows[-1])
     at, error = history.cycles[last], float(history.worn_volume_error[last])
     volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
-    uncertain = describe_uncertain(*volumes, error, rtol, "with longer steps, fewer harmonics and a coarser sweep")
+    coarser = "with longer steps, fewer harmonics and a coarser sweep"
+    uncertain = describe_uncertain(*volumes, error, rtol, coarser, history.reference_end)
     cut_off = describe_cut_off(history.cut_off_cycle / slower) if at >= history.cut_off_cycle else ""
     inaccurate = held = ""
     # inf means "never", but is the count of a final state, too
@@ -204,13 +208,11 @@ def last_error(counts: FloatArray, error: FloatArray, rate: FloatArray, last: fl
     return float(error[reached[-1]])
 
 
-def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
-    """Sentence about an uncertain worn volume, m3, beside that of a solution `coarser`, NaN where that ended before; or
-    why its error, inf, is not known.
-    """
+def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str, reason: str) -> str:
+    """About an uncertain worn volume, m3, beside that of a solution `coarser`; reason: why it ended, or ""."""
     if math.isinf(error):
-        why = "it depends on another one that is not known"
-        why = why if math.isfinite(other) else f"{coarser} the history does not go so far"
+        ends = f"{coarser} the history ends early: {reason}"
+        why = ends if reason else "that of a vibration on the way is not known"
         return f"the error of the worn volume is not known: {why}"
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
     volumes, others = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"

@@ -8,6 +8,8 @@ into those of the pairs (r) and all others (i),
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple, cast
@@ -91,6 +93,19 @@ class CondensedStructure:
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
 
+class SingularStructureError(np.linalg.LinAlgError):
+    """The structure with a stuck joint is singular; no other failure of linear algebra is called so."""
+
+
+@contextmanager
+def regular(where: str) -> Iterator[None]:
+    """Says that it is the structure that is singular in what follows; where: at which frequency."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise SingularStructureError(f"the matrix of the structure is singular {where}") from error
+
+
 @lru_cache(maxsize=CACHED_STRUCTURES)
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
@@ -98,7 +113,7 @@ def build_structure(
     """Condense the structure at a frequency, rad/s, with an excitation amplitude, N, in harmonic 1.
 
     orders: harmonics above the static one, ascending.
-    Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular at a harmonic.
+    Raises SingularStructureError where the structure with a stuck joint is singular at a harmonic.
     """
     relative = model.contact.relative
     still = model.linear[0]
@@ -108,11 +123,12 @@ def build_structure(
     shares = 16 * len(orders) * n_rel**2 > DENSE_BYTES and n <= 2 * n_rel
     real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
     rates, load = omega * np.array(orders, np.float64), excitation_amplitude * first.load_harmonic
-    if shares and real and not model.nodal_diameter:
-        moving, force, rows, offset = _condense_shared(still, relative, rates, load)
-    else:
-        moving, force, rows, offset = _condense_each(model, relative, rates, orders, load)
-    static_stiffness, static_force, static_response, static_offset = _static(still, tuple(relative.tolist()))
+    with regular(f"at {omega / (2.0 * np.pi):.6g} Hz, at one of its harmonics, or at rest"):
+        static_stiffness, static_force, static_response, static_offset = _static(still, tuple(relative.tolist()))
+        if shares and real and not model.nodal_diameter:
+            moving, force, rows, offset = _condense_shared(still, relative, rates, load)
+        else:
+            moving, force, rows, offset = _condense_each(model, relative, rates, orders, load)
     amplitudes = np.zeros((n_rel, len(orders)), complex)
     amplitudes[:, :1] = force[:, None]
     return CondensedStructure(
@@ -218,13 +234,14 @@ def whole_motion(
     """All displacements (n, ...), m, whose relative ones are `moved` (n_rel, ...), m, under a load (n, ...), N.
 
     Both change with exp(s t); exponent: s, 1/s, `i n w` in harmonic n.
-    Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular.
+    Raises SingularStructureError where the structure with a stuck joint is singular.
     """
     n_rel, others, whole = relative.size, _others(len(linear.mass), relative), np.zeros(load.shape, complex)
     whole[relative] = moved
     if others.size:
         rows = _dynamic_stiffness(linear, exponent, np.ix_(others, np.concatenate([relative, others])))
-        whole[others] = np.linalg.solve(rows[:, n_rel:], load[others] - rows[:, :n_rel] @ moved)
+        with regular(f"at {abs(exponent) / (2.0 * np.pi):.6g} Hz"):
+            whole[others] = np.linalg.solve(rows[:, n_rel:], load[others] - rows[:, :n_rel] @ moved)
     return whole
 
 

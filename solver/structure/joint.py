@@ -121,7 +121,7 @@ class Case:
     def joint(self, omega: float, excitation_amplitude: float) -> Joint:
         """Joint at the angular frequency omega (rad/s) and excitation amplitude (N).
 
-        Raises numpy.linalg.LinAlgError where the structure with a stuck joint is singular at a harmonic.
+        Raises SingularStructureError where the structure with a stuck joint is singular at a harmonic.
         """
         orders = self.resolution.orders
         structure = held(build_structure(self.model, omega, excitation_amplitude, orders), self.hold)

@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
-from solver.structure.condensation import condense
+from solver.structure.condensation import condense, regular
 
 INERTIAL_RATIO = 2.0
 """Ratio of the stiffness at twice a rate to the stiffness at the rate, above which a pair is inertial: 1 for a spring,
@@ -116,5 +116,6 @@ def compliance_at(model: ReducedModel, rate: float) -> FloatArray:
 def _diagonal(linear: LinearModel, relative: tuple[int, ...], rate: float, *, compliance: bool) -> FloatArray:
     """Diagonal of the condensed `K + s^2 M`, N/m, or of its inverse, m/N: the same for many states."""
     full = linear.stiffness + rate**2 * linear.mass
-    condensed = condense(full, np.array(relative, np.intp), np.zeros(full.shape[0])).stiffness
-    return np.asarray(np.real(np.diag(np.linalg.inv(condensed) if compliance else condensed)))
+    with regular(f"in motions that grow at {rate:.6g} 1/s: a part has neither mass nor stiffness"):
+        condensed = condense(full, np.array(relative, np.intp), np.zeros(full.shape[0])).stiffness
+        return np.asarray(np.real(np.diag(np.linalg.inv(condensed) if compliance else condensed)))

@@ -39,22 +39,24 @@ Checked = tuple[WearState, dict[str, Any]]
 
 def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
     """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
-    certificate = None if (anew := needs_new_choice(wearing, state)) else _certificate(wearing, state)
+    settings, certificate = wearing.case.settings, _certificate(wearing, state)
     # more harmonics or samples may suffice
-    if anew or (certificate is None and state.accurate and wearing.case.settings.automatic):
+    more_may_do = certificate.failures(settings.tolerance) and state.accurate and settings.automatic
+    if more_may_do or needs_new_choice(wearing, state):
         chosen = choose_anew(wearing, state)
         if isinstance(chosen, Failure):
             return chosen
         state, certificate = chosen, _certificate(wearing, chosen)
-    if certificate is None:
-        return Failure(Outcome.CERTIFICATE_FAILED)
+    if said := certificate.sentence(settings.tolerance):
+        return Failure(Outcome.CERTIFICATE_FAILED, f"at cycle {in_digits(state.cycle)}: {said}")
     # given harmonics and samples are accurate enough, unless there was no state with others for a comparison
     if not (state.accurate and np.isfinite(state.estimate.largest)):
         worst = max(state.worst, state.estimate, key=lambda each: each.largest)
         state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
     case, joint = wearing.case_and_joint(state)
     if state.hold is not None and creeps(joint, state.hold, state.at):
-        return Failure(Outcome.ADRIFT)
+        said = "the friction on all pairs does not balance their mean force"
+        return Failure(Outcome.ADRIFT, f"at cycle {in_digits(state.cycle)} {said}")
     if vibrates_otherwise(state):
         unstable = find_instability(case, joint, state.at, wearing.run, False)
         if unstable is not None and not unstable.outcome.complete:
@@ -64,13 +66,12 @@ def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
     return state, report | {"excitation_frequency_error": wearing.frequency_error(state)}
 
 
-def _certificate(wearing: WearingJoint, state: WearState) -> Certificate | None:
-    """The certificate of a state, with the errors of the last choice of its harmonics; None where it does not hold."""
+def _certificate(wearing: WearingJoint, state: WearState) -> Certificate:
+    """The certificate of a state, with the errors of the last choice of its harmonics."""
     estimate = state.estimate
     wear_rate_error = wearing.wearing_work.amplification(*worn_by(state.at)) * estimate.wear_rate
     certificate = certify(wearing.joint_of(state), state.at)
-    certificate = replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
-    return None if certificate.failures(wearing.case.settings.tolerance) else certificate
+    return replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
 
 
 def report_only(wearing: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...]) -> Checked:
@@ -125,13 +126,14 @@ def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable; INACCURATE where its stability, or that of the start
     state, which the sweep has judged already, is not known.
     """
-    unknown = Failure(Outcome.INACCURATE, wearing.start.message) if wearing.start.message else None
+    unknown = Failure(Outcome.INACCURATE, wearing.start.unjudged) if wearing.start.unjudged else None
     if state.cycle == 0.0 and wearing.follow is None and not vibrates_otherwise(state):
         return unknown
     case, joint = wearing.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, state.at) is None and not wearing.run.is_stable(wearing.joint_of(state), state.at):
-        return Failure(Outcome.UNSTABLE)
+        said = f"at cycle {in_digits(state.cycle)} a small disturbance grows and keeps its sign, as between two folds"
+        return Failure(Outcome.UNSTABLE, said)
     return find_instability(case, joint, state.at, wearing.run, True) or unknown
 
 

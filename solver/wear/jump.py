@@ -20,7 +20,7 @@ from solver.continuation.transient import SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray
-from solver.outcome import Outcome
+from solver.outcome import Outcome, in_digits
 from solver.results.history import HELD_FORCE
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
@@ -66,7 +66,8 @@ def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray
     joint = wearing.joint_of(state)
     point = relax_to_periodic(joint, worn, state.point, joint, wearing.run)
     if isinstance(point, Failure):
-        return point if point.outcome is Outcome.ADRIFT else Failure(Outcome.MARCH_FAILED)
+        reason = point.outcome if point.outcome is Outcome.ADRIFT else Outcome.MARCH_FAILED
+        return Failure(reason, f"no state is found beyond cycle {in_digits(state.cycle)}: {point.message}")
     # a small fold of the branch at a corner is no jump, and there may be many corners
     if vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))

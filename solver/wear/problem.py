@@ -22,7 +22,7 @@ from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths,
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import SHORTEST_STEP
-from solver.outcome import Outcome
+from solver.outcome import Outcome, in_digits
 from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, ROUND_OFF, Resolution, Scheme, SolverSettings, ToTheEnd
 from solver.structure.joint import Case
@@ -138,7 +138,8 @@ class WearProblem(WearingJoint):
         if isinstance(self.request.cycles, ToTheEnd) and (failure := wears_without_end(state, course)) is not None:
             return failure
         most = HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
-        return Failure(Outcome.MARCH_FAILED) if state.wears and self.run.budget.iterations > most else None
+        said = f"more than {most} iterations in {len(course.ends)} steps, up to cycle {in_digits(state.cycle)}"
+        return Failure(Outcome.MARCH_FAILED, said) if state.wears and self.run.budget.iterations > most else None
 
     def with_first_length(self, state: WearState) -> WearState:
         """The first state with its step limit, and the length of an adaptive step; at least two lead to the limit."""

@@ -274,6 +274,7 @@ class Solution:
         return {
             "outcome": Outcome.CONVERGED if failure is None else failure.outcome,
             "message": "" if failure is None else failure.message,
+            "reference_end": next((each.failure.message for each in every[1:] if each.failure), ""),
             "newton_iterations": sum(each.iterations for each in every),
             "run_time": sum(each.seconds for each in every),
         }

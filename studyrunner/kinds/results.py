@@ -83,8 +83,9 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
     if not endless:
         asked = 0.0 if task.to_the_end is not None else end
         last = asked if whole else min(last, asked)
-    if not message and known.size and not outcome.complete:
-        message = describe_reach(last, end, float(history.worn_volume_error[known[-1]]))
+    if known.size and not outcome.complete:
+        reach = describe_reach(last, end, float(history.worn_volume_error[known[-1]]))
+        message = "; ".join(filter(None, (message, reach)))
     own: dict[str, Any] = {
         "outcome": int(outcome),
         "jump_cycle": jump,

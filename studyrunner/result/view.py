@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.result.opening import as_history, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
-from studyrunner.units import show_cycles, show_percent, show_value
+from studyrunner.units import show_cycles, show_value
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
@@ -267,10 +267,6 @@ class Result:
             if known.max() > 0.0:
                 break
         return self.largest(known)
-
-    def show_error(self, point: Point) -> str:
-        """Error of the worn volume of a point as text: "2.6 %"."""
-        return show_percent(float(self.errors[self.place(point)]), float(self.rtol[self.place(point)]))
 
     def largest(self, values: NDArray[Any]) -> dict[str, int]:
         """The point at which an array of points is largest."""

@@ -28,34 +28,30 @@ from studyrunner.summary.findings import (
     where_is,
 )
 from studyrunner.system.progress import count
-from studyrunner.units import show_cycles, show_percent, show_rtol
+from studyrunner.units import scale_for, show_percent, show_rtol
 
 MOST_LINES = 9
 
 SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
 
+_LARGEST = 100.0
+"""Size, m, of a model without a mesh: masses on springs that are usual in textbooks move by some 10 m."""
+
 _MOST_FAILURES, _MOST_MODES = 2, 4
 _WIDTH, _LONGEST = 12, 240
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
-
-
-_FAR = 10.0
-"""Errors of more than so many times `rtol` do not fall in proportion to it."""
 
 _AUTOMATIC = 'harmonics and samples of "auto", where numbers are given'
 ADVICE = {
     Outcome.TIME_LIMIT: "--retry-failed continues with a larger solver.time_limit",
     Outcome.RESONANCE_LOST: "Try another range in loading.between, or another axes.sweep",
-    Outcome.START_FAILED: f"Try another axes.sweep, or {_AUTOMATIC}",
-    Outcome.BRANCH_LOST: f"Try another axes.sweep, or {_AUTOMATIC}",
     Outcome.UNSTABLE: "Try another axes.sweep",
-    Outcome.MARCH_FAILED: f"Try a smaller solver.rtol or step, or {_AUTOMATIC}",
     Outcome.STEP_TOO_LONG: 'Try scheme = "adaptive", or a smaller step',
-    Outcome.SENSITIVE: "Try a smaller solver.rtol or step; if that fails, the joint is that sensitive: use [scatter]",
-    Outcome.INACCURATE: f"Try {_AUTOMATIC}",
-    Outcome.CERTIFICATE_FAILED: f"Try a smaller solver.tolerance, or {_AUTOMATIC}",
+    Outcome.SENSITIVE: "[scatter] shows how far the worn volume scatters",
     Outcome.NO_FINAL_STATE: "Try an end in slow_time.cycles or slow_time.until",
+    **dict.fromkeys((Outcome.START_FAILED, Outcome.BRANCH_LOST), f"Try another axes.sweep, or {_AUTOMATIC}"),
+    **dict.fromkeys((Outcome.INACCURATE, Outcome.CERTIFICATE_FAILED), f"Try {_AUTOMATIC}"),
 }
 """What may help, by outcome."""
 
@@ -108,9 +104,9 @@ def summarise(result: Result) -> Summary:
             *wear_and_response(result, resonance),
             *filter(None, (shortest_life(result), compare_meshes(result))),
         ]
-        doubts += filter(None, (_not_small(result), _in_radians(result, resonance), _too_few_counts(result)))
+        doubts += [_not_small(result), _too_far(result), _in_radians(result, resonance), _too_few_counts(result)]
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
-    findings += [*_failures(result), *(Finding("doubt", "beware", doubt) for doubt in doubts[:1])]
+    findings += [*(Finding("doubt", "beware", doubt) for doubt in doubts if doubt), *_failures(result)]
     if certainty := certainty_of(result, wore=wore):
         findings.append(certainty)
     return Summary(result.computed.size, int(result.computed.sum()), tuple(findings))
@@ -149,18 +145,9 @@ def _failures(result: Result) -> Iterator[Finding]:
 def _first_ended(result: Result, number: int) -> tuple[dict[str, int], str]:
     """The first point that ended in this way, and what is to be added to its outcome, which may be nothing."""
     place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
-    point = result.point_at(place)
-    if number == Outcome.SENSITIVE:
-        # what its message holds is no result
-        return point, ""
-    message = str(result.dataset["message"].values[place]) if result.has("message") else ""
-    if result.has_values[place] and result.counted[:-1] not in message:
-        last = show_cycles(float(result.last_cycle[place]), result.counted)
-        end = "" if result.computed[place] else f"computed up to {last}"
-        is_known = 0.0 < result.errors[place] <= SENSITIVE_ERROR
-        known = f"worn volume known within {result.show_error(point)}" if is_known else ""
-        message = ", ".join(filter(None, (end, known, message)))
-    return point, message
+    # the volumes in the message of a point whose error is known are no results
+    is_silent = not result.has("message") or (number == Outcome.SENSITIVE and np.isfinite(result.errors[place]))
+    return result.point_at(place), "" if is_silent else str(result.dataset["message"].values[place])
 
 
 # --- values that are hardly what was meant ---
@@ -178,13 +165,28 @@ def _not_small(result: Result) -> str:
     pairs = contact_pairs(result, result.shown)
     areas = [float(np.nansum(pairs.area[pairs.surface == surface])) for surface in np.unique(pairs.surface)]
     width = math.sqrt(min((area for area in areas if area > 0.0), default=math.inf))
-    ratios = np.nan_to_num(np.where(result.computed, result.dataset["largest_wear_depth"].values, 0.0) / width)
+    ratios = np.nan_to_num(np.where(result.has_values, result.dataset["largest_wear_depth"].values, 0.0) / width)
     if ratios.max() <= SMALL:
         return ""
     return (
         f"the method assumes shallow wear, but the depth is {ratios.max():.2g} of the contact width at"
         f" {where_is(result, result.largest(ratios))}: take fewer cycles, and check that wear_coefficient is in 1/Pa"
     )
+
+
+def _too_far(result: Result) -> str:
+    """A response that is larger than the model: the displacements of a linear structure have no limit."""
+    if not result.has("response_amplitude"):
+        return ""
+    moved = result.over_points("response_amplitude", lambda values: np.nan_to_num(values).max(axis=-1))
+    moved, mesh = np.where(result.has_values, moved, 0.0), [f"mesh_{axis}" for axis in "xyz" if result.has("mesh_x")]
+    size = max((float(np.ptp(result.dataset[name].values)) for name in mesh), default=_LARGEST)
+    if moved.max() <= size:
+        return ""
+    by, large = (scale_for("m", each).show(each) for each in (float(moved.max()), size))
+    than = f"the {large} of the model" if mesh else f"{large}: models are smaller"
+    at = where_is(result, result.largest(moved))
+    return f"a response moves by {by} at {at}, more than {than}: check the unit of the excitation, N, and of the model"
 
 
 def _in_radians(result: Result, first: float) -> str:
@@ -239,9 +241,11 @@ def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
         point = result.largest(np.where(above if above.any() else known, errors, -1.0))
         worst = float(errors[result.place(point)])
         values |= {"worst": worst, "where": result.describe(point) if result.varying else ""}
-        if above.any() and worst < math.inf:
-            in_volume = of == "worn volume"
-            values["advice"] = _advise_error(result, result.place(point), worst) if in_volume else "a smaller rtol"
+        schemes = result.dataset["scheme"].values if of == "worn volume" and "scheme" in result.axes else OWN_STEPS
+        scheme = str(schemes[point.get("scheme", 0)])
+        if above.any() and math.isfinite(worst) and scheme not in OWN_STEPS:
+            # with which the history is compared, so that its error is smaller
+            values["advice"] = 'scheme = "adaptive"'
     return Finding("certainty", "certainty", _describe_certainty(result.computed.size, values), values)
 
 
@@ -273,18 +277,3 @@ def _errors_of_modes(result: Result) -> NDArray[np.float64]:
             value, error = np.abs(result.dataset[name].values), result.dataset[f"{name}_error"].values
             errors = np.maximum(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
     return errors
-
-
-def _advise_error(result: Result, place: tuple[int, ...], error: float) -> str:
-    """What to set so that the error of a worn volume is smaller. error: relative, above `rtol`."""
-    scheme, rtol = "adaptive", float(result.rtol[place])
-    if "scheme" in result.axes:
-        scheme = str(result.dataset["scheme"].values[place[result.axes.index("scheme")]])
-    if scheme not in OWN_STEPS:
-        by_depth = scheme == "explicit" and "largest_depth" in result.study.get("slow_time", {})
-        return f'scheme = "adaptive" or a smaller {"slow_time.largest_depth" if by_depth else "step"}'
-    if error >= _FAR * rtol:
-        return "a smaller solver.rtol"
-    # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
-    digits, exponent = f"{rtol**2 / error:.12e}".split("e")
-    return f"solver.rtol = {float(f'{digits[:3]}e{exponent}'):g}"

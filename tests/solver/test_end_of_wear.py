@@ -44,7 +44,7 @@ def test_the_count_is_that_at_which_the_history_has_the_wear(scheme):
 
 
 def test_the_error_of_a_life_is_not_known_where_the_reference_solution_has_no_state(monkeypatch):
-    monkeypatch.setattr(problem, "report_only", lambda *_, **__: Failure(Outcome.MARCH_FAILED))
+    monkeypatch.setattr(problem, "report_only", lambda *_, **__: Failure(Outcome.MARCH_FAILED, "lost"))
     found = march(4000.0, "adaptive", until=WearTarget("wear_depth", 2.3e-5))
     assert found.cycles_to_target > 0.0
     assert found.cycles_to_target_error == np.inf

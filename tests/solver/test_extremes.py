@@ -17,7 +17,7 @@ from solver import build_model
 from solver.accuracy.certificate import certify
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import Failure, State
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.newton.run import Run
@@ -57,12 +57,11 @@ def elastic(n_pairs=3):
     return Case(random_model(1, ("3d",) * n_pairs), OMEGA)
 
 
-def block(stiffness=(1e7, 2e7), *, ground=1e5, damping=0.02, preload=100.0, area=None, gap=0.0, lift=0.0):
+def block(stiffness=(1e7, 2e7), *, ground=1e5, preload=100.0, lift=0.0):
     """A rigid block of 1 kg on elastic pairs without mass, pressed on, pushed along both tangents.
 
     stiffness: N/m, of each pair, half as much along the tangents. ground: N/m, all that holds the block but friction.
-    damping: of critical, of the block on its pairs. preload: N, on the block. lift: vibrating force along the normal
-    over that along the first tangent.
+    preload: N, on the block. lift: vibrating force along the normal over that along the first tangent.
     """
     n_pairs = len(stiffness)
     n = 3 + 3 * n_pairs
@@ -77,9 +76,10 @@ def block(stiffness=(1e7, 2e7), *, ground=1e5, damping=0.02, preload=100.0, area
     mass[:3, :3] = np.eye(3)
     load_static[0] = preload
     load_harmonic[:3] = lift, 1.0, 0.5j
-    c, dofs = 2.0 * damping / np.sqrt(max(stiffness)) * k, 3 + np.arange(3 * n_pairs).reshape(n_pairs, 3)
-    loads = {"load_static": load_static, "load_harmonic": load_harmonic, "response": [1, 2], "gap": gap}
-    return Case(build_model(mass, c, k, dofs, 1e-4 if area is None else area, **loads), BLOCK)
+    # 2 % of critical damping, of the block on its pairs
+    c, dofs = 0.04 / np.sqrt(max(stiffness)) * k, 3 + np.arange(3 * n_pairs).reshape(n_pairs, 3)
+    loads = {"load_static": load_static, "load_harmonic": load_harmonic, "response": [1, 2]}
+    return Case(build_model(mass, c, k, dofs, 1e-4, **loads), BLOCK)
 
 
 def slider(stiffness=1e5, damping=0.0, force=10.0, omega=2 * np.pi * 160.0):
@@ -102,7 +102,7 @@ def run(case):
 
 
 def judge_start(case, start):
-    assert (start.state is None) == (start.outcome is not Outcome.CONVERGED)
+    assert (start.state is None) == (start.outcome is not Outcome.CONVERGED) == bool(start.message)
     if start.state is None:
         return
     joint = build_case(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
@@ -139,10 +139,9 @@ BASES = {"elastic": elastic(), "block": block(), "slider": slider()}
 OR_TOO_LONG = (*COMPLETE, Outcome.STEP_TOO_LONG)
 
 
-def undamped(case):
-    linear = case.model.linear[0]
-    without = replace(linear, damping=np.zeros_like(linear.damping))
-    return replace(case, model=replace(case.model, linear={0: without}))
+def scaled(case, matrix, factor):
+    changed = replace(case.model.linear[0], **{matrix: factor * getattr(case.model.linear[0], matrix)})
+    return replace(case, model=replace(case.model, linear={0: changed}))
 
 
 def extreme_cases():
@@ -155,11 +154,12 @@ def extreme_cases():
         yield f"{name}, wear 1e4", replace(base, wear=1e4 * base.wear), OR_TOO_LONG
         yield f"{name}, 50 times the load", replace(base, amplitude=50.0 * base.amplitude), COMPLETE
     held = 2.0 * np.pi * glued_frequency(elastic().model)
-    yield "no damping, at a resonance of the held structure", replace(undamped(elastic()), omega=held), None
+    free = scaled(elastic(), "damping", 0.0)
+    yield "no damping, at a resonance of the held structure", replace(free, omega=held), None
     # lightly damped on stiff ground: there is a state, whatever its history
     yield "a block that bounces", block(lift=0.2), (*Outcome,)
-    yield "no damping, elastic", undamped(elastic()), COMPLETE
-    yield "no damping, block", undamped(block()), COMPLETE
+    yield "no damping, elastic", free, COMPLETE
+    yield "no damping, block", scaled(block(), "damping", 0.0), COMPLETE
     # no load but a vibrating one on pairs that just touch: predicted forces whose squares underflow
     yield "1e-160 N", replace(block(preload=0.0, lift=0.2), amplitude=1e-160), None
 
@@ -230,6 +230,30 @@ def test_hundreds_of_pairs():
     case = Case(random_model(3, ("constant_load_one_tangent",) * 200), OMEGA, amplitude=20.0, settings=settings)
     history = run_converged(case)
     assert 0 < (history.wear_depth[-1] > 0.0).sum() < 200
+
+
+FEW = SolverSettings(3, 64)
+WITHOUT_STATE = {
+    Outcome.CERTIFICATE_FAILED: Case(scene("vibro_impact", 3), 1.0, amplitude=2e3, settings=FEW),
+    Outcome.START_FAILED: scaled(elastic(), "stiffness", -1.0),
+    Outcome.TIME_LIMIT: replace(elastic(), settings=replace(SETTINGS, time_limit=1e-9)),
+    Outcome.UNSETTLED: replace(block(ground=0.0, lift=0.3), amplitude=1e3, settings=FEW),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("outcome", WITHOUT_STATE)
+def test_where_there_is_no_state_a_sentence_says_why(outcome):
+    start, history = run(WITHOUT_STATE[outcome])
+    assert start.outcome is history.outcome is outcome
+    assert start.message == history.message
+
+
+@pytest.mark.parametrize("outcome", Outcome)
+def test_no_end_can_be_without_a_sentence(outcome):
+    if outcome is not Outcome.CONVERGED:
+        with pytest.raises(ValueError, match=outcome.meaning):
+            Failure(outcome, "")
 
 
 # --- random scenes ---

@@ -324,7 +324,7 @@ def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
 def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     def run(case):
         lost = case.guide is not None and case.depth.max() > 0.5 * float(whole.wear_depth[-1].max())
-        return Failure(Outcome.MARCH_FAILED) if lost else exact_run(case)
+        return Failure(Outcome.MARCH_FAILED, "lost") if lost else exact_run(case)
 
     monkeypatch.setattr(integrating, "run_block", exact_run)
     whole = exactly_known((0, 10, 60))

@@ -83,7 +83,8 @@ def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch):
     whole, own = usual(), problem.full_check
 
     def give_up(work, state, *more, **named):
-        return own(work, state, *more, **named) if state.cycle <= 12_000.0 else Failure(Outcome.CERTIFICATE_FAILED)
+        lost = state.cycle > 12_000.0
+        return Failure(Outcome.CERTIFICATE_FAILED, "lost") if lost else own(work, state, *more, **named)
 
     monkeypatch.setattr(problem, "full_check", give_up)
     ended = worn()
@@ -115,7 +116,7 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
 
     def go_astray(of, state):
         lost = isinstance(of.steps, Adaptive) and state.cycle >= 12_000.0
-        return Failure(Outcome.MARCH_FAILED) if lost else own(of, state)
+        return Failure(Outcome.MARCH_FAILED, "lost") if lost else own(of, state)
 
     monkeypatch.setattr(WearProblem, "step", go_astray)
     history = worn()

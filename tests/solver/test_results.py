@@ -134,6 +134,7 @@ def test_the_loop_of_a_sliding_mass_is_a_rectangle_of_the_energy_that_friction_t
 
 ALL = np.arange(3)
 UNKNOWN = {"worn_volume": 1e-9 * np.arange(3.0), "worn_volume_error": np.array([0.0, 0.1, 0.6])}
+ALONE = {"worn_volume_error": np.array([0.0, np.inf, np.inf]), "reference_end": "lost"}
 
 
 @pytest.mark.parametrize(
@@ -148,6 +149,7 @@ UNKNOWN = {"worn_volume": 1e-9 * np.arange(3.0), "worn_volume_error": np.array([
         (ALL, {**UNKNOWN, "cut_off_cycle": 11.0}, Outcome.SENSITIVE, "worn volume 2 mm3"),
         # an unknown error is no large one
         (ALL, {**UNKNOWN, "worn_volume_error": np.full(3, np.inf)}, Outcome.INACCURATE, "is not known: "),
+        (ALL, {**UNKNOWN, **ALONE}, Outcome.INACCURATE, "a coarser sweep the history ends early: lost"),
         # a history that shares it and ends before is known
         ([0, 1], UNKNOWN, Outcome.CONVERGED, ""),
         # a joint that is held says so beside all else

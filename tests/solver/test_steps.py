@@ -106,11 +106,11 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
         return not euler or tried[-1][0] != "adaptive" or tried[-1][1] <= found_from * shortest
 
     tried = failing(monkeypatch, fails)
-    monkeypatch.setattr(control, "jump", lambda *_: Failure(Outcome.MARCH_FAILED))
+    monkeypatch.setattr(control, "jump", lambda *_: Failure(Outcome.MARCH_FAILED, "lost"))
     of.limit = end * shortest
     found = of.step(first)
     if doublings is None:
-        assert found == Failure(Outcome.MARCH_FAILED)
+        assert found == Failure(Outcome.MARCH_FAILED, "lost")
     else:
         assert isinstance(found, WearState)
         assert tried[-2:] == [("adaptive", 2.0 * shortest), ("adaptive", 4.0 * shortest)]

@@ -1,5 +1,6 @@
 """A start state is that of its own point, whatever else is asked for; folds; sweeps resumed, and sweeps in vain."""
 
+import re
 from dataclasses import replace
 from functools import partial
 
@@ -13,6 +14,7 @@ from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import FIRST_ITERATIONS, follow_branch
+from solver.newton.run import guarded
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import Resolution, SolverSettings, all_orders
@@ -146,6 +148,14 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
     starts = dict(follow_branch(model, 0.5, 20.0, np.array([frequency]), "up", SolverSettings(3, 64)))
     assert starts[0].outcome is Outcome.SINGULAR
     assert starts[0].state is None
+    assert f"at {frequency:.6g} Hz" in starts[0].message
+
+
+@pytest.mark.parametrize("fails", [np.linalg.inv, np.linalg.eigvals])
+def test_what_else_fails_in_linear_algebra_is_no_singular_structure(fails):
+    found = guarded(lambda: [fails(np.full((2, 2), value)) for value in (0.0, np.nan)])
+    assert found.outcome is Outcome.EXCEPTION
+    assert re.match(r"LinAlgError: .* \(.*test_sweep.py, line", found.message)
 
 
 def test_a_curve_of_a_slider_takes_few_iterations():

@@ -80,7 +80,7 @@ def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np
         "reference_volume": 1.5 * line,
     }
     totals = {"jump_cycle": np.nan, "error_estimate": 0.0, "newton_iterations": 7, "run_time": 0.5, "branch": 2}
-    totals |= {"last_cycle": float(cycles[-1]), "fold_frequency": 101.5, "step_limit": 250.0}
+    totals |= {"last_cycle": float(cycles[-1]), "fold_frequency": 101.5, "step_limit": 250.0, "message": "lost"}
     at = np.array(cycles)
     return WearHistory(outcome=outcome, cycles=at, loop_displacement=loops, loop_force=-loops, **of_cycles, **totals)
 
@@ -111,7 +111,7 @@ class FakedBlocks:
         rate = rate * (1.0 if case.guide is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
         response = 1e-6 * block.excitation_amplitude * (1.0 + case.depth.sum() + np.array([[0.0], [1.0]]))
         if block.name in self.fails:
-            return Failure(self.fails[block.name])
+            return Failure(self.fails[block.name], "lost")
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
         return BlockResult(
             cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, guide=Guide((), 1.0), iterations=7

@@ -188,7 +188,7 @@ def test_what_was_computed_of_a_point_that_failed_is_kept():
     assert result.values["worn_volume"][:2].tolist() == [0.0, 1.0]
     assert result.values["largest_wear_depth"] == 1.0
     assert totals_of(result, "branch", "fold_frequency", "newton_iterations") == [2, 101.5, 7]
-    assert result.values["message"] == "computed up to cycle 50 of 20 000, the worn volume there to 3 %"
+    assert result.values["message"] == "lost; computed up to cycle 50 of 20 000, the worn volume there to 3 %"
 
 
 def test_loops_are_read_at_the_counts_of_a_point():
@@ -231,6 +231,8 @@ def test_bundled_studies_are_plausible(name):
         ("dovetail", "axes.frequency=150e3", "frequency 1.5e+05 Hz", "in mHz (then it is 150 Hz)"),
         ("dovetail", "axes.excitation_amplitude=[1, 1e9]", "excitation_amplitude 1e+09 N", "(then it is 1e+06 N)"),
         ("dovetail", "slow_time.until={wear_depth=5.0}", "slow_time.until.wear_depth 5 m", "in um (then it is 5e-06"),
+        ("dovetail", "slow_time.until={worn_volume=1.0}", "slow_time.until.worn_volume 1 m3", "in mm3"),
+        ("dovetail", "slow_time.cycles=1e20", "slow_time.cycles 1e+20 is more than machines live", "meant"),
         ("mission", "mission.0.excitation_amplitude=1e9", "excitation_amplitude 1e+09 N", "in mN"),
     ],
 )
@@ -301,7 +303,7 @@ def test_histories_of_one_that_ended_early_are_results_all_the_same(last, outcom
         assert there == [True, last >= end]
         assert result.values["error_estimate"] == pytest.approx(0.03 * result.values["worn_volume"][there][-1])
     # the message of the integrated one counts its own cycles
-    assert [result.values["message"] == "at cycle 9" for result in found] == [True, False, False]
+    assert ["at cycle 9" in result.values["message"] for result in found] == [True, False, False]
     assert all(result.values["message"] == "" for result in found if result.values["outcome"] == 0)
 
 

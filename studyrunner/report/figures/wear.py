@@ -124,7 +124,7 @@ def _with_error(result: Result, point: Point) -> str:
     if np.isinf(result.errors[place]):
         return show_known(np.inf)
     remark = ", sensitive" if result.ended(Outcome.SENSITIVE)[place] else ", above rtol" if result.above[place] else ""
-    return f" ± {result.show_error(point)}{remark}"
+    return f" ± {show_percent(float(result.errors[place]), float(result.rtol[place]))}{remark}"
 
 
 # --- over an axis of the study ---
