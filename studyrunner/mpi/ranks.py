@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studyrunner.system.machine import package_digest
-from studyrunner.system.process import uninterrupted
+from studyrunner.system.process import die, leave_endings, uninterrupted
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -35,7 +35,14 @@ _REMEDY = "start run-study with the mpiexec of its environment or, on a cluster,
 
 
 class LauncherError(Exception):
-    """The launcher started processes that cannot work together: each would compute the whole study."""
+    """The launcher started processes that cannot work together: each would compute the whole study.
+
+    known: whether all of them know; otherwise some may wait for this one.
+    """
+
+    def __init__(self, message: str, *, known: bool = True) -> None:
+        super().__init__(message)
+        self.known = known
 
 
 def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
@@ -82,6 +89,10 @@ class Ranks:
 
     def abort(self, status: int) -> None:
         """Ends all ranks at once; returns only where there is no other rank."""
+        if launcher_size() > 1:
+            # they wait in MPI_Init
+            time.sleep(_SECONDS_TO_PRINT)
+            die()
 
 
 class MpiRanks(Ranks):
@@ -103,6 +114,8 @@ class MpiRanks(Ranks):
         with warnings.catch_warnings():
             # start_ranks says the same with the remedy.
             warnings.filterwarnings("ignore", "suspicious MPI execution environment", RuntimeWarning)
+            # it waits for all ranks, deaf; UCX has taken SIGHUP meanwhile
+            leave_endings()
             MPI.Init_thread(MPI.THREAD_FUNNELED)
         self._mpi, self._world = MPI, MPI.COMM_WORLD
         self._sent: list[MPI.Request] = []
@@ -170,7 +183,8 @@ def start_ranks() -> Ranks:
     except (ImportError, RuntimeError, LauncherError) as error:
         if announced <= 1:
             return Ranks()
-        raise LauncherError(f"{announced} processes were started that cannot talk ({error}): {_REMEDY}") from error
+        wrong = f"{announced} processes were started that cannot talk ({error}): {_REMEDY}"
+        raise LauncherError(wrong, known=isinstance(error, LauncherError)) from error
     hosts = {software: host for host, software in ranks.software}
     if announced > ranks.size:
         wrong = f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}"

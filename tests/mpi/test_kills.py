@@ -139,6 +139,7 @@ ENDED_BY = {
     "the launcher": (2, signal.SIGTERM, (None,)),
     "one rank": (2, signal.SIGTERM, (1,)),
     "one rank first": (2, signal.SIGTERM, (1, 0)),
+    "the terminal of a rank": (2, signal.SIGHUP, (1,)),
 }
 """Number of ranks, signal, and who gets it one after the other: ranks, or the process that was started."""
 

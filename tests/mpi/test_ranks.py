@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -15,6 +16,7 @@ from tests.mpi.launching import (
     CHEAP,
     FAKED,
     ROOT,
+    SOON,
     count_entries,
     launcher,
     options,
@@ -145,6 +147,17 @@ if os.environ["PMI_RANK"] == "1":
 sys.argv = [{faked!r}, *sys.argv[1:]]
 runpy.run_path({faked!r}, run_name="__main__")
 """
+ENDS_EARLY = """\
+import os, signal, sys
+class Finder:
+    @staticmethod
+    def find_spec(name, *_):
+        if name == "mpi4py" and os.environ["PMI_RANK"] == "{rank}":
+            {what}
+sys.meta_path.insert(0, Finder)
+from studyrunner.cli import main
+sys.exit(main())
+"""
 CANNOT_SEE = 'mount -t tmpfs none "$HIDDEN" && exec "$0" "$@"'
 """Started with a view of its own of the file system, in which the folder HIDDEN is empty."""
 
@@ -175,6 +188,36 @@ def test_processes_of_the_launcher_of_another_library(names, said, tmp_path):
     assert_refused(first, "2 processes", said, "mpiexec")
     assert (second.status, second.said) == (2, "")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("rank", "what"),
+    [
+        (0, "raise ImportError('none here')"),
+        (1, "raise ImportError('none here')"),
+        (1, "os.kill(os.getpid(), signal.SIGTERM)"),
+        (1, "open('gone', 'w').close(); os._exit(130)"),
+    ],
+)
+def test_a_rank_that_ends_before_it_has_found_the_others_ends_all(rank, what, tmp_path):
+    """The others wait in MPI_Init, and the launcher takes the end for a good one, unless it is by a signal."""
+    program = tmp_path / "early.py"
+    program.write_text(ENDS_EARLY.format(rank=rank, what=what), encoding="utf-8")
+
+    def end(running):
+        if "_exit" in what:
+            # no process that could tell the launcher is left
+            assert running.reaches((tmp_path / "gone").exists)
+            time.sleep(2.0)
+            running.process.terminate()
+
+    ended = run_to_end(2, [str(program), *STUDY], tmp_path, disturb=end)
+    assert ended.status != 0
+    assert ended.seconds < SOON
+    assert "Traceback" not in ended.said
+    if "raise" in what:
+        (line,) = [line for line in ended.said.splitlines() if "run-study" in line]
+        assert line.startswith("run-study: launcher: 2 processes were started that cannot talk (none here): ")
 
 
 def test_ranks_with_different_software(tmp_path):
