@@ -30,6 +30,7 @@ _JOBS = ("SLURM_NTASKS", "PBS_NP", "LSB_DJOB_NUMPROC", "NSLOTS")
 _SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _SECONDS_TO_PRINT = 1.0
 _SHARED = "/dev/shm/mpich_shm_"
+_SECONDS_TO_MAP = 600.0
 _MANY_SENT = 64
 _REMEDY = "start run-study with the mpiexec of its environment or, on a cluster, install mpi4py against the site's MPI"
 
@@ -163,12 +164,30 @@ class MpiRanks(Ranks):
 
 
 def _unlink_shared_memory() -> None:
-    """Removes the names of the memory that MPICH shares: the memory then ends with its processes, however they end."""
-    # systems other than Linux have no such list
+    """Removes the names of the memory that MPICH shares: the memory then ends with its processes, however they end.
+
+    So it does with memory of this user that no process has mapped: ranks that were killed while they found each other
+    have left it. A name is needed for the moment in which processes map it, and an old one by nobody.
+    """
+    for name in _mapped(Path("/proc/self/maps")):
+        Path(name).unlink(missing_ok=True)
+    # another rank may do the same
     with contextlib.suppress(OSError):
-        for line in Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace").splitlines():
-            if _SHARED in line:
-                Path(line[line.index(_SHARED) :]).unlink(missing_ok=True)
+        old = {
+            str(path)
+            for path in Path(_SHARED).parent.glob(f"{Path(_SHARED).name}*")
+            if (found := path.stat()).st_uid == os.geteuid() and found.st_mtime < time.time() - _SECONDS_TO_MAP
+        }
+        for name in old and old.difference(*map(_mapped, Path("/proc").glob("[0-9]*/maps"))):
+            Path(name).unlink(missing_ok=True)
+
+
+def _mapped(maps: Path) -> set[str]:
+    """Names of such memory that a process has mapped; none where there is no such list, or it may not be read."""
+    with contextlib.suppress(OSError):
+        lines = maps.read_text(encoding="utf-8", errors="replace").splitlines()
+        return {line[line.index(_SHARED) :] for line in lines if _SHARED in line}
+    return set()
 
 
 def start_ranks() -> Ranks:

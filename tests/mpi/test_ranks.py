@@ -1,16 +1,20 @@
 """run-study under mpiexec: the same result for any number of ranks; launching it wrong says so, once."""
 
 import contextlib
+import mmap
 import os
 import signal
 import subprocess
 import sys
 import time
+import uuid
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 import xarray as xr
 
+from studyrunner.mpi import ranks
 from tests.benchmarks.overhead import run
 from tests.mpi.launching import (
     CHEAP,
@@ -132,6 +136,40 @@ def test_a_study_ends_with_the_result_of_one_process(study, kills, tmp_path):
         assert expected.loop_force.notnull().any(["cycle", "phase", "component"]).sum() == 2 * 2
         assert "mesh_quad" in expected
     assert "worn_volume" not in expected or (expected.worn_volume.max() > 0.0)
+
+
+HOLD = "import mmap, sys; file = open(sys.argv[1], 'r+b'); held = mmap.mmap(file.fileno(), 0); print(); input()"
+
+
+@pytest.fixture
+def shared(monkeypatch):
+    """Begin of the names of memory that is taken for that of MPICH."""
+    begin = f"{ranks._SHARED}{uuid.uuid4().hex}_"
+    monkeypatch.setattr(ranks, "_SHARED", begin)
+    yield begin
+    for path in Path(begin).parent.glob(f"{Path(begin).name}*"):
+        path.unlink()
+
+
+def test_memory_of_killed_ranks_is_removed_and_no_other(shared):
+    """That of an old run which is alive has lost its name long ago, but for that of another program."""
+    paths = {name: Path(shared + name) for name in ("dead", "young", "held", "foreign", "own")}
+    for path in paths.values():
+        path.write_bytes(bytes(4096))
+        os.utime(path, (0, 0) if path.name[-5:] != "young" else None)
+    foreign = os.geteuid() == 0
+    if foreign:
+        os.chown(paths["foreign"], 12345, -1)
+    with (
+        subprocess.Popen([sys.executable, "-c", HOLD, paths["held"]], stdin=-1, stdout=-1) as holder,
+        paths["own"].open("r+b") as file,
+        mmap.mmap(file.fileno(), 0),
+    ):
+        assert holder.stdout.readline()
+        ranks._unlink_shared_memory()
+        left = {name for name, path in paths.items() if path.exists()}
+        holder.communicate(b"\n")
+    assert left == {"young", "held"} | ({"foreign"} if foreign else set())
 
 
 # --- launching it wrong ---
