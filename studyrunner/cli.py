@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import platform
 import shlex
 import sys
 import time
@@ -124,9 +125,13 @@ def _tell(ranks: Ranks, error: BaseException) -> int:
             said = str(error) if isinstance(error, KeyboardInterrupt) else ""
             print(f"run-study: {said or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
+    from solver.outcome import describe_error, is_machine_fault
+
     if isinstance(error, StorageError):
         print(f"run-study: {error}", file=sys.stderr)
-    elif isinstance(error, MachineFaultError):
+    elif isinstance(error, MachineFaultError) or is_machine_fault(error):
+        if not isinstance(error, MachineFaultError):
+            error = MachineFaultError(f"{describe_error(error)}, on {platform.node()}")
         if ranks.rank > 0:
             _leave_to_rank_0(ranks, error)
         kept = "what was computed is kept, and the same command goes on from it"

@@ -125,22 +125,49 @@ def test_a_history_that_was_given_up_goes_on_with_more_time(monkeypatch):
 
 # --- faults of the machine ---
 
+OF_NUMPY = type("_ArrayMemoryError", (MemoryError,), {})("Unable to allocate 8.00 TiB")
+FAULTS = [NO_ROOM, MemoryError(), OF_NUMPY, RuntimeError("can't start new thread")]
 
+
+def assert_goes_on(study, expected, solver, fault, capsys):
+    """The run ends in one sentence, and the same command completes it."""
+    assert main(study) == 1
+    said = capsys.readouterr().err
+    (line,) = [line for line in said.splitlines() if line.startswith("run-study: ")]
+    assert line.startswith(f"run-study: {type(fault).__name__}: {fault}")
+    assert line.endswith("a fault of the machine; what was computed is kept, and the same command goes on from it")
+    assert "Traceback" not in said
+    solver.begin_again()
+    assert main(study) == 0
+    xr.testing.assert_identical(results(), expected)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("kind", [Sweep, History])
-def test_a_run_that_a_fault_of_the_machine_has_ended_goes_on(kind, solver, capsys):
+def test_a_run_that_a_fault_of_the_machine_has_ended_goes_on(kind, fault, solver, capsys):
     expected = whole(solver, SMALL)
 
     def disturb(task, _):
         if isinstance(task, kind):
-            raise NO_ROOM
+            raise fault
 
     solver.disturb = disturb
-    assert main(SMALL) == 1
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study: ")]
-    assert line.startswith("run-study: OSError: [Errno 122] Disk quota exceeded")
-    solver.begin_again()
-    assert main(SMALL) == 0
-    xr.testing.assert_identical(results(), expected)
+    assert_goes_on(SMALL, expected, solver, fault, capsys)
+
+
+@pytest.mark.parametrize(
+    ("fault", "place"), [(FAULTS[3], "threading.Thread.start"), (FAULTS[1], "studyrunner.run.small_arrays")]
+)
+def test_a_fault_of_the_machine_outside_of_tasks(fault, place, solver, monkeypatch, capsys):
+    expected = whole(solver, SMALL)
+
+    def fail(*_, **__):
+        broken.undo()
+        raise fault
+
+    with monkeypatch.context() as broken:
+        broken.setattr(place, fail)
+        assert_goes_on(SMALL, expected, solver, fault, capsys)
 
 
 @pytest.mark.slow
@@ -154,7 +181,7 @@ def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch):
         nonlocal n_calls
         n_calls += 1
         if n_calls in (3, 30):
-            raise NO_ROOM
+            raise FAULTS[n_calls % 2]
         return own(self, *given)
 
     monkeypatch.setattr(WearingJoint, "with_rates", with_rates)
