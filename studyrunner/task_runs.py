@@ -56,8 +56,11 @@ def _compute(task: Task, models: Mapping[int, ReducedModel], keep: Keep) -> Iter
     try:
         for result in task.compute(models, keep_last):
             if isinstance(result, PointResult):
+                outcome = result.values["outcome"]
+                if outcome == Outcome.EXCEPTION and task.resume is not None:
+                    raise RuntimeError(result.values["message"])
                 # a history that its time limit has ended goes on from there when it gets more
-                is_limited = is_limited or result.values["outcome"] == Outcome.TIME_LIMIT
+                is_limited = is_limited or outcome == Outcome.TIME_LIMIT
                 result = replace(result, progress=last) if is_limited else result
             left.pop(result.place, None)
             yield result
@@ -66,6 +69,10 @@ def _compute(task: Task, models: Mapping[int, ReducedModel], keep: Keep) -> Iter
         raise_ending()
         if is_machine_fault(error):
             raise
+        if task.resume is not None:
+            # what an earlier run has left may have been altered: it is done without
+            yield from _compute(replace(task, skipped=frozenset(task.order) - left.keys(), resume=None), models, keep)
+            return
         for place in left:
             yield task.failed(place, Outcome.EXCEPTION, describe_error(error))
 

@@ -145,6 +145,8 @@ class Sweep(_FromRest):
             keep=keep,
             resume=self.resume,
         ):
+            if start.outcome is Outcome.EXCEPTION and self.resume is not None:
+                raise RuntimeError(start.message)
             n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
             yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 

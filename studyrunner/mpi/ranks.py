@@ -88,7 +88,7 @@ class Ranks:
     def close(self) -> None:
         """Ends the communication; every rank calls this once."""
 
-    def abort(self, status: int) -> None:
+    def abort(self, status: int) -> None:  # noqa: ARG002
         """Ends all ranks at once; returns only where there is no other rank."""
         if launcher_size() > 1:
             # they wait in MPI_Init

@@ -154,7 +154,7 @@ def open_mapped(given: MappedFile) -> Any:  # a type that rank 0 knows
 
 
 class MachineFaultError(Exception):
-    """The machine is at fault (`solver.outcome.is_machine_fault`), as a rank says it in a line: the run ends with it."""
+    """A fault of the machine (`solver.outcome.is_machine_fault`) in the words of a rank, with which the run ends."""
 
 
 def package_digest(package: str) -> str:

@@ -1,20 +1,27 @@
 """A run that is ended at any point, or that a fault of the machine disturbs, leaves a result; the next one ends it."""
 
+import contextlib
 import os
+import re
 import signal
+import sqlite3
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
+from solver.packing import Packed
 from studyrunner import cli
 from studyrunner.checkpoint import store
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.cli import main
 from studyrunner.kinds.wear import History, Sweep
+from studyrunner.mpi import schedule
 from studyrunner.result import write
 from studyrunner.user_error import UserError
-from tests.mpi.launching import count_entries, results
+from tests.mpi.launching import count_entries, options, results
 from tests.studyrunner.small_studies import SMALL
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
@@ -121,6 +128,62 @@ def test_a_history_that_was_given_up_goes_on_with_more_time(monkeypatch):
     # but for the limit, which stands in their attributes
     xr.testing.assert_equal(results(), results("whole.nc"))
     assert count_entries("progress") == 0
+
+
+def in_words(text):
+    """JSON, or JSON in a text of JSON, with words for the numbers that have a point."""
+    quote = '\\"' if '\\"' in text else '"'
+    return re.sub(r"\d+\.\d+", lambda _: f"{quote}much{quote}", text)
+
+
+ALTERED = {
+    "empty arrays": lambda text, arrays: (text, [array[:0] for array in map(np.atleast_1d, arrays)]),
+    "no arrays": lambda text, _: (text, []),
+    "one number": lambda text, arrays: (text, [np.ones(1, array.dtype) for array in arrays]),
+    "other numbers": lambda text, arrays: (text, [array.astype(complex) for array in arrays]),
+    "deep text": lambda _, arrays: ("[" * 100_000, arrays),
+    "text for numbers": lambda text, arrays: (in_words(text), arrays),
+    "no text": lambda _, arrays: (None, arrays),
+}
+
+
+@pytest.fixture(scope="module")
+def broken_off(tmp_path_factory):
+    """A run of the solver itself that was ended in its second history: the study, its result, and what is left."""
+    folder, own = tmp_path_factory.mktemp("broken_off"), CompletionIndex.keep
+
+    def keep(self, task, progress):
+        own(self, task, progress)
+        if isinstance(task, History) and self.n_points_finished:
+            raise KeyboardInterrupt
+
+    study = [*SMALL[:-2], *options("solver.harmonics=3", "solver.samples=32")]
+    study += [*options("axes.wear_coefficient=1e-11", "slow_time.cycles=20_000", "axes.step=100"), "-o", "out.nc"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.0)
+        assert main([*study[:-1], "whole.nc"]) == 0
+        patch.setattr(CompletionIndex, "keep", keep)
+        assert main(study) == 130
+        assert [count_entries(kind) > 0 for kind in ("result", "progress", "computed")] == [True] * 3
+        return study, results("whole.nc"), Path("out.nc.progress").read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["result", "progress", "computed"])
+@pytest.mark.parametrize("how", ALTERED)
+def test_entries_that_were_altered_are_computed_again(how, kind, broken_off):
+    study, expected, left = broken_off
+    Path("out.nc.progress").write_bytes(left)
+    with contextlib.closing(sqlite3.connect("out.nc.progress", isolation_level=None)) as changed:
+        for key, blob in changed.execute("SELECT key, blob FROM entries WHERE kind=?", [kind]).fetchall():
+            packed = store.from_blob(blob)
+            text, arrays = ALTERED[how](packed.text, packed.arrays)
+            blob = store.to_blob(Packed(text, tuple(arrays)))
+            changed.execute("UPDATE entries SET blob=? WHERE kind=? AND key=?", [blob, kind, key])
+        changed.execute("INSERT INTO entries VALUES ('crashes', 'of a task', 'no number')")
+    assert main(study) == 0
+    xr.testing.assert_identical(results(), expected)
 
 
 # --- faults of the machine ---
