@@ -239,7 +239,7 @@ class TaskPlan:
     left_out: numbers of points that are not computed alone, by reason. n_points: of the study.
     """
 
-    results: tuple[Task, ...]
+    results: Sequence[Task]
     left_out: Mapping[str, int]
     n_points: int
     sweeps: tuple[Task, ...] = ()
@@ -261,11 +261,6 @@ class TaskPlan:
         for task in self.results:
             found.setdefault(task.waits_for, []).append(task)
         return found
-
-    @property
-    def cost(self) -> float:
-        """Estimated time on one rank, s, where every point wears."""
-        return sum(task.cost for task in (*self.sweeps, *self.results))
 
 
 def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study) -> TaskPlan:
