@@ -56,8 +56,8 @@ class _Points(NamedTuple):
 _Case = tuple[TaskJoint, Excitation, SolverSettings]
 """What the states of a sweep have in common."""
 
-_Starts = dict[float, dict[WearLaw, _Points]]
-"""Points by frequency and wear law, in the order of the study."""
+_Starts = dict[WearLaw, dict[float, _Points]]
+"""Points by wear law and frequency, in the order of the study."""
 
 _Shared = tuple[Integrated, tuple[tuple[int, ...], ...]]
 """A history that is integrated, and which points, by their numbers, have each history that is read from it."""
@@ -135,7 +135,7 @@ def build_tasks(
     sharing = cache(partial(_share_histories, study))
     n_histories = 0
     for (joint, excitation, settings), starts in _cases(study, contacts, scenes).items():
-        ascending, direction = sorted(starts), excitation.direction
+        ascending, direction = sorted(set[float]().union(*starts.values())), excitation.direction
         n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
         case: dict[str, Any] = {"joint": joint, "excitation": excitation, "settings": settings}
         case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
@@ -145,12 +145,16 @@ def build_tasks(
             sweep = Sweep(number=len(sweeps), frequencies=tuple(frequencies), cost=cost, **case)
             sweeps.append(sweep)
             for position, frequency in enumerate(frequencies):
-                for law, (values, at) in starts[frequency].items():
+                for law, of_law in starts.items():
+                    if frequency not in of_law:
+                        continue
+                    values, at = of_law.pop(frequency)
                     tasks, of_start = sharing(tuple(values))
                     where = law, sweep.number, position, frequency
                     histories.append(_FromStart(n_histories, of_case, *where, tasks, at))
                     n_histories += len(tasks)
-                    causes.update(of_start)
+                    if of_start:
+                        causes.update(of_start)
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
     return TaskPlan(_Histories(histories), left_out, study.n_points, tuple(sweeps))
 
@@ -161,18 +165,20 @@ def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: Sc
     for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
         # by the places on the axes, of which there are few, and not by what stands there
-        own, all_values = dict[tuple[int, ...], _Points](), dict[tuple[int, ...], _Values]()
+        of_cases, all_values = dict[tuple[int, ...], dict[float, _Points]](), dict[tuple[int, ...], _Values]()
         for at, settings in grid(part.study):
-            key = at["frequency"], at["excitation_amplitude"], at["sweep"], id(settings)
-            if key not in own:
+            case = at["excitation_amplitude"], at["sweep"], id(settings)
+            if case not in of_cases:
                 starts = cases.setdefault((joint, Excitation.at(part.study, at), settings), {})
-                of_laws = starts.setdefault(axes.frequency[at["frequency"]], {})
-                own[key] = of_laws.setdefault(law, _Points([], []))
+                of_cases[case] = starts.setdefault(law, {})
+            frequency, of_law = axes.frequency[at["frequency"]], of_cases[case]
+            if frequency not in of_law:
+                of_law[frequency] = _Points([], [])
             place = at["wear_coefficient"], at["step"], at["scheme"]
             if place not in all_values:
                 wear, step, scheme = place
                 all_values[place] = _Values(axes.wear_coefficient[wear], axes.step[step], axes.scheme[scheme])
-            values, indices = own[key]
+            values, indices = of_law[frequency]
             values.append(all_values[place])
             indices.append((*index(at), *part.place))
     return cases
@@ -197,7 +203,7 @@ def _share_histories(study: Study, points: Sequence[_Values]) -> tuple[tuple[_To
         shared.append((integrated, tuple(map(tuple, by_wear.values()))))
         n_different = len({points[number] for number in alike})
         causes.update({cause: n_different - 1, "equal": len(alike) - n_different})
-    return tuple(_together(study, shared)), causes
+    return tuple(_together(study, shared)), +causes
 
 
 def _group(study: Study, point: _Values) -> tuple[str, Hashable]:

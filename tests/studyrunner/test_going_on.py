@@ -138,12 +138,10 @@ def in_words(text):
 
 ALTERED = {
     "empty arrays": lambda text, arrays: (text, [array[:0] for array in map(np.atleast_1d, arrays)]),
-    "no arrays": lambda text, _: (text, []),
     "one number": lambda text, arrays: (text, [np.ones(1, array.dtype) for array in arrays]),
     "other numbers": lambda text, arrays: (text, [array.astype(complex) for array in arrays]),
     "deep text": lambda _, arrays: ("[" * 100_000, arrays),
     "text for numbers": lambda text, arrays: (in_words(text), arrays),
-    "no text": lambda _, arrays: (None, arrays),
 }
 
 
