@@ -17,7 +17,7 @@ from solver.packing import Packed, pack_model, unpack_model
 from studies.model_check import check_model
 from studies.scene import Progress
 from studies.scene_error import SceneError
-from studyrunner.checkpoint.store import COMPUTED, DAMAGES, Store
+from studyrunner.checkpoint.store import COMPUTED, UNREADABLE, Store
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.ranks import Ranks
@@ -197,7 +197,7 @@ def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt
     """Builds one scene, or takes its model from an earlier run, which is equal to the last bit (`solver.packing`)."""
     known = None
     # what is damaged, altered, or of another version, is built again
-    with contextlib.suppress(*DAMAGES, SceneError):
+    with contextlib.suppress(*UNREADABLE, SceneError):
         if task.known is not None:
             model = unpack_model(task.known)
             check_model(model)

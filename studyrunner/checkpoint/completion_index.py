@@ -64,11 +64,12 @@ class CompletionIndex:
         return contents.reshape(-1).view(self.kind), there
 
     def _bytes(self, packed: Packed) -> NDArray[np.generic]:
-        """Bytes of a record. Raises ValueError where it is none."""
+        """Bytes of a record. Raises ValueError or TypeError where it is none: no such length, outcome or text."""
         (found,) = packed.arrays
-        # text of a record that cannot be read raises, and so does an outcome that there is not
         (record,) = found.view(self.kind)
         Outcome(record["outcome"]), str(record["message"])
+        if found.dtype != np.uint8:
+            raise TypeError(found.dtype)
         return found
 
     def forget_damaged(self) -> None:

@@ -32,7 +32,7 @@ RESULTS, PROGRESS, COMPUTED = "result", "progress", "computed"
 """Kinds of entries: results of tasks, start states among them; progress of tasks; what is computed once for a study, by
 the hash of its inputs."""
 
-DAMAGES = (zlib.error, ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError)
+UNREADABLE = (zlib.error, ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError)
 """What comes of reading an entry that was damaged or altered."""
 
 _LARGEST = 9 * 10**8  # bytes of an entry: SQLite has no larger ones
@@ -69,7 +69,7 @@ def to_blob(packed: Packed) -> bytes:
 
 
 def from_blob(blob: bytes) -> Packed:
-    """The value of `to_blob`. Raises one of DAMAGES where the bytes are no such value."""
+    """The value of `to_blob`. Raises one of UNREADABLE where the bytes are no such value."""
     raw = zlib.decompress(blob)
     arrays, place = [], raw.index(b"\n") + 1
     text, layout = json.loads(raw[:place])
@@ -147,13 +147,13 @@ class Store:
 
     def read(self, kind: str, key: str, take: Callable[[Packed], Any] = lambda packed: packed) -> Any:
         """An entry, as `take` gives it; None where there is none. One that is damaged, or that was altered so that
-        `take` raises one of DAMAGES, is forgotten. Raises StorageError.
+        `take` raises one of UNREADABLE, is forgotten. Raises StorageError.
         """
         if key not in self._keys[kind]:
             return None
         with _storage_errors(self.path):
             (blob,) = self._database.execute(_ONE, [kind, key]).fetchone() or (b"",)
-        with contextlib.suppress(*DAMAGES):
+        with contextlib.suppress(*UNREADABLE):
             return take(from_blob(blob))
         self.forget(kind, key)
         return None
@@ -218,7 +218,7 @@ class Store:
 def read_study(path: Path, key: str = _STUDY) -> str | None:
     """The study that a file belongs to, or another entry about itself, without its lock; None where there is none."""
     address = f"file:{quote(os.fsencode(path))}?mode=ro&immutable=1"
-    with contextlib.suppress(sqlite3.Error, *DAMAGES):
+    with contextlib.suppress(sqlite3.Error, *UNREADABLE):
         with contextlib.closing(sqlite3.connect(address, uri=True)) as database:
             (blob,) = database.execute(_ONE, [_FILE, key]).fetchone() or (b"",)
         return str(blob.decode()) or None
