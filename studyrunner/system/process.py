@@ -15,7 +15,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import Any, TextIO
+
+TYPE_CHECKING = False  # without `typing`, which takes long to load
+if TYPE_CHECKING:
+    from typing import Any, TextIO
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 """Ctrl-C, the end of the time of a job or of a terminal, and signals that batch systems send before the end."""
