@@ -155,7 +155,17 @@ def in_digits(value: float, digits: int = 6) -> str:
     return f"{float(f'{value:.{digits}g}'):.15g}"
 
 
-def describe_error(error: Exception) -> str:
+def is_machine_fault(error: BaseException) -> bool:
+    """Whether the machine has failed, its disk, its memory or its cache of kernels, and not the computation."""
+    # the last ones by name and words: numba, where its cache is cut off, and Python have no class of their own for them
+    return (
+        isinstance(error, OSError | EOFError | ImportError | MemoryError)
+        or type(error).__name__ == "UnpicklingError"
+        or "can't start new thread" in str(error)
+    )
+
+
+def describe_error(error: BaseException) -> str:
     """Text of an unexpected error in one line for the result file, with function, file and line where it was called."""
     frames = traceback.extract_tb(error.__traceback__)
     # libraries say what they were given, not what for

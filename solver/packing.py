@@ -18,6 +18,9 @@ from solver.outcome import Outcome
 
 T = TypeVar("T")
 
+_PLAIN: dict[Any, Any] = {"float": float | int, "int": int, "str": str, "bool": bool, "FloatArray": np.ndarray}
+"""Types of fields that are checked when a value is rebuilt, by their annotation."""
+
 _CLASSES: dict[str, type[Any]] = {each.__name__: each for each in (ContactInterface, LinearModel, ReducedModel)}
 
 
@@ -115,4 +118,11 @@ def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> Any:
     if kind in ("tuple", "list"):
         items = [_rebuilt(item, arrays) for item in content]
         return tuple(items) if kind == "tuple" else items
-    return _CLASSES[kind](**_rebuilt(content, arrays))
+    made = _CLASSES[kind](**_rebuilt(content, arrays))
+    for field in fields(made):
+        value = getattr(made, field.name)
+        if not isinstance(value, _PLAIN.get(field.type, object)):
+            raise TypeError(f"{kind}.{field.name} is of type {type(value).__name__}")
+        if field.type == "FloatArray" and value.dtype != np.float64:
+            raise TypeError(f"{kind}.{field.name} holds {value.dtype}")
+    return made

@@ -19,8 +19,9 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
-from typing import TYPE_CHECKING
 
+# `typing` takes longer to load than the rest, and Ctrl-C meanwhile is a traceback: see `commands`
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from studyrunner.api import StorageError, Study, UserError, open_result, read_study, run_study
     from studyrunner.worn_joint import compute_worn_joint

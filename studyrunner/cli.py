@@ -1,10 +1,11 @@
-"""The command `run-study` on each rank. Signals are handled from the first moment, before slow imports."""
+"""The command `run-study` on each rank. Signals are handled once the ranks have found each other."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
 import os
+import platform
 import shlex
 import sys
 import time
@@ -22,6 +23,7 @@ from studyrunner.system.process import (
     is_ending,
     keep_talking,
     last_error,
+    leave_endings,
     raise_ending,
     take_endings,
 )
@@ -69,11 +71,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     ranks = Ranks()
     try:
-        take_endings()
+        leave_endings()
         keep_talking()
         # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         ranks = start_ranks()
+        take_endings()
         status = CONVERGED
         if ranks.rank == 0:
             status = _lead(ranks, sys.argv[1:] if arguments is None else arguments)
@@ -90,11 +93,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ranks.close()
         return status
     except LauncherError as error:
-        if launcher_rank() == 0:
-            print(f"run-study: launcher: {error}", file=sys.stderr)
-        else:
-            # a launcher may pass nothing on once another process has failed
+        if launcher_rank() > 0:
+            # rank 0 mostly says the same, and a launcher may pass nothing on once another process has failed
             time.sleep(_SECONDS_FOR_A_LINE)
+        if launcher_rank() == 0 or not error.known:
+            print(f"run-study: launcher: {error}", file=sys.stderr)
+        if not error.known:
+            ranks.abort(BAD_INPUT)
         return BAD_INPUT
     except BaseException as error:
         # One rank's end must be the end of all: the others would wait for ever.
@@ -120,9 +125,13 @@ def _tell(ranks: Ranks, error: BaseException) -> int:
             said = str(error) if isinstance(error, KeyboardInterrupt) else ""
             print(f"run-study: {said or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED
+    from solver.outcome import describe_error, is_machine_fault
+
     if isinstance(error, StorageError):
         print(f"run-study: {error}", file=sys.stderr)
-    elif isinstance(error, MachineFaultError):
+    elif isinstance(error, MachineFaultError) or is_machine_fault(error):
+        if not isinstance(error, MachineFaultError):
+            error = MachineFaultError(f"{describe_error(error)}, on {platform.node()}")
         if ranks.rank > 0:
             _leave_to_rank_0(ranks, error)
         kept = "what was computed is kept, and the same command goes on from it"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
@@ -41,15 +43,17 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     return build(study, scenes, [each.n_displacements for each in facts], contact_changes(study, scenes, facts))
 
 
-def describe_tasks(tasks: Sequence[Task]) -> str:
+def describe_tasks(tasks: Iterable[Task]) -> str:
     """Tasks in words."""
-    sweeps = Counter(task.excitation.direction == "ramp" for task in tasks if isinstance(task, Sweep))
-    n_results = Counter[type]()
+    sweeps, n_results, n_modes = Counter[bool](), Counter[type](), 0
     for task in tasks:
         # of a history those that are integrated
         n_results[type(task)] += len(task.integrated) if isinstance(task, History) else task.n_results
+        if isinstance(task, Sweep):
+            sweeps[task.excitation.direction == "ramp"] += 1
+        elif isinstance(task, Mode):
+            n_modes += 1
     ways = " and ".join(count(sweeps[ramp], word) for ramp, word in ((False, "sweep"), (True, "ramp")) if sweeps[ramp])
-    n_modes = sum(isinstance(task, Mode) for task in tasks)
     parts = {
         Sweep: f"{count(n_results[Sweep], 'start state')} by {ways}",
         History: count(n_results[History], "wear history", "wear histories"),
@@ -66,17 +70,50 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
+    effort = _effort_of(plan)
     rows = [
-        *_of_study(study, facts, plan),
-        *_of_effort(study, largest, plan, built_with, seconds),
+        *_of_study(study, facts, plan, effort),
+        *_of_effort(study, largest, plan, effort, built_with, seconds),
         *remarks_of_study(study),
         *(("note", doubt) for doubt in doubts_of_study(study, largest)),
     ]
     return [f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows]
 
 
-def _of_study(study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan) -> Iterator[tuple[str, str]]:
-    facts, tasks = merge_facts(of_scenes), (*plan.sweeps, *plan.results)
+class _Effort(NamedTuple):
+    """What the tasks of a plan take.
+
+    words: the tasks. n_unknowns: most of one task. seconds, longest: estimated time on one rank where every point
+    wears, and of the longest task with the sweep that it waits for.
+    """
+
+    words: str
+    n_unknowns: int
+    seconds: float
+    longest: float
+
+
+def _effort_of(plan: TaskPlan) -> _Effort:
+    """In one pass: the tasks may be made on the way, and there may be a million of them."""
+    n_tasks, n_unknowns, seconds, longest = 0, 0, 0.0, 0.0
+    sweeps = {sweep.number: sweep.cost for sweep in plan.sweeps}
+
+    def look() -> Iterator[Task]:
+        nonlocal n_tasks, n_unknowns, seconds, longest
+        for task in itertools.chain(plan.sweeps, plan.results):
+            n_tasks, n_unknowns, seconds = n_tasks + 1, max(n_unknowns, task.n_unknowns), seconds + task.cost
+            start = task.waits_for
+            longest = max(longest, task.cost if start is None else task.cost + sweeps[start[0]])
+            yield task
+
+    words = describe_tasks(look())
+    return _Effort(f"{n_tasks}: {words}", n_unknowns, seconds, longest)
+
+
+def _of_study(
+    study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan, effort: _Effort
+) -> Iterator[tuple[str, str]]:
+    facts = merge_facts(of_scenes)
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
     n_contact = facts.contact.n_contact
     contact = f"{count(n_contact, 'contact pair')} with {count(facts.n_displacements, 'relative displacement')}"
@@ -100,11 +137,11 @@ def _of_study(study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan) -> 
         yield "cycles", f"{until}; {n_stored} states are stored, spaced evenly in worn volume and cycles"
     elif study.kind.counted:
         yield "cycles", f"{study.output_counts[-1]:g}, of which {count(n_stored, 'count is', 'counts are')} stored"
-    yield "tasks", f"{len(tasks)}: {describe_tasks(tasks)}"
+    yield "tasks", effort.words
 
 
 def _of_effort(
-    study: Study, facts: SceneFacts, plan: TaskPlan, built_with: float, prepared_in: float
+    study: Study, facts: SceneFacts, plan: TaskPlan, effort: _Effort, built_with: float, prepared_in: float
 ) -> Iterator[tuple[str, str]]:
     """built_with: memory for building a scene, bytes. prepared_in: CPU time until the scenes are built, s."""
     shown = [
@@ -115,22 +152,17 @@ def _of_effort(
     if is_automatic and facts.largest_harmonics is not None:
         shown[0] += f" (at most {facts.largest_harmonics}, for which the scene holds the nodal diameters)"
     yield "solver", ", ".join(shown)
-    n_unknowns = max(task.n_unknowns for task in plan.results)
     automatic = f", with {AUTOMATIC_HARMONICS} for automatic harmonics" if is_automatic else ""
-    yield "unknowns", f"{n_unknowns} at most in one task{automatic}"
+    yield "unknowns", f"{effort.n_unknowns} at most in one task{automatic}"
     nothing = "nothing" if study.solver.shortcuts else "nothing: solver.shortcuts = false"
     left_out = [f"{count(number, 'point')}: {reason}" for reason, number in plan.left_out.items()] or [nothing]
     yield from zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True)
-    # a history with the sweep that it waits for
-    sweeps = {sweep.number: sweep.cost for sweep in plan.sweeps}
-    longest = max(task.cost + (sweeps[task.waits_for[0]] if task.waits_for else 0.0) for task in plan.results)
-    one, two, most = (
-        format_seconds(prepared_in + seconds) for seconds in (plan.cost, max(longest, plan.cost / 2.0), longest)
-    )
+    whole, longest = effort.seconds, effort.longest
+    one, two, most = (format_seconds(prepared_in + each) for each in (whole, max(longest, whole / 2.0), longest))
     yield "time", f"about {one} on one rank, {two} on two, {most} on many, {study.kind.time}"
     yield "", f"points at which all pairs stick take next to none; a first run compiles for {COMPILE_SECONDS} s more"
     n_values = plan.n_points * values_of_point(study, facts)
-    memory = memory_a_rank(n_unknowns, n_values, is_automatic, built_with) / 1e9
+    memory = memory_a_rank(effort.n_unknowns, n_values, is_automatic, built_with) / 1e9
     yield "memory", f"about {memory:.1f} GB a rank; result {n_values * 8 / 1e6:.1f} MB before compression"
 
 

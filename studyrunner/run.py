@@ -56,6 +56,7 @@ def compute_study(
     store.note_study(identity_of(study.study.name, study.scene.model))
     if fresh:
         completion.forget_all()
+    completion.forget_damaged()
     if retry_failed:
         completion.forget_failed()
     completion.give_up_crashed()

@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from solver.packing import Packed, pack_model, unpack_model
+from studies.model_check import check_model
 from studies.scene import Progress
-from studyrunner.checkpoint.store import COMPUTED, Store
+from studies.scene_error import SceneError
+from studyrunner.checkpoint.store import COMPUTED, UNREADABLE, Store
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.ranks import Ranks
@@ -183,18 +185,23 @@ class _Building(TaskHandler):
 
     def read(self, number: int) -> ReducedModel:
         """The model of a scene. Raises RuntimeError where it is no longer there."""
-        packed = self.found[number].model or self._store.read(COMPUTED, self._keys[number])
-        if packed is None:
+        packed = self.found[number].model
+        key, model = self._keys[number], None if packed is None else unpack_model(packed)
+        model = model or self._store.read(COMPUTED, key, unpack_model)
+        if model is None:
             raise RuntimeError(f"the model of scene {number} has gone")
-        return unpack_model(packed)
+        return model
 
 
 def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt]:
     """Builds one scene, or takes its model from an earlier run, which is equal to the last bit (`solver.packing`)."""
     known = None
-    # what is damaged, or of another version, is built again
-    with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
-        known = None if task.known is None else unpack_model(task.known)
+    # what is damaged, altered, or of another version, is built again
+    with contextlib.suppress(*UNREADABLE, SceneError):
+        if task.known is not None:
+            model = unpack_model(task.known)
+            check_model(model)
+            known = model
     try:
         model = build_study_scene(task.study, progress, known)
         variables = answers.build_scene_variables(task.study, model, progress)

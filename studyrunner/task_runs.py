@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import platform
 from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from solver.clock import n_compiled
-from solver.outcome import Outcome, describe_error
+from solver.outcome import Outcome, describe_error, is_machine_fault
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Keep, PointResult, Result, StartResult, Task
 from studyrunner.mpi.schedule import Run, TaskHandler
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task, hold_models
-from studyrunner.system.machine import MachineFaultError, MappedFile, is_machine_fault, open_mapped
+from studyrunner.system.machine import MappedFile, open_mapped
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
 
@@ -27,7 +26,7 @@ _LATE = 0.3
 
 
 def evaluator() -> Run:
-    """The function that does tasks on a rank, and builds scenes. A fault of the machine raises MachineFaultError."""
+    """The function that does tasks on a rank, and builds scenes. A fault of the machine is raised."""
     models: ModelCache[tuple[ReducedModel, ...]] = OrderedDict()
 
     def evaluate(task: Task | SceneTask, keep: Callable[[object], None]) -> Iterator[Result | SceneBuilt]:
@@ -57,10 +56,9 @@ def _compute(task: Task, models: Mapping[int, ReducedModel], keep: Keep) -> Iter
     try:
         for result in task.compute(models, keep_last):
             if isinstance(result, PointResult):
-                outcome, message = result.values["outcome"], result.values["message"]
-                if outcome == Outcome.EXCEPTION and is_machine_fault(message):
-                    # the solver takes whatever breaks it off for an end
-                    raise MachineFaultError(message)
+                outcome = result.values["outcome"]
+                if outcome == Outcome.EXCEPTION and task.resume is not None:
+                    raise RuntimeError(result.values["message"])
                 # a history that its time limit has ended goes on from there when it gets more
                 is_limited = is_limited or outcome == Outcome.TIME_LIMIT
                 result = replace(result, progress=last) if is_limited else result
@@ -69,11 +67,14 @@ def _compute(task: Task, models: Mapping[int, ReducedModel], keep: Keep) -> Iter
     except Exception as error:
         # An exception from a signal is no failure of the task.
         raise_ending()
-        message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
-        if isinstance(error, MachineFaultError) or is_machine_fault(message):
-            raise MachineFaultError(f"{message}, on {platform.node()}") from error
+        if is_machine_fault(error):
+            raise
+        if task.resume is not None:
+            # what an earlier run has left may have been altered: it is done without
+            yield from _compute(replace(task, skipped=frozenset(task.order) - left.keys(), resume=None), models, keep)
+            return
         for place in left:
-            yield task.failed(place, Outcome.EXCEPTION, message)
+            yield task.failed(place, Outcome.EXCEPTION, describe_error(error))
 
 
 class StudyRun(TaskHandler):

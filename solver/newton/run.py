@@ -17,7 +17,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.harmonic_balance.state import Failure, State, final_history, transfer
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING, JacobianSolver
-from solver.outcome import Outcome, describe_error
+from solver.outcome import Outcome, describe_error, is_machine_fault
 from solver.structure.condensation import SingularStructureError
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
@@ -279,7 +279,7 @@ class Run:
 
 
 def guarded(compute: Callable[[], T]) -> T | Failure:
-    """Result of a computation, or its error as a failure."""
+    """Result of a computation, or its error as a failure; a fault of the machine is none, and is raised."""
     try:
         return compute()
     except SingularStructureError as error:
@@ -287,5 +287,7 @@ def guarded(compute: Callable[[], T]) -> T | Failure:
     except OutOfTimeError:
         return Failure(Outcome.TIME_LIMIT, "the CPU time of solver.time_limit is over")
     except Exception as error:
+        if is_machine_fault(error):
+            raise
         # an error spoils one point only: the study goes on
         return Failure(Outcome.EXCEPTION, describe_error(error))

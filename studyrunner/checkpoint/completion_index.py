@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +59,30 @@ class CompletionIndex:
             # the data type of a record is part of its name
             if before < place:
                 contents[place], there[place] = contents[before], there[before]
-            elif (found := self.store.read(RESULTS, name)) is not None:
-                contents[place], there[place] = found.arrays[0], True
+            elif (found := self.store.read(RESULTS, name, self._bytes)) is not None:
+                contents[place], there[place] = found, True
         return contents.reshape(-1).view(self.kind), there
+
+    def _bytes(self, packed: Packed) -> NDArray[np.generic]:
+        """Bytes of a record. Raises ValueError or TypeError where it is none: no such length, outcome or text."""
+        (found,) = packed.arrays
+        (record,) = found.view(self.kind)
+        Outcome(record["outcome"]), str(record["message"])
+        if found.dtype != np.uint8:
+            raise TypeError(found.dtype)
+        return found
+
+    def forget_damaged(self) -> None:
+        """Forgets results and start states that were damaged or altered since they were added."""
+        for sweep in self.plan.sweeps:
+            for place, name in enumerate(sweep.names):
+                self._read_start(place, name)
+        for name in itertools.chain.from_iterable(task.names for task in self.plan.results):
+            self.store.read(RESULTS, name, self._bytes)
+
+    def _read_start(self, place: int, name: str) -> StartResult | None:
+        start: StartResult | None = self.store.read(RESULTS, name, partial(StartResult.unpack, place))
+        return start
 
     @property
     def n_points_finished(self) -> int:
@@ -85,8 +108,8 @@ class CompletionIndex:
         """Known start states that are needed, with their sweeps."""
         for sweep in self.plan.sweeps:
             for place in self._needed(sweep):
-                if (start := self.store.read(RESULTS, sweep.names[place])) is not None:
-                    yield sweep, StartResult.unpack(place, start)
+                if (start := self._read_start(place, sweep.names[place])) is not None:
+                    yield sweep, start
 
     def _needed(self, sweep: Task) -> list[int]:
         """Places of a sweep from which a task is still to begin."""
@@ -125,8 +148,8 @@ class CompletionIndex:
         without_state: set[tuple[int, int] | None] = set()
         for sweep in self.plan.sweeps:
             for place, name in enumerate(sweep.names):
-                start = self.store.read(RESULTS, name)
-                if start is not None and StartResult.unpack(place, start).n_unknowns == 0:
+                start = self._read_start(place, name)
+                if start is not None and start.n_unknowns == 0:
                     without_state.add((sweep.number, place))
                     self.store.forget(RESULTS, name)
                     self.store.forget(PROGRESS, sweep.key)

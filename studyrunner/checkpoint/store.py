@@ -15,8 +15,9 @@ import sqlite3
 import time
 import zlib
 from collections import defaultdict
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -31,6 +32,9 @@ RESULTS, PROGRESS, COMPUTED = "result", "progress", "computed"
 """Kinds of entries: results of tasks, start states among them; progress of tasks; what is computed once for a study, by
 the hash of its inputs."""
 
+UNREADABLE = (zlib.error, ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError)
+"""What comes of reading an entry that was damaged or altered."""
+
 _LARGEST = 9 * 10**8  # bytes of an entry: SQLite has no larger ones
 _SECONDS_A_TRANSACTION = 0.25  # that an entry waits for others at most, on a disk that is fast
 _SHARE_OF_WRITING = 0.1  # of the time of rank 0, on a disk that is slow
@@ -41,6 +45,7 @@ _FILE, _STUDY, _OPEN = "file", "study", "open"  # kind and keys of the entries a
 _CRASHES = "crashes"  # kind of the entries with the number of crashes of a task, by its key
 _SCHEMA = "CREATE TABLE entries (kind TEXT NOT NULL, key TEXT NOT NULL, blob BLOB NOT NULL, PRIMARY KEY (kind, key))"
 _ONE = "SELECT blob FROM entries WHERE kind=? AND key=?"
+_COUNTS = "SELECT key, CAST(CAST(blob AS TEXT) AS INTEGER) FROM entries WHERE kind=?"  # 0 for what is no number
 _MARKS = {"application_id": int.from_bytes(b"wear", "big"), "user_version": 6}
 _PRAGMAS = ("trusted_schema=OFF", "temp_store=MEMORY", "locking_mode=EXCLUSIVE", "synchronous=FULL")
 _DAMAGES = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_FORMAT)
@@ -64,7 +69,7 @@ def to_blob(packed: Packed) -> bytes:
 
 
 def from_blob(blob: bytes) -> Packed:
-    """The value of `to_blob`. Raises ValueError, TypeError or zlib.error where the bytes are no such value."""
+    """The value of `to_blob`. Raises one of UNREADABLE where the bytes are no such value."""
     raw = zlib.decompress(blob)
     arrays, place = [], raw.index(b"\n") + 1
     text, layout = json.loads(raw[:place])
@@ -103,8 +108,7 @@ class Store:
             self._file = path.stat().st_ino
             for kind, key in self._database.execute("SELECT kind, key FROM entries"):
                 self._keys[kind].add(key)
-            counts = self._database.execute("SELECT key, blob FROM entries WHERE kind=?", [_CRASHES])
-            self.crashes = {key: int(number) for key, number in counts}
+            self.crashes: dict[str, int] = dict(self._database.execute(_COUNTS, [_CRASHES]))
             remove_leftovers(path)
         self.ended_hard = _OPEN in self._keys[_FILE]
         self._write(_FILE, _OPEN, f"process {os.getpid()} on {socket.gethostname()}".encode())
@@ -141,14 +145,16 @@ class Store:
         """Keys of all entries of a kind, on the disk or on their way."""
         return self._keys[kind]
 
-    def read(self, kind: str, key: str) -> Packed | None:
-        """An entry; None where there is none, or a damaged one, which is forgotten. Raises StorageError."""
+    def read(self, kind: str, key: str, take: Callable[[Packed], Any] = lambda packed: packed) -> Any:
+        """An entry, as `take` gives it; None where there is none. One that is damaged, or that was altered so that
+        `take` raises one of UNREADABLE, is forgotten. Raises StorageError.
+        """
         if key not in self._keys[kind]:
             return None
         with _storage_errors(self.path):
             (blob,) = self._database.execute(_ONE, [kind, key]).fetchone() or (b"",)
-        with contextlib.suppress(zlib.error, ValueError, TypeError):
-            return from_blob(blob)
+        with contextlib.suppress(*UNREADABLE):
+            return take(from_blob(blob))
         self.forget(kind, key)
         return None
 
@@ -212,10 +218,10 @@ class Store:
 def read_study(path: Path, key: str = _STUDY) -> str | None:
     """The study that a file belongs to, or another entry about itself, without its lock; None where there is none."""
     address = f"file:{quote(os.fsencode(path))}?mode=ro&immutable=1"
-    with contextlib.suppress(sqlite3.Error, ValueError, TypeError):
+    with contextlib.suppress(sqlite3.Error, *UNREADABLE):
         with contextlib.closing(sqlite3.connect(address, uri=True)) as database:
             (blob,) = database.execute(_ONE, [_FILE, key]).fetchone() or (b"",)
-        return bytes(blob).decode() or None
+        return str(blob.decode()) or None
     return None
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from solver.packing import Packed
+from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
@@ -83,8 +83,20 @@ class StartResult:
 
     @classmethod
     def unpack(cls, place: int, packed: Packed) -> StartResult:
-        """The start state from the output of `pack`."""
+        """The start state from the output of `pack`. Raises an error where it is none that a history can begin from."""
+        from solver.results.history import StartState  # a run alone needs it, and numba with it
+
         moves, n_unknowns, text = json.loads(packed.text)
+        start = unpack(Packed(text, packed.arrays))
+        if not (isinstance(start, StartState) and isinstance(moves, bool) and isinstance(n_unknowns, int)):
+            raise TypeError(type(start).__name__)
+        for state in filter(None, (start.state, start.reference)):
+            n_pairs, n_coefficients = len(state.start_history), 2 * len(start.resolution.orders) + 1
+            of_pairs, all_numbers = (n_pairs, 3, n_coefficients), 3 * n_pairs * n_coefficients
+            found = state.displacement_h.shape, state.contact_force_h.shape, state.start_history.shape, n_unknowns
+            # a pair has one to three displacements
+            if found[:3] != (of_pairs, of_pairs, (n_pairs, 2)) or not all_numbers <= 3 * n_unknowns <= 3 * all_numbers:
+                raise ValueError(found)
         return cls(place, Packed(text, packed.arrays), moves, n_unknowns)
 
 
@@ -227,7 +239,7 @@ class TaskPlan:
     left_out: numbers of points that are not computed alone, by reason. n_points: of the study.
     """
 
-    results: tuple[Task, ...]
+    results: Sequence[Task]
     left_out: Mapping[str, int]
     n_points: int
     sweeps: tuple[Task, ...] = ()
@@ -249,11 +261,6 @@ class TaskPlan:
         for task in self.results:
             found.setdefault(task.waits_for, []).append(task)
         return found
-
-    @property
-    def cost(self) -> float:
-        """Estimated time on one rank, s, where every point wears."""
-        return sum(task.cost for task in (*self.sweeps, *self.results))
 
 
 def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study) -> TaskPlan:

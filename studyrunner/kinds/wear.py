@@ -20,7 +20,6 @@ from studyrunner.kinds.results import build_result
 from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, digest, up_or_down
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.study.study import Study
-from studyrunner.system.machine import MachineFaultError, is_machine_fault
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -146,8 +145,8 @@ class Sweep(_FromRest):
             keep=keep,
             resume=self.resume,
         ):
-            if start.outcome is Outcome.EXCEPTION and is_machine_fault(start.message):
-                raise MachineFaultError(start.message)
+            if start.outcome is Outcome.EXCEPTION and self.resume is not None:
+                raise RuntimeError(start.message)
             n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
             yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
 

@@ -10,7 +10,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from functools import cache, partial
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from solver.contact.wear_law import WearLaw
@@ -36,23 +38,81 @@ _REASONS = {
 """Why points share a history."""
 
 
-class _Point(NamedTuple):
-    """A point of the study. at: its index along the dimensions of the study."""
+class _Values(NamedTuple):
+    """What the points that begin from one start state may differ in."""
 
     wear_coefficient: float
     step: float
     scheme: str
-    at: Index
+
+
+class _Points(NamedTuple):
+    """Points that begin from one start state: of each its values, and its index along the dimensions of the study."""
+
+    values: list[_Values]
+    at: list[Index]
 
 
 _Case = tuple[TaskJoint, Excitation, SolverSettings]
 """What the states of a sweep have in common."""
 
-_Starts = dict[float, dict[WearLaw, list[_Point]]]
-"""Points by frequency and wear law, in the order of the study."""
+_Starts = dict[WearLaw, dict[float, _Points]]
+"""Points by wear law and frequency, in the order of the study."""
 
-_Shared = tuple[Integrated, tuple[tuple[Index, ...], ...]]
-"""A history that is integrated, and the points of each history that is read from it."""
+_Shared = tuple[Integrated, tuple[tuple[int, ...], ...]]
+"""A history that is integrated, and which points, by their numbers, have each history that is read from it."""
+
+
+class _Together(NamedTuple):
+    """The histories of a task, by place which points have them, and how many Newton iterations they take."""
+
+    integrated: tuple[Integrated, ...]
+    points: tuple[tuple[int, ...], ...]
+    iterations: float
+
+
+class _FromStart(NamedTuple):
+    """The histories from one start state. first: number of the first task. case: what they share with others."""
+
+    first: int
+    case: Mapping[str, Any]
+    law: WearLaw
+    sweep: int
+    position: int
+    frequency: float
+    tasks: Sequence[_Together]
+    at: Sequence[Index]
+
+    def history(self, number: int) -> History:
+        """A task, by its number among those from this state."""
+        integrated, points, iterations = self.tasks[number]
+        return History(
+            number=self.first + number,
+            law=self.law,
+            sweep=self.sweep,
+            position=self.position,
+            frequency=self.frequency,
+            integrated=integrated,
+            indices=tuple(tuple(self.at[point] for point in same) for same in points),
+            cost=seconds_of(self.case["n_unknowns"], iterations),
+            **self.case,
+        )
+
+
+class _Histories(Sequence[History]):
+    """The histories of a study, each made when it is asked for: `--plan` of 10^6 points takes a fifth of the memory."""
+
+    def __init__(self, starts: Sequence[_FromStart]) -> None:
+        self._starts = starts
+
+    def __len__(self) -> int:
+        return self._starts[-1].first + len(self._starts[-1].tasks)
+
+    def __iter__(self) -> Iterator[History]:
+        return (start.history(number) for start in self._starts for number in range(len(start.tasks)))
+
+    def __getitem__(self, place: Any) -> Any:
+        return tuple(self)[place]
 
 
 def build_tasks(
@@ -63,7 +123,7 @@ def build_tasks(
     Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
     their own never do. The order and the numbers of the tasks depend on the study alone.
     """
-    sweeps, histories, causes = list[Sweep](), list[History](), Counter[str]()
+    sweeps, histories, causes = list[Sweep](), list[_FromStart](), Counter[str]()
     outputs: dict[str, Any] = {
         "cycles": study.output_counts,
         "variables": tuple(study.recorded),
@@ -71,71 +131,82 @@ def build_tasks(
         "until": study.until,
         "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
     }
+    # most start states have points with the same values
+    sharing = cache(partial(_share_histories, study))
+    n_histories = 0
     for (joint, excitation, settings), starts in _cases(study, contacts, scenes).items():
-        ascending, direction = sorted(starts), excitation.direction
+        ascending, direction = sorted(set[float]().union(*starts.values())), excitation.direction
         n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
         case: dict[str, Any] = {"joint": joint, "excitation": excitation, "settings": settings}
         case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
+        of_case = case | outputs
         for frequencies in [[one] for one in ascending] if direction == "ramp" else [ascending]:
             cost = seconds_of(n_unknowns, iterations_of_sweep(direction, len(frequencies)))
             sweep = Sweep(number=len(sweeps), frequencies=tuple(frequencies), cost=cost, **case)
             sweeps.append(sweep)
             for position, frequency in enumerate(frequencies):
-                start: dict[str, Any] = {"sweep": sweep.number, "position": position, "frequency": frequency}
-                for law, points in starts[frequency].items():
-                    for together in _together(study, _share_histories(study, points, causes)):
-                        integrated, indices = zip(*together, strict=True)
-                        histories.append(
-                            History(
-                                number=len(histories),
-                                law=law,
-                                integrated=integrated,
-                                indices=tuple(itertools.chain.from_iterable(indices)),
-                                cost=seconds_of(n_unknowns, _iterations(study, integrated)),
-                                **start,
-                                **case,
-                                **outputs,
-                            )
-                        )
+                for law, of_law in starts.items():
+                    if frequency not in of_law:
+                        continue
+                    values, at = of_law.pop(frequency)
+                    tasks, of_start = sharing(tuple(values))
+                    where = law, sweep.number, position, frequency
+                    histories.append(_FromStart(n_histories, of_case, *where, tasks, at))
+                    n_histories += len(tasks)
+                    if of_start:
+                        causes.update(of_start)
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
-    return TaskPlan(tuple(histories), left_out, study.n_points, tuple(sweeps))
+    return TaskPlan(_Histories(histories), left_out, study.n_points, tuple(sweeps))
 
 
 def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet) -> dict[_Case, _Starts]:
     """Points that one sweep reaches."""
-    cases, own_axes = dict[_Case, _Starts](), study.own_axes
+    cases, index = dict[_Case, _Starts](), itemgetter(*study.own_axes)
     for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
+        # by the places on the axes, of which there are few, and not by what stands there
+        of_cases, all_values = dict[tuple[int, ...], dict[float, _Points]](), dict[tuple[int, ...], _Values]()
         for at, settings in grid(part.study):
-            starts = cases.setdefault((joint, Excitation.at(part.study, at), settings), {})
-            points = starts.setdefault(axes.frequency[at["frequency"]], {}).setdefault(law, [])
-            wear, step, scheme = (getattr(axes, name)[at[name]] for name in ("wear_coefficient", "step", "scheme"))
-            points.append(_Point(wear, step, scheme, (*(at[name] for name in own_axes), *part.place)))
+            case = at["excitation_amplitude"], at["sweep"], id(settings)
+            if case not in of_cases:
+                starts = cases.setdefault((joint, Excitation.at(part.study, at), settings), {})
+                of_cases[case] = starts.setdefault(law, {})
+            frequency, of_law = axes.frequency[at["frequency"]], of_cases[case]
+            if frequency not in of_law:
+                of_law[frequency] = _Points([], [])
+            place = at["wear_coefficient"], at["step"], at["scheme"]
+            if place not in all_values:
+                wear, step, scheme = place
+                all_values[place] = _Values(axes.wear_coefficient[wear], axes.step[step], axes.scheme[scheme])
+            values, indices = of_law[frequency]
+            values.append(all_values[place])
+            indices.append((*index(at), *part.place))
     return cases
 
 
-def _share_histories(study: Study, points: Sequence[_Point], causes: Counter[str]) -> Iterator[_Shared]:
-    """The histories to integrate from a start state; with `shortcuts = false` only equal points share one.
-
-    causes: numbers of points that are not computed alone, by reason; those of these points are added.
+def _share_histories(study: Study, points: Sequence[_Values]) -> tuple[tuple[_Together, ...], Counter[str]]:
+    """The tasks from a start state, and how many points are not computed alone, by reason; with `shortcuts = false`
+    only equal points share a history.
     """
-    groups: dict[tuple[str, Hashable], list[_Point]] = {}
-    for point in points:
-        groups.setdefault(_group(study, point), []).append(point)
+    groups: dict[tuple[str, Hashable], list[int]] = {}
+    for number, point in enumerate(points):
+        groups.setdefault(_group(study, point), []).append(number)
+    shared, causes = list[_Shared](), Counter[str]()
     for (cause, _), alike in groups.items():
-        by_wear: dict[float, list[_Point]] = {}
-        for point in sorted(alike, key=lambda point: -point.wear_coefficient):
-            by_wear.setdefault(point.wear_coefficient, []).append(point)
-        first = next(iter(by_wear.values()))[0]
+        by_wear: dict[float, list[int]] = {}
+        for number in sorted(alike, key=lambda number: -points[number].wear_coefficient):
+            by_wear.setdefault(points[number].wear_coefficient, []).append(number)
+        first = points[next(iter(by_wear.values()))[0]]
         depth = study.slow_time.largest_depth if first.scheme == "explicit" else None
         unworn = cause in ("cycles", "unworn")
         integrated = Integrated(first.scheme, first.step, depth, tuple(by_wear), unworn)
-        yield integrated, tuple(tuple(point.at for point in same) for same in by_wear.values())
-        n_different = len({point[:3] for point in alike})
+        shared.append((integrated, tuple(map(tuple, by_wear.values()))))
+        n_different = len({points[number] for number in alike})
         causes.update({cause: n_different - 1, "equal": len(alike) - n_different})
+    return tuple(_together(study, shared)), +causes
 
 
-def _group(study: Study, point: _Point) -> tuple[str, Hashable]:
+def _group(study: Study, point: _Values) -> tuple[str, Hashable]:
     """Reason for which a point may share a history, and what points that do have in common."""
     if study.solver.shortcuts:
         if study.output_counts[-1] == 0.0:
@@ -147,10 +218,10 @@ def _group(study: Study, point: _Point) -> tuple[str, Hashable]:
         if point.scheme == "explicit" and study.slow_time.largest_depth is not None:
             # the last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories
             return "largest_depth", point.wear_coefficient
-    return "alone", point[:3]
+    return "alone", point
 
 
-def _together(study: Study, shared: Iterator[_Shared]) -> Iterator[tuple[_Shared, ...]]:
+def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
     """The histories by task."""
     groups: dict[object, list[_Shared]] = {}
     for each in shared:
@@ -158,7 +229,8 @@ def _together(study: Study, shared: Iterator[_Shared]) -> Iterator[tuple[_Shared
         groups.setdefault(each if alone else each[0].wear_coefficients[0], []).append(each)
     for group in groups.values():
         for first in range(0, len(group), MOST_TOGETHER):
-            yield tuple(group[first : first + MOST_TOGETHER])
+            integrated, points = zip(*group[first : first + MOST_TOGETHER], strict=True)
+            yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), _iterations(study, integrated))
 
 
 def _iterations(study: Study, integrated: Sequence[Integrated]) -> float:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studyrunner.system.machine import package_digest
-from studyrunner.system.process import uninterrupted
+from studyrunner.system.process import die, leave_endings, uninterrupted
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -30,12 +30,20 @@ _JOBS = ("SLURM_NTASKS", "PBS_NP", "LSB_DJOB_NUMPROC", "NSLOTS")
 _SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _SECONDS_TO_PRINT = 1.0
 _SHARED = "/dev/shm/mpich_shm_"
+_SECONDS_TO_MAP = 600.0
 _MANY_SENT = 64
 _REMEDY = "start run-study with the mpiexec of its environment or, on a cluster, install mpi4py against the site's MPI"
 
 
 class LauncherError(Exception):
-    """The launcher started processes that cannot work together: each would compute the whole study."""
+    """The launcher started processes that cannot work together: each would compute the whole study.
+
+    known: whether all of them know; otherwise some may wait for this one.
+    """
+
+    def __init__(self, message: str, *, known: bool = True) -> None:
+        super().__init__(message)
+        self.known = known
 
 
 def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
@@ -80,8 +88,12 @@ class Ranks:
     def close(self) -> None:
         """Ends the communication; every rank calls this once."""
 
-    def abort(self, status: int) -> None:
+    def abort(self, status: int) -> None:  # noqa: ARG002
         """Ends all ranks at once; returns only where there is no other rank."""
+        if launcher_size() > 1:
+            # they wait in MPI_Init
+            time.sleep(_SECONDS_TO_PRINT)
+            die()
 
 
 class MpiRanks(Ranks):
@@ -103,6 +115,8 @@ class MpiRanks(Ranks):
         with warnings.catch_warnings():
             # start_ranks says the same with the remedy.
             warnings.filterwarnings("ignore", "suspicious MPI execution environment", RuntimeWarning)
+            # it waits for all ranks, deaf; UCX has taken SIGHUP meanwhile
+            leave_endings()
             MPI.Init_thread(MPI.THREAD_FUNNELED)
         self._mpi, self._world = MPI, MPI.COMM_WORLD
         self._sent: list[MPI.Request] = []
@@ -150,12 +164,30 @@ class MpiRanks(Ranks):
 
 
 def _unlink_shared_memory() -> None:
-    """Removes the names of the memory that MPICH shares: the memory then ends with its processes, however they end."""
-    # systems other than Linux have no such list
+    """Removes the names of the memory that MPICH shares: the memory then ends with its processes, however they end.
+
+    So it does with memory of this user that no process has mapped: ranks that were killed while they found each other
+    have left it. A name is needed for the moment in which processes map it, and an old one by nobody.
+    """
+    for name in _mapped(Path("/proc/self/maps")):
+        Path(name).unlink(missing_ok=True)
+    # another rank may do the same
     with contextlib.suppress(OSError):
-        for line in Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace").splitlines():
-            if _SHARED in line:
-                Path(line[line.index(_SHARED) :]).unlink(missing_ok=True)
+        old = {
+            str(path)
+            for path in Path(_SHARED).parent.glob(f"{Path(_SHARED).name}*")
+            if (found := path.stat()).st_uid == os.geteuid() and found.st_mtime < time.time() - _SECONDS_TO_MAP
+        }
+        for name in old and old.difference(*map(_mapped, Path("/proc").glob("[0-9]*/maps"))):
+            Path(name).unlink(missing_ok=True)
+
+
+def _mapped(maps: Path) -> set[str]:
+    """Names of such memory that a process has mapped; none where there is no such list, or it may not be read."""
+    with contextlib.suppress(OSError):
+        lines = maps.read_text(encoding="utf-8", errors="replace").splitlines()
+        return {line[line.index(_SHARED) :] for line in lines if _SHARED in line}
+    return set()
 
 
 def start_ranks() -> Ranks:
@@ -170,7 +202,8 @@ def start_ranks() -> Ranks:
     except (ImportError, RuntimeError, LauncherError) as error:
         if announced <= 1:
             return Ranks()
-        raise LauncherError(f"{announced} processes were started that cannot talk ({error}): {_REMEDY}") from error
+        wrong = f"{announced} processes were started that cannot talk ({error}): {_REMEDY}"
+        raise LauncherError(wrong, known=isinstance(error, LauncherError)) from error
     hosts = {software: host for host, software in ranks.software}
     if announced > ranks.size:
         wrong = f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import contextlib
 import errno
 import hashlib
@@ -24,12 +23,6 @@ _BYTES_OF_TRIAL = 2**22  # a disk is full for a library that writes a part of a 
 _NO_SYNC = (errno.EINVAL, errno.ENOTSUP)
 _ALIGNED = 64  # bytes: no array shares a line of the cache with another one
 _COMPUTING = ("fretwear", "numba", "numpy", "scipy")
-
-_FAULTS = (OSError, EOFError, ImportError)
-# the last one by its name: what numba raises where its cache is cut off
-_NAMES = frozenset(
-    kind.__name__ for kind in vars(builtins).values() if isinstance(kind, type) and issubclass(kind, _FAULTS)
-) | {"UnpicklingError"}
 
 
 # --- files: under a name that no other has, and on the disk before they get their own name ---
@@ -161,12 +154,7 @@ def open_mapped(given: MappedFile) -> Any:  # a type that rank 0 knows
 
 
 class MachineFaultError(Exception):
-    """A disk or the cache of the kernels is at fault, and not the task that broke off: the run ends with one line."""
-
-
-def is_machine_fault(message: str) -> bool:
-    """Whether a line of `describe_error` tells of such a fault."""
-    return message.partition(":")[0] in _NAMES
+    """A fault of the machine (`solver.outcome.is_machine_fault`) in the words of a rank, with which the run ends."""
 
 
 def package_digest(package: str) -> str:

@@ -13,9 +13,12 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import Any, TextIO
+
+TYPE_CHECKING = False  # without `typing`, which takes long to load
+if TYPE_CHECKING:
+    from typing import Any, TextIO
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 """Ctrl-C, the end of the time of a job or of a terminal, and signals that batch systems send before the end."""
@@ -33,13 +36,30 @@ _came: float | None = None  # when the first signal came
 _handled = False
 
 
+def leave_endings() -> None:
+    """From now on each of these signals ends the process at once: while modules are loaded, and while a call of a
+    library waits for other processes, no handler of Python runs. Ignored ones stay so.
+    """
+    _handle_endings(signal.SIG_DFL)
+
+
 def take_endings() -> None:
     """From now on each of these signals raises KeyboardInterrupt in the main thread, once; ignored ones stay so."""
     global _came, _handled
     _came, _handled = None, False
+    _handle_endings(_interrupt)
+
+
+def _handle_endings(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
     for number in ENDING:
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _interrupt)
+        # written anew where nothing changes: libraries take signals without a word to Python
+        signal.signal(number, signal.SIG_IGN if signal.getsignal(number) is signal.SIG_IGN else handler)
+
+
+def die() -> None:
+    """Ends the process by a signal: its launcher then ends the others, which some do not at an exit status."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def begin_ending() -> None:

@@ -6,7 +6,7 @@ others wait for that.
 FAKE_STEPS: every history takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
 takes two. What was done when, and what was gone on from, is noted in a file.
 FAKE_PROGRESS: a task says so often how far it is, s; 0.03 where it is not given.
-FAKE_CRASH: what each history at the second frequency does instead: "segfault" or "abort".
+FAKE_CRASH: what each history at the second frequency does instead: "segfault", "abort", or "memory": it gets none.
 FAKE_NOTHING: tasks take no time at all; in the end rank 0 says how much memory and time it has taken.
 """
 
@@ -82,6 +82,8 @@ def compute_history(
     task: History, facts: SceneFacts, n_steps: int, seconds: float, keep: Keep
 ) -> Iterator[PointResult]:
     failing, crash = int(os.environ.get("FAKE_FAILURE", "-1")), os.environ.get("FAKE_CRASH", "")
+    if task.position == 1 and crash == "memory":
+        raise MemoryError
     if task.position == 1 and crash:
         # as a bug in compiled code would
         ctypes.string_at(0) if crash == "segfault" else os.abort()

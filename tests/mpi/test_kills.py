@@ -139,6 +139,7 @@ ENDED_BY = {
     "the launcher": (2, signal.SIGTERM, (None,)),
     "one rank": (2, signal.SIGTERM, (1,)),
     "one rank first": (2, signal.SIGTERM, (1, 0)),
+    "the terminal of a rank": (2, signal.SIGHUP, (1,)),
 }
 """Number of ranks, signal, and who gets it one after the other: ranks, or the process that was started."""
 
@@ -260,3 +261,10 @@ def test_an_exception_on_one_rank_ends_all(tmp_path):
     # what was finished is kept, and the result is written when the run ends in good order only
     left = {path.name for path in tmp_path.iterdir() if path.suffix != ".partial"}
     assert left - {"out.nc.progress-journal"} == {"out.nc.progress"}
+
+
+def test_a_rank_without_memory_ends_all_and_no_point_is_lost(tmp_path):
+    ended = run_to_end(2, STUDY, tmp_path, {"FAKE_CRASH": "memory"})
+    (line,) = [line for line in ended.said.splitlines() if line.startswith("run-study: ")]
+    assert (ended.status, line.startswith("run-study: MemoryError: ")) == (1, True)
+    assert run_here(STUDY, tmp_path) == 0

@@ -1,20 +1,26 @@
 """run-study under mpiexec: the same result for any number of ranks; launching it wrong says so, once."""
 
 import contextlib
+import mmap
 import os
 import signal
 import subprocess
 import sys
+import time
+import uuid
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 import xarray as xr
 
+from studyrunner.mpi import ranks
 from tests.benchmarks.overhead import run
 from tests.mpi.launching import (
     CHEAP,
     FAKED,
     ROOT,
+    SOON,
     count_entries,
     launcher,
     options,
@@ -132,6 +138,40 @@ def test_a_study_ends_with_the_result_of_one_process(study, kills, tmp_path):
     assert "worn_volume" not in expected or (expected.worn_volume.max() > 0.0)
 
 
+HOLD = "import mmap, sys; file = open(sys.argv[1], 'r+b'); held = mmap.mmap(file.fileno(), 0); print(); input()"
+
+
+@pytest.fixture
+def shared(monkeypatch):
+    """Begin of the names of memory that is taken for that of MPICH."""
+    begin = f"{ranks._SHARED}{uuid.uuid4().hex}_"
+    monkeypatch.setattr(ranks, "_SHARED", begin)
+    yield begin
+    for path in Path(begin).parent.glob(f"{Path(begin).name}*"):
+        path.unlink()
+
+
+def test_memory_of_killed_ranks_is_removed_and_no_other(shared):
+    """That of an old run which is alive has lost its name long ago, but for that of another program."""
+    paths = {name: Path(shared + name) for name in ("dead", "young", "held", "foreign", "own")}
+    for path in paths.values():
+        path.write_bytes(bytes(4096))
+        os.utime(path, (0, 0) if path.name[-5:] != "young" else None)
+    foreign = os.geteuid() == 0
+    if foreign:
+        os.chown(paths["foreign"], 12345, -1)
+    with (
+        subprocess.Popen([sys.executable, "-c", HOLD, paths["held"]], stdin=-1, stdout=-1) as holder,
+        paths["own"].open("r+b") as file,
+        mmap.mmap(file.fileno(), 0),
+    ):
+        assert holder.stdout.readline()
+        ranks._unlink_shared_memory()
+        left = {name for name, path in paths.items() if path.exists()}
+        holder.communicate(b"\n")
+    assert left == {"young", "held"} | ({"foreign"} if foreign else set())
+
+
 # --- launching it wrong ---
 
 FREQUENCIES = options("axes.frequency={start = 100, stop = 160, num = 5}")
@@ -144,6 +184,17 @@ if os.environ["PMI_RANK"] == "1":
     ranks.describe_software = lambda: ("elsewhere", "other")
 sys.argv = [{faked!r}, *sys.argv[1:]]
 runpy.run_path({faked!r}, run_name="__main__")
+"""
+ENDS_EARLY = """\
+import os, signal, sys
+class Finder:
+    @staticmethod
+    def find_spec(name, *_):
+        if name == "mpi4py" and os.environ["PMI_RANK"] == "{rank}":
+            {what}
+sys.meta_path.insert(0, Finder)
+from studyrunner.cli import main
+sys.exit(main())
 """
 CANNOT_SEE = 'mount -t tmpfs none "$HIDDEN" && exec "$0" "$@"'
 """Started with a view of its own of the file system, in which the folder HIDDEN is empty."""
@@ -175,6 +226,36 @@ def test_processes_of_the_launcher_of_another_library(names, said, tmp_path):
     assert_refused(first, "2 processes", said, "mpiexec")
     assert (second.status, second.said) == (2, "")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("rank", "what"),
+    [
+        (0, "raise ImportError('none here')"),
+        (1, "raise ImportError('none here')"),
+        (1, "os.kill(os.getpid(), signal.SIGTERM)"),
+        (1, "open('gone', 'w').close(); os._exit(130)"),
+    ],
+)
+def test_a_rank_that_ends_before_it_has_found_the_others_ends_all(rank, what, tmp_path):
+    """The others wait in MPI_Init, and the launcher takes the end for a good one, unless it is by a signal."""
+    program = tmp_path / "early.py"
+    program.write_text(ENDS_EARLY.format(rank=rank, what=what), encoding="utf-8")
+
+    def end(running):
+        if "_exit" in what:
+            # no process that could tell the launcher is left
+            assert running.reaches((tmp_path / "gone").exists)
+            time.sleep(2.0)
+            running.process.terminate()
+
+    ended = run_to_end(2, [str(program), *STUDY], tmp_path, disturb=end)
+    assert ended.status != 0
+    assert ended.seconds < SOON
+    assert "Traceback" not in ended.said
+    if "raise" in what:
+        (line,) = [line for line in ended.said.splitlines() if "run-study" in line]
+        assert line.startswith("run-study: launcher: 2 processes were started that cannot talk (none here): ")
 
 
 def test_ranks_with_different_software(tmp_path):

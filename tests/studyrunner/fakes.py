@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from solver.model import ContactInterface
-from solver.packing import Packed
+from solver.outcome import Outcome
+from solver.packing import Packed, pack
+from solver.results.history import StartState
+from solver.settings import Resolution
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import Store
 from studyrunner.kinds.task import Index, PointResult, Result, StartResult, Task, TaskPlan
@@ -28,6 +31,8 @@ PAIRS = ContactInterface(
     surface=("intrados", "extrados"),
 )
 FACTS = SceneFacts(n_displacements=6, contact=PAIRS, response_names=("tip",), digest="0" * 64)
+
+NO_STATE = pack(StartState(Outcome.CONVERGED, None, 1.0, Resolution((1,), 64), 0.0, 0.0)).text
 
 
 def plan_of(study: Study, n_displacements: int = 2, n_pairs: int = 1) -> TaskPlan:
@@ -55,7 +60,7 @@ def fake_sweep(task: Sweep) -> Iterator[StartResult]:
     for place in task.places:
         excitation = task.excitation
         start = (task.frequencies[place], excitation.amplitude, excitation.direction == "up", *settings)
-        yield StartResult(place, Packed("fake", (np.array(start),)), moves=place % 2 == 0, n_unknowns=18)
+        yield StartResult(place, Packed(NO_STATE, (np.array(start),)), moves=place % 2 == 0, n_unknowns=18)
 
 
 def fake_history(task: History, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> PointResult:

@@ -1,20 +1,27 @@
 """A run that is ended at any point, or that a fault of the machine disturbs, leaves a result; the next one ends it."""
 
+import contextlib
 import os
+import re
 import signal
+import sqlite3
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
+from solver.packing import Packed
 from studyrunner import cli
 from studyrunner.checkpoint import store
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.cli import main
 from studyrunner.kinds.wear import History, Sweep
+from studyrunner.mpi import schedule
 from studyrunner.result import write
 from studyrunner.user_error import UserError
-from tests.mpi.launching import count_entries, results
+from tests.mpi.launching import count_entries, options, results
 from tests.studyrunner.small_studies import SMALL
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
@@ -123,24 +130,105 @@ def test_a_history_that_was_given_up_goes_on_with_more_time(monkeypatch):
     assert count_entries("progress") == 0
 
 
+def in_words(text):
+    """JSON, or JSON in a text of JSON, with words for the numbers that have a point."""
+    quote = '\\"' if '\\"' in text else '"'
+    return re.sub(r"\d+\.\d+", lambda _: f"{quote}much{quote}", text)
+
+
+ALTERED = {
+    "empty arrays": lambda text, arrays: (text, [array[:0] for array in map(np.atleast_1d, arrays)]),
+    "one number": lambda text, arrays: (text, [np.ones(1, array.dtype) for array in arrays]),
+    "other numbers": lambda text, arrays: (text, [array.astype(complex) for array in arrays]),
+    "deep text": lambda _, arrays: ("[" * 100_000, arrays),
+    "text for numbers": lambda text, arrays: (in_words(text), arrays),
+}
+
+
+@pytest.fixture(scope="module")
+def broken_off(tmp_path_factory):
+    """A run of the solver itself that was ended in its second history: the study, its result, and what is left."""
+    folder, own = tmp_path_factory.mktemp("broken_off"), CompletionIndex.keep
+
+    def keep(self, task, progress):
+        own(self, task, progress)
+        if isinstance(task, History) and self.n_points_finished:
+            raise KeyboardInterrupt
+
+    study = [*SMALL[:-2], *options("solver.harmonics=3", "solver.samples=32")]
+    study += [*options("axes.wear_coefficient=1e-11", "slow_time.cycles=20_000", "axes.step=100"), "-o", "out.nc"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.0)
+        assert main([*study[:-1], "whole.nc"]) == 0
+        patch.setattr(CompletionIndex, "keep", keep)
+        assert main(study) == 130
+        assert [count_entries(kind) > 0 for kind in ("result", "progress", "computed")] == [True] * 3
+        return study, results("whole.nc"), Path("out.nc.progress").read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["result", "progress", "computed"])
+@pytest.mark.parametrize("how", ALTERED)
+def test_entries_that_were_altered_are_computed_again(how, kind, broken_off):
+    study, expected, left = broken_off
+    Path("out.nc.progress").write_bytes(left)
+    with contextlib.closing(sqlite3.connect("out.nc.progress", isolation_level=None)) as changed:
+        for key, blob in changed.execute("SELECT key, blob FROM entries WHERE kind=?", [kind]).fetchall():
+            packed = store.from_blob(blob)
+            text, arrays = ALTERED[how](packed.text, packed.arrays)
+            blob = store.to_blob(Packed(text, tuple(arrays)))
+            changed.execute("UPDATE entries SET blob=? WHERE kind=? AND key=?", [blob, kind, key])
+        changed.execute("INSERT INTO entries VALUES ('crashes', 'of a task', 'no number')")
+    assert main(study) == 0
+    xr.testing.assert_identical(results(), expected)
+
+
 # --- faults of the machine ---
 
+OF_NUMPY = type("_ArrayMemoryError", (MemoryError,), {})("Unable to allocate 8.00 TiB")
+FAULTS = [NO_ROOM, MemoryError(), OF_NUMPY, RuntimeError("can't start new thread")]
 
+
+def assert_goes_on(study, expected, solver, fault, capsys):
+    """The run ends in one sentence, and the same command completes it."""
+    assert main(study) == 1
+    said = capsys.readouterr().err
+    (line,) = [line for line in said.splitlines() if line.startswith("run-study: ")]
+    assert line.startswith(f"run-study: {type(fault).__name__}: {fault}")
+    assert line.endswith("a fault of the machine; what was computed is kept, and the same command goes on from it")
+    assert "Traceback" not in said
+    solver.begin_again()
+    assert main(study) == 0
+    xr.testing.assert_identical(results(), expected)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("kind", [Sweep, History])
-def test_a_run_that_a_fault_of_the_machine_has_ended_goes_on(kind, solver, capsys):
+def test_a_run_that_a_fault_of_the_machine_has_ended_goes_on(kind, fault, solver, capsys):
     expected = whole(solver, SMALL)
 
     def disturb(task, _):
         if isinstance(task, kind):
-            raise NO_ROOM
+            raise fault
 
     solver.disturb = disturb
-    assert main(SMALL) == 1
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study: ")]
-    assert line.startswith("run-study: OSError: [Errno 122] Disk quota exceeded")
-    solver.begin_again()
-    assert main(SMALL) == 0
-    xr.testing.assert_identical(results(), expected)
+    assert_goes_on(SMALL, expected, solver, fault, capsys)
+
+
+@pytest.mark.parametrize(
+    ("fault", "place"), [(FAULTS[3], "threading.Thread.start"), (FAULTS[1], "studyrunner.run.small_arrays")]
+)
+def test_a_fault_of_the_machine_outside_of_tasks(fault, place, solver, monkeypatch, capsys):
+    expected = whole(solver, SMALL)
+
+    def fail(*_, **__):
+        broken.undo()
+        raise fault
+
+    with monkeypatch.context() as broken:
+        broken.setattr(place, fail)
+        assert_goes_on(SMALL, expected, solver, fault, capsys)
 
 
 @pytest.mark.slow
@@ -154,7 +242,7 @@ def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch):
         nonlocal n_calls
         n_calls += 1
         if n_calls in (3, 30):
-            raise NO_ROOM
+            raise FAULTS[n_calls % 2]
         return own(self, *given)
 
     monkeypatch.setattr(WearingJoint, "with_rates", with_rates)

@@ -99,6 +99,26 @@ def test_an_ending_is_not_lost_where_something_else_is_raised(end, error):
         pass
 
 
+LOADING = """
+import os, signal, sys
+class Finder:
+    @staticmethod
+    def find_spec(name, *_):
+        if name == "argparse":
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Finder)
+sys.argv = ["", "--help"]
+from studyrunner.commands import {command}
+sys.exit({command}())
+"""
+
+
+@pytest.mark.parametrize("command", ["run_study", "study_report"])
+def test_an_interrupt_while_a_command_is_loaded_is_no_traceback(command, tmp_path):
+    ended = run_command([sys.executable, "-c", LOADING.format(command=command)], tmp_path)
+    assert (ended.status, ended.out, ended.said) == (-signal.SIGINT, "", "")
+
+
 def shell(command, folder):
     """Exit status of the command before the pipe; what was said behind it."""
     ended = run_command(["bash", "-c", f"{command}; exit ${{PIPESTATUS[0]}}"], folder)
