@@ -107,31 +107,34 @@ class Structure:
     """A structure with contact pairs.
 
     held (n_nodes, 3): displacements that are 0, or depend on others by the constraints. cut: cut faces; None where the
-    structure is no cyclic sector. ties: pairs that are glued for good; None of none.
+    structure is no cyclic sector. followers (m,): nodes that follow others, those of the pairs first. points (3 m,
+    3 n_nodes): what they follow in this sector; sectors (m,): in which it is.
     """
 
     held: BoolArray
     cut: CutFaces | None
     constraints: Constraints
     pairs: ContactPairs
-    ties: ContactPairs | None
+    followers: IntArray
+    points: sparse.csr_matrix
+    sectors: IntArray
+
+    def follow(self, nodal_diameter: int) -> tuple[IntArray, sparse.csr_matrix, sparse.csr_matrix]:
+        """Displacements (3 m,) of the followers; those of all nodes that they cause, (3 n_nodes, 3 m), where nothing
+        holds them; and what they follow (3 m, 3 n_nodes) in a wave.
+        """
+        dofs = (3 * self.followers[:, None] + np.arange(3)).ravel()
+        loose = sparse.diags((~self.held.ravel()).astype(float), format="csr") - self.constraints.across
+        points = self.points
+        if self.cut is not None:
+            # a point of the next sector moves as its image in this one, turned and with the phase of the wave
+            points = (self.cut.across(self.sectors, nodal_diameter) @ points).tocsr()
+        return dofs, loose[:, dofs], points
 
     def coordinates(self, nodal_diameter: int) -> Coordinates:
         """Those of a wave. Raises SceneError where nodes follow each other in a circle, or none is free."""
         pairs, constraints, held = self.pairs, self.constraints, self.held.ravel()
-        followers = [(pairs.moving, pairs.opposite, pairs.sector)]
-        if self.ties is not None:
-            followers.append((self.ties.moving, self.ties.opposite, self.ties.sector))
-        if self.cut is not None:
-            left = sparse.eye(len(self.held), format="csr")[self.cut.left]
-            followers.append((self.cut.right, left, np.ones(len(self.cut.right), dtype=np.int64)))
-        nodes, opposite, sectors = zip(*followers, strict=True)
-        dofs = (3 * np.concatenate(nodes)[:, None] + np.arange(3)).ravel()
-        points = sparse.kron(sparse.vstack(opposite), np.eye(3), format="csr")
-        if self.cut is not None:
-            # a point of the next sector moves as its image in this one, turned and with the phase of the wave
-            points = (self.cut.across(np.concatenate(sectors), nodal_diameter) @ points).tocsr()
-        follow = (sparse.diags((~held).astype(float), format="csr") - constraints.across)[:, dofs]
+        dofs, follow, points = self.follow(nodal_diameter)
         total = resolve(follow @ points + constraints.steps)
         if total is None:
             raise SceneError("contact", "surfaces follow each other in a circle", "give every pair of surfaces once")
@@ -173,7 +176,14 @@ def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
         if cut is not None:
             bound[cut.right] = True
         ties = ties.chosen(~bound[ties.moving])
-    return Structure(held, cut, constraints, pairs, ties)
+    joined = [pairs] if ties is None else [pairs, ties]
+    followers = [(each.moving, each.carried(model.mesh.coordinates, axis), each.sector) for each in joined]
+    if cut is not None:
+        images = sparse.eye(held.size, format="csr")[(3 * cut.left[:, None] + np.arange(3)).ravel()]
+        followers.append((cut.right, images, np.ones(len(cut.right), dtype=np.int64)))
+    nodes, points, sectors = zip(*followers, strict=True)
+    points = sparse.vstack(points, format="csr")
+    return Structure(held, cut, constraints, pairs, np.concatenate(nodes), points, np.concatenate(sectors))
 
 
 def _check_followers(
