@@ -21,6 +21,7 @@ _OVERLAP = 0.5
 curved surfaces hundredths; between both faces of one body it is 1 or more."""
 _TOUCHES = 1e-9  # of the extent of a face: a distance that is round-off
 _FLAT = 1e-10  # moment of inertia of a face over its largest, about an axis about which it has no rotation
+_NEIGHBOURS = 30  # of a node of no face, with which a surface turns there: of several lines of nodes
 _STRAIGHT = 0.7  # part of the way to the closest point that is along the normal, where the way goes through material
 
 
@@ -186,10 +187,15 @@ def match_nodes(
             found = f"{len(unknown)} nodes of {contact.first.name} have no area or normal, as node"
             raise SceneError("contact", f"{found} {mesh.numbers[unknown[0]]}", "give both in the table of nodes")
         there = contact.beside(coordinates, axis)
-        apart, nearest = cKDTree(there[others]).query(coordinates[nodes])
+        near = np.arange(1, 1 + min(_NEIGHBOURS, len(others)))
+        distances, nearest = cKDTree(there[others]).query(coordinates[nodes], near)
+        apart = distances[:, 0]
         limit = contact.tolerance or _TOLERANCE * float(np.sqrt(area[nodes].min()))
         _check_near(contact, apart, limit, mesh, "give nodes that meet, node by node, or a larger tolerance")
-        weights = sparse.eye(len(coordinates), format="csr")[others[nearest]]
+        entries = np.zeros(nearest.shape)
+        entries[:, 0] = 1.0
+        weights = sparse.csr_matrix((entries.ravel(), others[nearest].ravel(), len(near) * np.arange(len(nodes) + 1)))
+        weights.resize(len(nodes), len(coordinates))
         pairs = _pairs_of(coordinates, there, contact, place, weights, (area[nodes], normals[nodes]), along)
         parts.append(replace(pairs, gap=np.where(np.isnan(gap[nodes]), pairs.gap, gap[nodes])))
     return _joined(parts, mesh)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from solver.model import BoolArray, FloatArray, IntArray
+from solver.model import BoolArray, FloatArray, IntArray, Matrix
 from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
@@ -108,7 +108,7 @@ class Structure:
 
     held (n_nodes, 3): displacements that are 0, or depend on others by the constraints. cut: cut faces; None where the
     structure is no cyclic sector. followers (m,): nodes that follow others, those of the pairs first. points (3 m,
-    3 n_nodes): what they follow in this sector; sectors (m,): in which it is.
+    3 n_nodes): what they follow in this sector; sectors (m,): in which it is; labels (m,): what joins them.
     """
 
     held: BoolArray
@@ -118,26 +118,37 @@ class Structure:
     followers: IntArray
     points: sparse.csr_matrix
     sectors: IntArray
+    labels: tuple[str, ...]
 
-    def follow(self, nodal_diameter: int) -> tuple[IntArray, sparse.csr_matrix, sparse.csr_matrix]:
-        """Displacements (3 m,) of the followers; those of all nodes that they cause, (3 n_nodes, 3 m), where nothing
-        holds them; and what they follow (3 m, 3 n_nodes) in a wave.
+    def _follow(self, nodal_diameter: int) -> tuple[IntArray, sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]:
+        """Displacements (3 m,) of the followers; those of all nodes that they are, but for what is held; what they
+        follow in a wave; and all displacements from those that follow none.
         """
         dofs = (3 * self.followers[:, None] + np.arange(3)).ravel()
         loose = sparse.diags((~self.held.ravel()).astype(float), format="csr") - self.constraints.across
-        points = self.points
+        follow, points = loose[:, dofs], self.points
         if self.cut is not None:
             # a point of the next sector moves as its image in this one, turned and with the phase of the wave
             points = (self.cut.across(self.sectors, nodal_diameter) @ points).tocsr()
-        return dofs, loose[:, dofs], points
+        total = resolve(follow @ points + self.constraints.steps)
+        if total is None:
+            raise SceneError("contact", "surfaces follow each other in a circle", "give every pair of surfaces once")
+        return dofs, follow, points, total
+
+    def deviation(self, motion: Matrix, nodal_diameter: int) -> tuple[Matrix, sparse.csr_matrix]:
+        """Displacements (3 n_nodes, n) that others cause in a motion, less the motion; all that move with these.
+
+        What is held does not count. Raises SceneError as `coordinates`.
+        """
+        dofs, follow, points, total = self._follow(nodal_diameter)
+        steps = self.constraints.steps
+        depends = np.diff(steps.indptr)[:, None] > 0
+        return follow @ (points @ motion - motion[dofs]) + steps @ motion - depends * motion, total
 
     def coordinates(self, nodal_diameter: int) -> Coordinates:
         """Those of a wave. Raises SceneError where nodes follow each other in a circle, or none is free."""
         pairs, constraints, held = self.pairs, self.constraints, self.held.ravel()
-        dofs, follow, points = self.follow(nodal_diameter)
-        total = resolve(follow @ points + constraints.steps)
-        if total is None:
-            raise SceneError("contact", "surfaces follow each other in a circle", "give every pair of surfaces once")
+        dofs, follow, _, total = self._follow(nodal_diameter)
         own = ~(held | constraints.idle)
         own[dofs] = False
         if not own.any():
@@ -176,14 +187,18 @@ def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
         if cut is not None:
             bound[cut.right] = True
         ties = ties.chosen(~bound[ties.moving])
-    joined = [pairs] if ties is None else [pairs, ties]
-    followers = [(each.moving, each.carried(model.mesh.coordinates, axis), each.sector) for each in joined]
+    followers = []
+    for each, surfaces in ((pairs, joint.contacts), (ties, joint.ties)):
+        if each is not None:
+            labels = [surfaces[place].name for place in each.surface]
+            followers.append((each.moving, each.carried(model.mesh.coordinates, axis), each.sector, labels))
     if cut is not None:
         images = sparse.eye(held.size, format="csr")[(3 * cut.left[:, None] + np.arange(3)).ravel()]
-        followers.append((cut.right, images, np.ones(len(cut.right), dtype=np.int64)))
-    nodes, points, sectors = zip(*followers, strict=True)
-    points = sparse.vstack(points, format="csr")
-    return Structure(held, cut, constraints, pairs, np.concatenate(nodes), points, np.concatenate(sectors))
+        n = len(cut.right)
+        followers.append((cut.right, images, np.ones(n, dtype=np.int64), ["the cut faces"] * n))
+    nodes, points, sectors, names = zip(*followers, strict=True)
+    points, labels = sparse.vstack(points, format="csr"), tuple(label for each in names for label in each)
+    return Structure(held, cut, constraints, pairs, np.concatenate(nodes), points, np.concatenate(sectors), labels)
 
 
 def _check_followers(
