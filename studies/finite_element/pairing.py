@@ -69,11 +69,12 @@ class ContactPairs:
     """Contact pairs; the relative displacement is that of the moving node minus that of the opposite point.
 
     moving (n_contact,): nodes. opposite (n_contact, n_nodes): interpolation weights of the opposite points, of the
-    nodes of this sector whose images they are, with an entry for all nodes of the face; sector (n_contact,): where the point is, 0, 1 or -1. frames (n_contact,
-    3, 3): rows are normal (out of the moving body: motion along it closes the pair), first and second tangent. present
-    (n_contact, 3): whether a relative displacement exists; the others are held. area (n_contact,): m2. position
-    (n_contact, 3): of the moving node, m. distance (n_contact,): along the normal, positive where the pair is open, m.
-    gap (n_contact,): m. surface (n_contact,): number of the pair of surfaces, with moving_name and opposite_name.
+    nodes of this sector whose images they are, with an entry for all nodes of the face; sector (n_contact,): where the
+    point is, 0, 1 or -1. frames (n_contact, 3, 3): rows are normal (out of the moving body: motion along it closes the
+    pair), first and second tangent. present (n_contact, 3): whether a relative displacement exists; the others are
+    held. area (n_contact,): m2. position (n_contact, 3): of the moving node, m. distance (n_contact,): along the
+    normal, positive where the pair is open, m. gap (n_contact,): m. surface (n_contact,): number of the pair of
+    surfaces, with moving_name and opposite_name.
     """
 
     moving: IntArray

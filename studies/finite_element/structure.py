@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
-from solver.model import BoolArray, FloatArray, IntArray, Matrix
+from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
@@ -135,14 +137,14 @@ class Structure:
             raise SceneError("contact", "surfaces follow each other in a circle", "give every pair of surfaces once")
         return dofs, follow, points, total
 
-    def deviation(self, motion: Matrix, nodal_diameter: int) -> tuple[Matrix, sparse.csr_matrix]:
-        """Displacements (3 n_nodes, n) that others cause in a motion, less the motion; all that move with these.
+    def deviation(self, motion: NDArray[Any], nodal_diameter: int) -> tuple[NDArray[Any], sparse.csr_matrix]:
+        """Displacements (3 n_nodes,) that others cause in a motion, less the motion; all that move with these.
 
         What is held does not count. Raises SceneError as `coordinates`.
         """
         dofs, follow, points, total = self._follow(nodal_diameter)
         steps = self.constraints.steps
-        depends = np.diff(steps.indptr)[:, None] > 0
+        depends = np.diff(steps.indptr) > 0
         return follow @ (points @ motion - motion[dofs]) + steps @ motion - depends * motion, total
 
     def coordinates(self, nodal_diameter: int) -> Coordinates:
@@ -197,8 +199,8 @@ def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
         n = len(cut.right)
         followers.append((cut.right, images, np.ones(n, dtype=np.int64), ["the cut faces"] * n))
     nodes, points, sectors, names = zip(*followers, strict=True)
-    points, labels = sparse.vstack(points, format="csr"), tuple(label for each in names for label in each)
-    return Structure(held, cut, constraints, pairs, np.concatenate(nodes), points, np.concatenate(sectors), labels)
+    joined = np.concatenate(nodes), sparse.vstack(points, format="csr"), np.concatenate(sectors)
+    return Structure(held, cut, constraints, pairs, *joined, tuple(label for each in names for label in each))
 
 
 def _check_followers(

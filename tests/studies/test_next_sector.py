@@ -46,7 +46,9 @@ def frequencies_of_sector(model, joint):
     return [prepared.frequencies(k, 4) for k in range(N // 2 + 1)]
 
 
-@pytest.mark.parametrize("sector", [*SECTORS, apart(*SECTORS[0]), opened(*SECTORS[0])], ids=["shroud", "damper", "disks apart", "gap"])
+@pytest.mark.parametrize(
+    "sector", [*SECTORS, apart(*SECTORS[0]), opened(*SECTORS[0])], ids=["shroud", "damper", "disks apart", "gap"]
+)
 def test_stuck_frequencies_of_all_waves_are_those_of_the_ring(sector):
     found = frequencies_of_sector(*sector)
     twice = [each for k, each in enumerate(found) for _ in range(1 if k in (0, N // 2) else 2)]

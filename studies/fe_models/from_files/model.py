@@ -36,7 +36,7 @@ from studies.scene_error import SceneError
 class LoadedModel:
     """A model as its files and the study describe it. deck: in units of the files. model, joint: SI.
 
-    motions (3 n_nodes, 6): of all nodes as one body, see `rigid_motions`. omega_squared_held: square of the speed at
+    motions (3 n_nodes, 6): of all nodes as one body, see `find_resistance`. omega_squared_held: square of the speed at
     which the matrices were made, rad2/s2; None where they do not tell.
     """
 
@@ -160,9 +160,11 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         pairs=_pairs_of_table(selections, whole, contacts, axis),
     )
     placed = ~np.isnan(nodes.coordinates[:, :1, None])
-    motions = np.where(placed, rigid_motions(nodes.coordinates), 0.0).reshape(-1, 6)
+    motions = np.vstack([(placed * rigid_motions(np.nan_to_num(nodes.coordinates))).reshape(-1, 6), supported.motions])
+    centre = np.nanmean(nodes.coordinates, axis=0) if cut is None else cut.axis.point
+    motions[:, 3:] -= motions[:, :3] @ rigid_motions(centre[None])[0, :, 3:]
     held_speed = None if imported is None else imported.omega_squared_held
-    return LoadedModel(deck, model, joint, np.vstack([motions, supported.motions]), held_speed)
+    return LoadedModel(deck, model, joint, motions, held_speed)
 
 
 def _check_assembled(deck: Deck, units: Units) -> None:

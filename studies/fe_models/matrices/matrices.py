@@ -150,8 +150,8 @@ def _symmetric(entries: Entries, labels: IntArray) -> sp.csr_array:
     # entries that may be 0 stand in both triangles, beside those of the diagonal
     stored = sp.csr_array((np.ones(matrix.nnz, dtype=bool), matrix.indices, matrix.indptr), shape=(n, n))
     if stored.multiply(stored.T).nnz > np.count_nonzero(places[0] == places[1]):
-        if places := find_asymmetry(matrix, _ASYMMETRY):
-            both = " and ".join(f"dof {labels[at] % _DOFS} of node {labels[at] // _DOFS}" for at in places)
+        if wrongly := find_asymmetry(matrix, _ASYMMETRY):
+            both = " and ".join(f"dof {labels[at] % _DOFS} of node {labels[at] // _DOFS}" for at in wrongly)
             found = f"the matrix is not symmetric between {both}"
             wrong(file, found, "export it without damping, gyroscopic terms and friction")
         return sp.csr_array((matrix + twin) / 2)

@@ -89,7 +89,7 @@ SAME = {
 def test_no_constraint_but_some_of_the_user_resists_motions_as_one_body(tmp_path):
     """`--check` names the one that does."""
     texts = {**BOTH_READ, **{name: text for name, (text, _) in SAME.items()}}
-    resists = {name: "*EQUATION" * ("equation" in name) for name in texts} | {"PIN": "deck.inp, line 112: *MPC"}
+    resists = {name: "*EQUATION" * ("equation" in name) for name in texts} | {"PIN": "deck.inp, line 111: *MPC"}
     for number, (name, text) in enumerate(texts.items()):
         (folder := tmp_path / f"{number}").mkdir()
         prepared, loaded = prepared_deck(folder, BLOCKS + text)
