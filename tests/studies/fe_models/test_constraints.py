@@ -8,15 +8,7 @@ import pytest
 
 from studies.finite_element.rigid_motions import find_resistance
 from studies.scene_error import SceneError
-from tests.studies.fe_models.decks import (
-    BLOCKS,
-    SECTORS,
-    frequencies,
-    listed_frequencies,
-    of_calculix,
-    prepared_deck,
-    run_tied,
-)
+from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 from tests.studies.fe_models.solid_meshes import needs_ccx
 
 REFERENCE = "*NODE\n900, 45., 5., 0.\n"
@@ -98,25 +90,14 @@ def test_no_constraint_but_some_of_the_user_resists_motions_as_one_body(tmp_path
         assert resists[name] in found, name
 
 
-SUSPENDED = """*ELSET, ELSET=EFOAM
-1, 5
-*MATERIAL, NAME=FOAM
-*ELASTIC
-0.001, 0.3
-*DENSITY
-1E-12
-*SOLID SECTION, ELSET=EFOAM, MATERIAL=FOAM
-*SURFACE, NAME=SA
-102, S1
-106, S1
-*SURFACE, NAME=SB
-104, S1
-108, S1
-*TIE, NAME=A, POSITION TOLERANCE=0.1
-SA, SLOW
-*TIE, NAME=B, POSITION TOLERANCE=0.8
-SB, SLOW
-"""
+SUSPENDED = "\n".join(
+    [
+        *("*ELSET, ELSET=EFOAM", "1, 5", "*MATERIAL, NAME=FOAM", "*ELASTIC", "0.001, 0.3", "*DENSITY", "1E-12"),
+        *("*SOLID SECTION, ELSET=EFOAM, MATERIAL=FOAM", "*SURFACE, NAME=SA", "102, S1", "106, S1", "*SURFACE, NAME=SB"),
+        *("104, S1", "108, S1", "*TIE, NAME=A, POSITION TOLERANCE=0.1", "SA, SLOW"),
+        *("*TIE, NAME=B, POSITION TOLERANCE=0.8", "SB, SLOW", ""),
+    ]
+)
 
 
 def test_ties_across_a_gap_let_bodies_turn(tmp_path):
@@ -132,8 +113,7 @@ def test_ties_across_a_gap_let_bodies_turn(tmp_path):
         found.append(prepared.frequencies(0, 8))
     np.testing.assert_allclose(found[1], found[0], rtol=1e-2)
     if shutil.which("ccx") is not None:
-        step = "*STEP\n*FREQUENCY\n8\n*END STEP\n"
-        np.testing.assert_allclose(found[1], listed_frequencies(run_tied(tmp_path, apart, step))[:8], rtol=1e-2)
+        np.testing.assert_allclose(found[1][:4], of_calculix(tmp_path, apart), rtol=1e-2)
 
 
 @pytest.mark.parametrize("name", SAME)
