@@ -29,7 +29,7 @@ def find_asymmetry(matrix: Any, tolerance: float = 1e-8) -> tuple[int, int] | No
     scale = sparse.diags_array(1.0 / bound)
     difference = abs(scale @ (matrix - matrix.conj().T) @ scale)
     row, column = divmod(int(difference.argmax()), n)
-    return (row, column) if difference[row, column] > tolerance else None
+    return None if difference[row, column] <= tolerance else (row, column)
 
 
 def build_model(

@@ -195,8 +195,8 @@ def match_nodes(
         _check_near(contact, apart, limit, mesh, "give nodes that meet, node by node, or a larger tolerance")
         entries = np.zeros(nearest.shape)
         entries[:, 0] = 1.0
-        weights = sparse.csr_matrix((entries.ravel(), others[nearest].ravel(), len(near) * np.arange(len(nodes) + 1)))
-        weights.resize(len(nodes), len(coordinates))
+        stored = entries.ravel(), others[nearest].ravel(), len(near) * np.arange(len(nodes) + 1)
+        weights = sparse.csr_matrix(stored, shape=(len(nodes), len(coordinates)))
         pairs = _pairs_of(coordinates, there, contact, place, weights, (area[nodes], normals[nodes]), along)
         parts.append(replace(pairs, gap=np.where(np.isnan(gap[nodes]), pairs.gap, gap[nodes])))
     return _joined(parts, mesh)
