@@ -16,8 +16,17 @@ ComplexArray = NDArray[np.complex128]
 Matrix = NDArray[np.float64] | NDArray[np.complex128]
 
 
+class _ByRows:
+    """Parts of a model: their arrays are stored by rows (C order), as the last bits of sums depend on the order."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, name, np.asarray(value, order="C"))
+
+
 @dataclass(frozen=True)
-class ContactInterface:
+class ContactInterface(_ByRows):
     """Contact pairs, `n_contact` of them.
 
     - dofs (n_contact, 3) int: indices of the closing, the first and the second tangential *relative* displacement of
@@ -67,7 +76,7 @@ class ContactInterface:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel:
+class LinearModel(_ByRows):
     """One linear structure with `n` displacements: `M x'' + C x' + K x + (contact forces) = load`, Eq. (1).
 
     Equal to itself alone, so that what is derived from a structure can be cached by it.

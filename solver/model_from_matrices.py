@@ -7,12 +7,29 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, IntArray, LinearModel, ReducedModel, needed_nodal_diameters
 
 OfWaves = ArrayLike | Mapping[int, ArrayLike]
 
-_SYMMETRIC = 1e-8  # relative to the largest entry: round-off of a matrix that was reduced or read from a text file
+
+def find_asymmetry(matrix: Any, tolerance: float = 1e-8) -> tuple[int, int] | None:
+    """Row and column of the entry that differs most from its mirror image; None of a Hermitian matrix.
+
+    matrix (n, n): dense or sparse. tolerance: of a difference over the geometric mean of both entries of the diagonal,
+    which bounds an entry of a positive semidefinite matrix: displacements and modal coordinates have different units.
+    Beside round-off of the largest entry, an entry of the diagonal is none.
+    """
+    n, largest = matrix.shape[0], float(abs(matrix).max())
+    if largest == 0.0:
+        return None
+    round_off = max(n, 10) * np.finfo(np.float64).eps * largest
+    bound = np.sqrt(np.maximum(abs(matrix.diagonal()), round_off / tolerance))
+    scale = sparse.diags_array(1.0 / bound)
+    difference = abs(scale @ (matrix - matrix.conj().T) @ scale)
+    row, column = divmod(int(difference.argmax()), n)
+    return None if difference[row, column] <= tolerance else (row, column)
 
 
 def build_model(
@@ -100,9 +117,9 @@ def _linear(
     nothing, matrices = np.zeros(n), {}
     for name in ("stiffness", "mass", "damping"):
         found = _array(name, np.zeros((n, n)) if given[name] is None else given[name], (n, n), real=real)
-        asymmetry = float(np.abs(found - found.conj().T).max(initial=0.0))
-        symmetric = asymmetry <= _SYMMETRIC * float(np.abs(found).max(initial=0.0))
-        _check(name, symmetric, f"give a {'symmetric' if real else 'Hermitian'} matrix")
+        if places := find_asymmetry(found):
+            kind = "symmetric" if real else "Hermitian"
+            _check(name, False, f"give a {kind} matrix: the entries at {places} and {places[::-1]} differ")
         matrices[name] = found
     # matrix (n_response, n) of the responses, from a matrix or from indices
     response = np.eye(n) if given["response"] is None else _array("response", given["response"], None, real=real)

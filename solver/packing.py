@@ -67,11 +67,8 @@ def in_rows(value: T) -> T:
     return cast("T", unpack(pack(value)))
 
 
-def pack_model(model: ReducedModel) -> Packed | None:
-    """The model; None where arrays are not stored by rows: the last bits of all results would change."""
-    values = [value for part in (*model.linear.values(), model.contact) for value in vars(part).values()]
-    if not all(value.flags.c_contiguous for value in values if isinstance(value, np.ndarray)):
-        return None
+def pack_model(model: ReducedModel) -> Packed:
+    """The model, whose arrays are stored by rows."""
     return pack((tuple(model.linear.items()), replace(model, linear={})))
 
 

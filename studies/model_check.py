@@ -13,11 +13,8 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, get_lapack_funcs
 
 from solver.model import ContactInterface, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
+from solver.model_from_matrices import find_asymmetry
 from studies.scene_error import SceneError
-
-_SYMMETRY = 1e-8
-"""Largest difference of two entries that should mirror each other, relative to the geometric mean of the two diagonal
-entries that bound them in a positive semidefinite matrix. Differences below 1e-12 of the largest entry never count."""
 
 TRANSPOSED = ": MATLAB and Fortran write columns first, so transpose every matrix of the file"
 """End of the remedy where a matrix has the right shape once it is transposed."""
@@ -151,11 +148,8 @@ def _refuse(key: str, values: NDArray[Any], wrong: NDArray[np.bool_], remedy: st
 
 
 def _check_hermitian(key: str, matrix: Matrix) -> None:
-    diagonal = np.sqrt(np.abs(np.diag(matrix)))
-    allowed = _SYMMETRY * np.outer(diagonal, diagonal) + 1e-12 * _largest(matrix)
-    difference = np.abs(matrix - matrix.conj().T)
-    if (difference > allowed).any():
-        row, column = np.unravel_index(int(np.argmax(difference - allowed)), matrix.shape)
+    if places := find_asymmetry(matrix):
+        row, column = places
         word = "Hermitian" if np.iscomplexobj(matrix) else "symmetric"
         entries = f"{matrix[row, column]} at {row}, {column} but {matrix[column, row]} at {column}, {row}"
         raise SceneError(key, f"not {word}: {entries}", f"give a {word} matrix")

@@ -208,7 +208,4 @@ def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt
     except UserError as error:
         yield SceneBuilt(None, error=error)
         return
-    packed = pack_model(model) if known is None else None
-    if known is None and packed is None:
-        raise ValueError(f"the matrices of {task.study.scene.model} are not stored by rows")
-    yield SceneBuilt(describe_scene(model), variables, packed)
+    yield SceneBuilt(describe_scene(model), variables, pack_model(model) if known is None else None)

@@ -19,6 +19,9 @@ _TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a 
 _OVERLAP = 0.5
 """Largest overlap of two bodies over the depth of their elements. Interference takes thousandths of it, flat facets on
 curved surfaces hundredths; between both faces of one body it is 1 or more."""
+_TOUCHES = 1e-9  # of the extent of a face: a distance that is round-off
+_FLAT = 1e-10  # moment of inertia of a face over its largest, about an axis about which it has no rotation
+_NEIGHBOURS = 30  # of a node of no face, with which a surface turns there: of several lines of nodes
 _STRAIGHT = 0.7  # part of the way to the closest point that is along the normal, where the way goes through material
 
 
@@ -66,11 +69,12 @@ class ContactPairs:
     """Contact pairs; the relative displacement is that of the moving node minus that of the opposite point.
 
     moving (n_contact,): nodes. opposite (n_contact, n_nodes): interpolation weights of the opposite points, of the
-    nodes of this sector whose images they are; sector (n_contact,): where the point is, 0, 1 or -1. frames (n_contact,
-    3, 3): rows are normal (out of the moving body: motion along it closes the pair), first and second tangent. present
-    (n_contact, 3): whether a relative displacement exists; the others are held. area (n_contact,): m2. position
-    (n_contact, 3): of the moving node, m. distance (n_contact,): along the normal, positive where the pair is open, m.
-    gap (n_contact,): m. surface (n_contact,): number of the pair of surfaces, with moving_name and opposite_name.
+    nodes of this sector whose images they are, with an entry for all nodes of the face; sector (n_contact,): where the
+    point is, 0, 1 or -1. frames (n_contact, 3, 3): rows are normal (out of the moving body: motion along it closes the
+    pair), first and second tangent. present (n_contact, 3): whether a relative displacement exists; the others are
+    held. area (n_contact,): m2. position (n_contact, 3): of the moving node, m. distance (n_contact,): along the
+    normal, positive where the pair is open, m. gap (n_contact,): m. surface (n_contact,): number of the pair of
+    surfaces, with moving_name and opposite_name.
     """
 
     moving: IntArray
@@ -91,9 +95,41 @@ class ContactPairs:
         """Number of pairs."""
         return len(self.moving)
 
+    def carried(self, coordinates: FloatArray, axis: CyclicAxis | None) -> sparse.csr_matrix:
+        """Matrix (3 n_contact, 3 n_nodes) from displacements of this sector to those of the opposite points, which move
+        with their faces to where the moving nodes are: a motion as one body causes no relative displacement.
+
+        `u = sum w_i u_i + theta x arm`, with the arm from the opposite point to the moving node and the mean rotation
+        of the face, `theta = J^-1 sum r_i x u_i`, J its moment of inertia. coordinates (n_nodes, 3), m.
+        """
+        weights, place, node = self.opposite, self.position.copy(), self.opposite.indices
+        for k in (1, -1):  # back to this sector
+            if axis is not None and (self.sector == k).any():
+                place[self.sector == k] = axis.turned(place[self.sector == k], -k)
+        count = np.diff(weights.indptr)
+        of, first = np.repeat(np.arange(self.n_contact), count), weights.indptr[:-1]
+        r = coordinates[node]
+        arm = place - np.add.reduceat(weights.data[:, None] * r, first)
+        r = r - (np.add.reduceat(r, first) / count[:, None])[of]
+        square = (r**2).sum(axis=1)
+        inertia = np.add.reduceat(square[:, None, None] * np.eye(3) - r[:, :, None] * r[:, None, :], first)
+        extent = np.sqrt(np.add.reduceat(square, first))
+        arm[np.linalg.norm(arm, axis=1) <= _TOUCHES * extent] = 0.0
+        turn = _cross(arm) @ np.linalg.pinv(inertia, rcond=_FLAT, hermitian=True)
+        blocks = weights.data[:, None, None] * np.eye(3) - turn[of] @ _cross(r)
+        shape = 3 * weights.shape[0], 3 * weights.shape[1]
+        carried = sparse.bsr_matrix((blocks, node, weights.indptr), shape).tocsr()
+        carried.eliminate_zeros()
+        return carried
+
     def chosen(self, which: IntArray | BoolArray) -> ContactPairs:
         """Some of the pairs."""
         return replace(self, **{name: getattr(self, name)[which] for name in ("opposite", *_ARRAYS)})
+
+
+def _cross(vectors: FloatArray) -> FloatArray:
+    """Matrices (n, 3, 3) of the vector products with vectors (n, 3) on the left."""
+    return np.cross(np.eye(3), vectors[:, None])
 
 
 _ARRAYS = ("moving", "sector", "frames", "present", "area", "position", "distance", "gap", "surface")
@@ -152,10 +188,15 @@ def match_nodes(
             found = f"{len(unknown)} nodes of {contact.first.name} have no area or normal, as node"
             raise SceneError("contact", f"{found} {mesh.numbers[unknown[0]]}", "give both in the table of nodes")
         there = contact.beside(coordinates, axis)
-        apart, nearest = cKDTree(there[others]).query(coordinates[nodes])
+        near = np.arange(1, 1 + min(_NEIGHBOURS, len(others)))
+        distances, nearest = cKDTree(there[others]).query(coordinates[nodes], near)
+        apart = distances[:, 0]
         limit = contact.tolerance or _TOLERANCE * float(np.sqrt(area[nodes].min()))
         _check_near(contact, apart, limit, mesh, "give nodes that meet, node by node, or a larger tolerance")
-        weights = sparse.eye(len(coordinates), format="csr")[others[nearest]]
+        entries = np.zeros(nearest.shape)
+        entries[:, 0] = 1.0
+        stored = entries.ravel(), others[nearest].ravel(), len(near) * np.arange(len(nodes) + 1)
+        weights = sparse.csr_matrix(stored, shape=(len(nodes), len(coordinates)))
         pairs = _pairs_of(coordinates, there, contact, place, weights, (area[nodes], normals[nodes]), along)
         parts.append(replace(pairs, gap=np.where(np.isnan(gap[nodes]), pairs.gap, gap[nodes])))
     return _joined(parts, mesh)

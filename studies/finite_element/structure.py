@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
@@ -107,34 +109,48 @@ class Structure:
     """A structure with contact pairs.
 
     held (n_nodes, 3): displacements that are 0, or depend on others by the constraints. cut: cut faces; None where the
-    structure is no cyclic sector. ties: pairs that are glued for good; None of none.
+    structure is no cyclic sector. followers (m,): nodes that follow others, those of the pairs first. points (3 m,
+    3 n_nodes): what they follow in this sector; sectors (m,): in which it is; labels (m,): what joins them.
     """
 
     held: BoolArray
     cut: CutFaces | None
     constraints: Constraints
     pairs: ContactPairs
-    ties: ContactPairs | None
+    followers: IntArray
+    points: sparse.csr_matrix
+    sectors: IntArray
+    labels: tuple[str, ...]
+
+    def _follow(self, nodal_diameter: int) -> tuple[IntArray, sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]:
+        """Displacements (3 m,) of the followers; those of all nodes that they are, but for what is held; what they
+        follow in a wave; and all displacements from those that follow none.
+        """
+        dofs = (3 * self.followers[:, None] + np.arange(3)).ravel()
+        loose = sparse.diags((~self.held.ravel()).astype(float), format="csr") - self.constraints.across
+        follow, points = loose[:, dofs], self.points
+        if self.cut is not None:
+            # a point of the next sector moves as its image in this one, turned and with the phase of the wave
+            points = (self.cut.across(self.sectors, nodal_diameter) @ points).tocsr()
+        total = resolve(follow @ points + self.constraints.steps)
+        if total is None:
+            raise SceneError("contact", "surfaces follow each other in a circle", "give every pair of surfaces once")
+        return dofs, follow, points, total
+
+    def deviation(self, motion: NDArray[Any], nodal_diameter: int) -> tuple[NDArray[Any], sparse.csr_matrix]:
+        """Displacements (3 n_nodes,) that others cause in a motion, less the motion; all that move with these.
+
+        What is held does not count. Raises SceneError as `coordinates`.
+        """
+        dofs, follow, points, total = self._follow(nodal_diameter)
+        steps = self.constraints.steps
+        depends = np.diff(steps.indptr) > 0
+        return follow @ (points @ motion - motion[dofs]) + steps @ motion - depends * motion, total
 
     def coordinates(self, nodal_diameter: int) -> Coordinates:
         """Those of a wave. Raises SceneError where nodes follow each other in a circle, or none is free."""
         pairs, constraints, held = self.pairs, self.constraints, self.held.ravel()
-        followers = [(pairs.moving, pairs.opposite, pairs.sector)]
-        if self.ties is not None:
-            followers.append((self.ties.moving, self.ties.opposite, self.ties.sector))
-        if self.cut is not None:
-            left = sparse.eye(len(self.held), format="csr")[self.cut.left]
-            followers.append((self.cut.right, left, np.ones(len(self.cut.right), dtype=np.int64)))
-        nodes, opposite, sectors = zip(*followers, strict=True)
-        dofs = (3 * np.concatenate(nodes)[:, None] + np.arange(3)).ravel()
-        points = sparse.kron(sparse.vstack(opposite), np.eye(3), format="csr")
-        if self.cut is not None:
-            # a point of the next sector moves as its image in this one, turned and with the phase of the wave
-            points = (self.cut.across(np.concatenate(sectors), nodal_diameter) @ points).tocsr()
-        follow = (sparse.diags((~held).astype(float), format="csr") - constraints.across)[:, dofs]
-        total = resolve(follow @ points + constraints.steps)
-        if total is None:
-            raise SceneError("contact", "surfaces follow each other in a circle", "give every pair of surfaces once")
+        dofs, follow, _, total = self._follow(nodal_diameter)
         own = ~(held | constraints.idle)
         own[dofs] = False
         if not own.any():
@@ -173,7 +189,18 @@ def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
         if cut is not None:
             bound[cut.right] = True
         ties = ties.chosen(~bound[ties.moving])
-    return Structure(held, cut, constraints, pairs, ties)
+    followers = []
+    for each, surfaces in ((pairs, joint.contacts), (ties, joint.ties)):
+        if each is not None:
+            labels = [surfaces[place].name for place in each.surface]
+            followers.append((each.moving, each.carried(model.mesh.coordinates, axis), each.sector, labels))
+    if cut is not None:
+        images = sparse.eye(held.size, format="csr")[(3 * cut.left[:, None] + np.arange(3)).ravel()]
+        n = len(cut.right)
+        followers.append((cut.right, images, np.ones(n, dtype=np.int64), ["the cut faces"] * n))
+    nodes, points, sectors, names = zip(*followers, strict=True)
+    joined = np.concatenate(nodes), sparse.vstack(points, format="csr"), np.concatenate(sectors)
+    return Structure(held, cut, constraints, pairs, *joined, tuple(label for each in names for label in each))
 
 
 def _check_followers(

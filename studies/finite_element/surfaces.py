@@ -237,7 +237,8 @@ def closest_points(
     points: FloatArray, surface: Surface, coordinates: FloatArray
 ) -> tuple[sparse.csr_matrix, FloatArray]:
     """Weights (n_points, n_nodes), by the shape functions of element faces, of the points of a surface that are closest
-    to points (n_points, 3), m, and the distances (n_points,) to the linear facets, m.
+    to points (n_points, 3), m, and the distances (n_points,) to the linear facets, m. All nodes of a face have an
+    entry, which may be 0.
     """
     corners = coordinates[surface.facets]
     centre = corners.mean(axis=1)
@@ -265,7 +266,7 @@ def closest_points(
     nodes = surface.faces[facet_of]
     places = np.einsum("pn,pna->pa", within, surface.places[facet_of])
     weights = _face_weights(points, nodes, places, coordinates)
-    point, corner = np.nonzero(weights)
+    point, corner = np.nonzero(nodes >= 0)
     entries = (weights[point, corner], (point, nodes[point, corner]))
     return sparse.csr_matrix(entries, shape=(len(points), len(coordinates))), distance
 

@@ -25,6 +25,8 @@ from studies.scene_error import SceneError
 
 _FARTHEST = 20.0  # of the contact: beyond what slip up to 0.9999 of sliding wears
 _HOLDER = 1e-9  # stiffness that holds the body over that of the contact: no result changes by more
+_SHEAR = 3e-4
+"""Of a sliding that is prescribed: by so much the bodies still shear. Measured: with 3e-7 a history is uncertain."""
 _MARGIN = 1.1
 """Over b from volume and unworn contact, `b^3 = a^3 + 3 R A / 2` or `b^4 = a^4 + 4 R V / pi`. Measured with uniform
 slip: up to 5 a the scar is 0.93 to 1.041 times that wide; from the depth, `b^2 = a^2 + 2 R W`, 0.90 to 1.012 times."""
@@ -108,7 +110,10 @@ class PressedBody(Scene):
     P: float
     Q: float | None
     stroke: float | None = Field(
-        None, gt=0, description="amplitude of the prescribed tangential motion in place of Q, m"
+        None, gt=0, description="amplitude of the motion of the body in place of Q, m: it shears, and slides by less"
+    )
+    sliding: float | None = Field(
+        None, gt=0, description="amplitude by which all of the contact slides, in place of Q or stroke, m"
     )
     E: float = Field(200e9, gt=0, description="Young's modulus of both bodies, Pa")
     nu: float = Field(0.3, ge=0, lt=0.5, description="Poisson's ratio of both bodies, 1")
@@ -116,9 +121,15 @@ class PressedBody(Scene):
 
     @model_validator(mode="after")
     def _check_motion(self) -> Self:
-        if self.Q is not None and self.stroke is not None:
-            raise SceneError("stroke", str(self.stroke), "give Q or stroke, not both")
+        given = [name for name in ("Q", "stroke", "sliding") if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise SceneError(given[1], str(getattr(self, given[1])), f"give {' or '.join(given)}, not both")
         return self
+
+    @property
+    def prescribed(self) -> float | None:
+        """Amplitude of a motion that is prescribed, m; None where a force moves the body."""
+        return self.sliding if self.stroke is None else self.stroke
 
     @property
     def modulus(self) -> float:
@@ -132,8 +143,9 @@ class PressedBody(Scene):
 
     @property
     def share(self) -> float:
-        """Of the force at which the body slides; 1 for a stroke."""
-        return self.tangential_force / max(self.friction_coefficient * self.P, 1e-300) if self.stroke is None else 1.0
+        """Of the force at which the body slides; 1 for a motion that is prescribed."""
+        sliding = max(self.friction_coefficient * self.P, 1e-300)
+        return self.tangential_force / sliding if self.prescribed is None else 1.0
 
     @property
     def thickness(self) -> float:
@@ -169,11 +181,11 @@ class PressedBody(Scene):
 
         As it is where a half-width is given, wear has no end, or no more is needed.
         """
-        if self.half_width is not None or self.stroke is None:
+        if self.half_width is not None or self.prescribed is None:
             return self
-        stroke = self.stroke * expected.amplitude
+        stroke = self.prescribed * expected.amplitude
         volume = min(4.0 * expected.per_slip_work * self.P * stroke, expected.volume / self.thickness)
-        worn, stick = self.scar(volume, expected.depth), self.stick_under(stroke)
+        worn, stick = self.scar(volume, expected.depth), 0.0 if self.stroke is None else self.stick_under(stroke)
         if stick > 0.0:
             worn = min(worn, 1.1 * worn_edge(self.worn_depth, self.contact, stick))
         needed = self.room(worn)
@@ -194,27 +206,31 @@ def press_body(
 
     With the contact forces lambda (N, compression positive), the approach d of the body and its tangential motion s,
     `u_N = d - C_N lambda_N` and `u_T = s - C_T lambda_T`: the stiffnesses are the inverse compliances, between the
-    pairs and the one displacement that moves them all. Under a stroke s is no unknown, and `C_T^-1 s` a load on u_T.
-    The response is s, under a stroke "slip", u_T of the pair nearest to the middle.
+    pairs and the one displacement that moves them all. Under a stroke s is no unknown, and `C_T^-1 s` a load on u_T;
+    where the sliding is prescribed, the bodies do not shear. The response is then "slip", u_T of the pair nearest to
+    the middle, else s.
 
     compliance: normal and tangential one, (n_contact, n_contact), m/N. position (n_contact, 3): m, from the middle.
     area (n_contact,): m2. edge (n_contact,): pairs beside which the half-spaces go on without pairs. name: of the body.
     """
-    n = len(area)
+    n, prescribed = len(area), body.prescribed
     normal, tangential = (np.asarray(np.linalg.inv(each), np.float64) for each in compliance)
-    moved = body.stroke is None
+    moved = prescribed is None
     stiffness = np.zeros((2 * n + 1 + moved, 2 * n + 1 + moved))
     _join(stiffness, np.arange(n), 2 * n, normal)
     load_static, load_harmonic = np.zeros((2, len(stiffness)))
     load_static[2 * n] = body.P * body.thickness
     response = np.zeros((1, len(stiffness)))
-    if body.stroke is None:
+    if prescribed is None:
         _join(stiffness, np.arange(n, 2 * n), 2 * n + 1, tangential)
         load_harmonic[2 * n + 1] = body.tangential_force * body.thickness
         response[0, 2 * n + 1] = 1.0
     else:
+        if body.sliding is not None:
+            shear = body.friction_coefficient * body.P * body.thickness * float(compliance[1].mean())
+            tangential *= max(shear / (_SHEAR * body.sliding), 1.0)
         stiffness[n : 2 * n, n : 2 * n] = 0.5 * (tangential + tangential.T)
-        load_harmonic[n : 2 * n] = body.stroke * tangential.sum(axis=1)
+        load_harmonic[n : 2 * n] = prescribed * tangential.sum(axis=1)
         response[0, n + int(np.argmin(np.linalg.norm(position, axis=1)))] = 1.0
     nothing = np.zeros_like(stiffness)
     linear = LinearModel(nothing, nothing, stiffness, load_static, load_harmonic.astype(np.complex128), response)

@@ -11,6 +11,7 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from studies import build_scene
 from studies.scene import ExpectedWear
+from studies.scene_error import SceneError
 from studies.scenes import scene_parameters
 from studies.scenes.cylinder_on_flat import line_worn_depth
 from studies.scenes.half_space import composite_modulus, patch_compliance, round_up, strip_compliance, worn_edge
@@ -234,6 +235,23 @@ def test_a_stroke_slides_where_the_approach_under_the_load_says():
     assert found == pytest.approx(A_POINT * 0.5 ** (1.0 / 3.0), rel=1e-12)
     assert SPHERE.stick_under(1e-3) == 0.0
     assert scene_parameters("sphere_on_flat")(friction_coefficient=0.0).stick_under(1e-9) == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "values", "load"),
+    [("cylinder_on_flat", {"strips": 8}, 1200.0), ("sphere_on_flat", {"patches": 3}, 100.0)],
+)
+def test_a_sliding_that_is_prescribed_wears_as_archard_says(name, values, load):
+    """Also where it is less than what the bodies shear before they slide, 2.2 um of a stroke of the cylinder."""
+    for sliding in (1e-6, 1e-5):
+        model = build_scene(name, sliding=sliding, **values)
+        assert model.response_names == ("slip",)
+        history = march_wear(model, 20.0, 1.0, MU, 1e-13, [0.0, 1e-4 / sliding], sweep="ramp")
+        assert history.outcome is Outcome.CONVERGED
+        assert history.worn_volume[-1] == pytest.approx(4.0 * 1e-13 * load * 1e-4, rel=1e-3)
+    with pytest.raises(SceneError, match="sliding: 1e-06; give stroke or sliding, not both"):
+        build_scene(name, sliding=1e-6, stroke=1e-5)
 
 
 def room(name, expected, **values):

@@ -16,14 +16,16 @@ from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduced_joint import FeScene
+from studies.finite_element.rigid_motions import find_resistance
 from studies.scene import Progress, make_compliant, silent
 
-N_FREQUENCIES = 4
-"""Natural frequencies that are shown."""
+N_FREQUENCIES = 8
+"""Natural frequencies that are shown of the glued model, and half as many with the pairs sliding."""
 
 _RPM = 30.0 / np.pi
 _NEIGHBOURS = {0: "", 1: " of the next sector", -1: " of the sector before"}
 _ROUND_OFF = 1e-9  # of the size of a facet, or of the largest force: a distance or a force that is none
+_STIFF = 1e-4  # of the last frequency shown: round-off of coordinates and of coefficients in a deck
 _FREE = 1e-9  # stiffness over the largest one of the relative displacements, below which nothing holds a motion
 _MOST_NUMBERS = 150
 _COLOURS = ("tab:red", "tab:green", "tab:blue")  # normal, first and second tangent
@@ -72,11 +74,7 @@ def describe_model(
         rows.append(("glued", f"first at nodal diameters {listed}: {_frequencies(np.array([*first.values()]))} Hz"))
     progress("reduction with twice the modes")
     rows.append(("reduction", _reduction_error(loaded, scene, parameters)))
-    rows.append(("rigid", f"{_count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
-    held = _count_free_motions(scene.model)
-    if held:
-        verb = "motion is" if held == 1 else "motions are"
-        rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
+    rows += _rigid(loaded, scene, turning[-1])
     total = prepared.static_load.reshape(-1, 3)[placed].sum(axis=0)
     rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
     progress("state at rest")
@@ -85,6 +83,21 @@ def describe_model(
     rows.append(("static", describe_rest(stiff, friction if isinstance(friction, float) else None)))
     rows += deck.remarks
     return rows
+
+
+def _rigid(loaded: LoadedModel, scene: FeScene, highest: float) -> Iterator[tuple[str, str]]:
+    """Motions as one body, and of bodies. highest: of the frequencies that are shown, Hz."""
+    resistance, name = find_resistance(scene.prepared, loaded.motions)
+    resists = name if resistance > _STIFF * highest else "no constraint"
+    free = f"{_count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"
+    yield "rigid", f"{free}; {resists} resists a motion of all as one body"
+    if resists == name:
+        found = f"{name} strains the model where it moves as one body, by the energy of at most {resistance:.3g} Hz"
+        yield "warning", f"{found}: join nodes that coincide, or let rotations follow"
+    held = _count_free_motions(scene.model)
+    if held:
+        verb = "motion is" if held == 1 else "motions are"
+        yield "warning", f"{held} {verb} held by friction alone: give retention_stiffness"
 
 
 def _free(model: ReducedModel, linear: LinearModel) -> IntArray:
@@ -123,10 +136,10 @@ def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters
         return f"none: there are no more than {n_modes} modes with the pairs glued"
     more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
     finer = reduce_model(loaded, more, 1, prepared=scene.prepared).model
-    own, other = (_sliding_frequencies(each.linear[k], each)[: 2 * N_FREQUENCIES] for each in (model, finer))
+    own, other = (_sliding_frequencies(each.linear[k], each)[:N_FREQUENCIES] for each in (model, finer))
     n = min(len(own), len(other))
     elastic = other[:n] > 1e-3 * other[:n].max()
-    own, other = own[:n][elastic][:N_FREQUENCIES], other[:n][elastic][:N_FREQUENCIES]
+    own, other = (each[:n][elastic][: N_FREQUENCIES // 2] for each in (own, other))
     worst = np.abs(own / other - 1.0).max()
     return (
         f"{parameters.stuck_modes} modes; with the pairs sliding freely {_frequencies(own)} Hz, by at most"

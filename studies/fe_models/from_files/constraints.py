@@ -11,6 +11,7 @@ from solver.model import BoolArray, FloatArray, IntArray
 from studies.fe_models.deck.contents import Deck, Equation, RigidMotion
 from studies.fe_models.files import Units
 from studies.finite_element.constraints import Constraints, Dependence, eliminate
+from studies.finite_element.rigid_motions import rigid_motions
 from studies.scene_error import SceneError
 
 _ROUND_OFF = 1e-9  # of a direction
@@ -21,7 +22,8 @@ class Supported:
     """What holds and joins the nodes: those of the model, then `extra` (m,), the numbers of nodes without elements.
 
     held (n, 3): displacements that are 0 or follow others. own (n, 3): those that are 0 by a boundary condition.
-    references: rows of nodes without elements. forces (3 n,): constant nodal forces, N.
+    references: rows of nodes without elements. forces (3 n,): constant nodal forces, N. motions (3 m, 6): of the extra
+    ones where all moves as one body, see `rigid_motions`.
     """
 
     held: BoolArray
@@ -30,6 +32,7 @@ class Supported:
     own: BoolArray
     forces: FloatArray
     references: Mapping[int, int]
+    motions: FloatArray
 
 
 def find_constraints(deck: Deck, numbers: IntArray, clamped: IntArray | None, units: Units, cut: IntArray) -> Supported:
@@ -80,7 +83,19 @@ class _Builder:
         if self.entries or self.oblique:
             everything = np.concatenate([self.numbers, extra])
             constraints, fixed = eliminate(self.entries, own, self.oblique, everything, len(self.numbers))
-        return Supported(fixed, extra, constraints, own, forces, references)
+        return Supported(fixed, extra, constraints, own, forces, references, self._motions())
+
+    def _motions(self) -> FloatArray:
+        """Motions (3 m, 6) of the extra nodes where all moves as one body; rotations turn with it."""
+        rotations = {motion.rotation for motion in self.deck.rigid_motions if motion.rotation}
+        numbers = np.array(self.extra, dtype=np.int64)
+        motions = rigid_motions(self.deck.coordinates[self.deck.rows_of_nodes(numbers)] * self.units.length)
+        for (kind, number), row in self.rows.items():
+            if row >= len(self.numbers) and (kind == "turn" or number in rotations):
+                motions[row - len(self.numbers)] = np.eye(3, 6, 3)
+            elif kind == "own":
+                motions[row - len(self.numbers)] = self._frame(number) @ motions[row - len(self.numbers)]
+        return motions.reshape(-1, 6)
 
     def _row(self, number: int, place: str, kind: str = "") -> int:
         """Row of a node, or of what else it has; what is not there is added. Raises SceneError where it is no node."""

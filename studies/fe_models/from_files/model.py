@@ -24,6 +24,7 @@ from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
 from studies.finite_element.reduced_joint import FeScene, build_fe_scene
 from studies.finite_element.reduction import PreparedModel
+from studies.finite_element.rigid_motions import rigid_motions
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
@@ -35,12 +36,14 @@ from studies.scene_error import SceneError
 class LoadedModel:
     """A model as its files and the study describe it. deck: in units of the files. model, joint: SI.
 
-    omega_squared_held: square of the speed at which the matrices were made, rad2/s2; None where they do not tell.
+    motions (3 n_nodes, 6): of all nodes as one body, see `find_resistance`. omega_squared_held: square of the speed at
+    which the matrices were made, rad2/s2; None where they do not tell.
     """
 
     deck: Deck
     model: FeModel
     joint: JointDefinition
+    motions: FloatArray
     omega_squared_held: float | None
 
 
@@ -156,7 +159,12 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         constraints=supported.constraints,
         pairs=_pairs_of_table(selections, whole, contacts, axis),
     )
-    return LoadedModel(deck, model, joint, None if imported is None else imported.omega_squared_held)
+    placed = ~np.isnan(nodes.coordinates[:, :1, None])
+    motions = np.vstack([(placed * rigid_motions(np.nan_to_num(nodes.coordinates))).reshape(-1, 6), supported.motions])
+    centre = np.nanmean(nodes.coordinates, axis=0) if cut is None else cut.axis.point
+    motions[:, 3:] -= motions[:, :3] @ rigid_motions(centre[None])[0, :, 3:]
+    held_speed = None if imported is None else imported.omega_squared_held
+    return LoadedModel(deck, model, joint, motions, held_speed)
 
 
 def _check_assembled(deck: Deck, units: Units) -> None:

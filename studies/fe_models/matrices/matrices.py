@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 import scipy.sparse as sp
 
+from solver.model_from_matrices import find_asymmetry
 from studies.fe_models.files import FloatArray, IntArray, library_errors, shown
 from studies.scene_error import SceneError
 
@@ -25,7 +26,7 @@ _LARGEST_DOFS = 5_000_000
 _MOST_NODES = 2**40  # numbers that fit into a label, negative ones as well
 _DOFS = 64  # labels of one node
 _HELD = 1e35  # a stiffness on the diagonal above it is a boundary condition (Abaqus writes 1e36)
-_ASYMMETRY = 1e-6  # over the largest entry: what text with few digits leaves
+_ASYMMETRY = 1e-6  # of two entries: what text with few digits leaves
 
 
 @dataclass(frozen=True)
@@ -149,9 +150,10 @@ def _symmetric(entries: Entries, labels: IntArray) -> sp.csr_array:
     # entries that may be 0 stand in both triangles, beside those of the diagonal
     stored = sp.csr_array((np.ones(matrix.nnz, dtype=bool), matrix.indices, matrix.indptr), shape=(n, n))
     if stored.multiply(stored.T).nnz > np.count_nonzero(places[0] == places[1]):
-        difference = abs(matrix - twin)
-        if difference.nnz and difference.max() > _ASYMMETRY * abs(values).max():
-            wrong(file, "the matrix is not symmetric", "export it without damping, gyroscopic terms and friction")
+        if wrongly := find_asymmetry(matrix, _ASYMMETRY):
+            both = " and ".join(f"dof {labels[at] % _DOFS} of node {labels[at] // _DOFS}" for at in wrongly)
+            found = f"the matrix is not symmetric between {both}"
+            wrong(file, found, "export it without damping, gyroscopic terms and friction")
         return sp.csr_array((matrix + twin) / 2)
     return sp.csr_array(matrix + twin - sp.diags_array(matrix.diagonal()))
 

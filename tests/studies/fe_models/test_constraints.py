@@ -1,10 +1,12 @@
 """Linear constraints and directions of a deck: against CalculiX, and against other ways to say the same."""
 
+import re
 import shutil
 
 import numpy as np
 import pytest
 
+from studies.finite_element.rigid_motions import find_resistance
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 from tests.studies.fe_models.solid_meshes import needs_ccx
@@ -74,6 +76,44 @@ SAME = {
         "*BOUNDARY\nXE, 2\n",
     ),
 }
+
+
+def test_no_constraint_but_some_of_the_user_resists_motions_as_one_body(tmp_path):
+    """`--check` names the one that does."""
+    texts = {**BOTH_READ, **{name: text for name, (text, _) in SAME.items()}}
+    resists = {name: "*EQUATION" * ("equation" in name) for name in texts} | {"PIN": "deck.inp, line 111: *MPC"}
+    for number, (name, text) in enumerate(texts.items()):
+        (folder := tmp_path / f"{number}").mkdir()
+        prepared, loaded = prepared_deck(folder, BLOCKS + text)
+        frequency, found = find_resistance(prepared, loaded.motions)
+        assert (frequency > 1e-3) == bool(resists[name]), name
+        assert resists[name] in found, name
+
+
+SUSPENDED = "\n".join(
+    [
+        *("*ELSET, ELSET=EFOAM", "1, 5", "*MATERIAL, NAME=FOAM", "*ELASTIC", "0.001, 0.3", "*DENSITY", "1E-12"),
+        *("*SOLID SECTION, ELSET=EFOAM, MATERIAL=FOAM", "*SURFACE, NAME=SA", "102, S1", "106, S1", "*SURFACE, NAME=SB"),
+        *("104, S1", "108, S1", "*TIE, NAME=A, POSITION TOLERANCE=0.1", "SA, SLOW"),
+        *("*TIE, NAME=B, POSITION TOLERANCE=0.8", "SB, SLOW", ""),
+    ]
+)
+
+
+def test_ties_across_a_gap_let_bodies_turn(tmp_path):
+    """On foam. CalculiX moves the nodes of the ties onto each other, as if there were no gap of 0.4 mm."""
+    text = re.sub(r"\*SURFACE INTERACTION.*?SUP, SLOW\n", SUSPENDED, BLOCKS, flags=re.DOTALL)
+    apart = re.sub(r"^(105|110|115), 40, (\d+), 5$", r"\1, 40, \2, 5.4", text, flags=re.MULTILINE)
+    assert apart.count("5.4") == 3
+    found = []
+    for name, each in (("touching", text), ("apart", apart)):
+        (tmp_path / name).mkdir()
+        prepared, loaded = prepared_deck(tmp_path / name, each, friction_coefficient=0.3)
+        assert find_resistance(prepared, loaded.motions)[0] < 1e-6
+        found.append(prepared.frequencies(0, 8))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-2)
+    if shutil.which("ccx") is not None:
+        np.testing.assert_allclose(found[1][:4], of_calculix(tmp_path, apart), rtol=1e-2)
 
 
 @pytest.mark.parametrize("name", SAME)

@@ -9,6 +9,7 @@ from scipy.optimize import minimize
 from studies.finite_element.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
+from studies.finite_element.rigid_motions import rigid_motions
 from studies.finite_element.surfaces import (
     closest_points,
     faces_of_elements,
@@ -110,6 +111,10 @@ def test_pairs_interpolate_what_a_face_can_hold(lower, upper):
     x, y, _ = mesh.coordinates.T
     field = 1.0 + 2.0 * x - 3.0 * y + (x * y if lower == "C3D8" else x * x - 0.7 * x * y + 0.4 * y * y)
     assert np.allclose(pairs.opposite @ field, field[pairs.moving], rtol=0.0, atol=1e-10)
+    # across the gap all moves as one body
+    motions = rigid_motions(mesh.coordinates)
+    carried = pairs.carried(mesh.coordinates, None) @ motions.reshape(-1, 6)
+    np.testing.assert_allclose(carried, motions[pairs.moving].reshape(-1, 6), atol=1e-13)
 
 
 def test_a_coarse_surface_inside_a_finer_one_moves():

@@ -1,14 +1,17 @@
 """Matrices come out of the files of the codes as they went in."""
 
 import re
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pytest
 from scipy import io
 
+from solver import build_model
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.finite_element.solid_mesh import assemble_stiffness
+from studies.model_check import check_model
 from studies.scene_error import SceneError
 from tests.studies.fe_models.matrix_files import REDUCED, chain, write_calculix, write_matrix_input, write_punch
 from tests.studies.fe_models.mutations import mutate
@@ -91,11 +94,38 @@ def test_tables_without_their_rows_or_with_complex_numbers(tmp_path, kind):
         (stiffness, rows[:-1], "9 x 9 entries for 8 rows"),
         (stiffness, np.ones_like(rows), "a dof has two rows"),
         (stiffness * 1j, rows, "complex numbers; give .* nd/<k>"),
-        (stiffness + np.triu(stiffness), rows, "not symmetric"),
     ):
         REDUCED[kind](tmp_path, {**named, "stiffness": matrix}, of_rows)
         with pytest.raises(SceneError, match=sentence):
             read_matrices(tmp_path / "job")
+
+
+BOTH = {name: REDUCED[name] for name in ("mat", "mat 7.3", "market", "harwell boeing", "op4", "op4 binary sparse")}
+BOTH["matrix input"] = partial(write_matrix_input, triangles="both")
+
+
+@pytest.mark.parametrize("name", ["stiffness", "mass", "damping"])
+def test_a_boundary_that_is_not_symmetric_beside_stiff_modes(tmp_path, name):
+    """Each entry is judged beside its own diagonal, whichever way the matrix comes in."""
+    named, rows = chain(n_modes=2)
+    named["damping"] = 0.1 * named["mass"]
+    n, scale = len(rows), np.append(np.ones(len(rows) - 2), [1e4, 1e6])
+    whole = {each: named[each] * np.outer(scale, scale) for each in ("mass", "damping", "stiffness")}
+    model = build_model(*whole.values(), [[0, 1, 2]], 1.0, load_harmonic=np.eye(n)[0])
+    matrix = whole[name].copy()
+    matrix[0, 1] += 0.17 * np.sqrt(matrix[0, 0] * matrix[1, 1])
+    wrong = whole | {name: matrix}
+    for folder, write in BOTH.items():
+        for part, given in (("right", whole), ("wrong", wrong)):
+            (tmp_path / folder / part).mkdir(parents=True)
+            write(tmp_path / folder / part, given | {"load": named["load"]}, rows)
+        read_matrices(tmp_path / folder / "right" / "job")
+        with pytest.raises(SceneError, match="the matrix is not symmetric between dof 1 of node 1 and dof 2 of node 1"):
+            read_matrices(tmp_path / folder / "wrong" / "job")
+    with pytest.raises(ValueError, match=rf"{name}: give a symmetric matrix: the entries at \(0, 1\) and"):
+        build_model(*wrong.values(), [[0, 1, 2]], 1.0, load_harmonic=np.eye(n)[0])
+    with pytest.raises(SceneError, match=f"{name}: not symmetric: .* at 0, 1 but .* at 1, 0"):
+        check_model(replace(model, linear={0: replace(model.linear[0], **{name: matrix})}))
 
 
 def test_a_file_of_matlab_without_any_of_the_matrices(tmp_path):
