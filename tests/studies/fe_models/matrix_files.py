@@ -131,7 +131,7 @@ def write_one_triangle(folder, named, rows):
         matrix = sparse.csc_array(np.tril(values) if values.ndim == 2 else values[:, None])
         matrix.sort_indices()
         lists = (matrix.indptr + 1, matrix.indices + 1, matrix.data)
-        forms = (("(8I4)", 8, "{:4d}"), ("(I6)", 1, "{:6d}"), ("(1P,3D24.16)", 3, "{:24.16E}"))
+        forms = (("(8I9)", 8, "{:9d}"), ("(I6)", 1, "{:6d}"), ("(1P,3D23.16)", 3, "{:23.16E}"))
         lines = []
         for numbers, (_, each, form) in zip(lists, forms, strict=True):
             texts = [form.format(number).replace("E", "D") for number in numbers]
