@@ -16,7 +16,13 @@ from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.imported import check_nodes_have_dofs, import_matrices, read_recovery
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
-from studies.fe_models.from_files.selections import Selections, find_clamped, find_cut, find_surfaces
+from studies.fe_models.from_files.selections import (
+    Selections,
+    find_clamped,
+    find_cut,
+    find_surfaces,
+    note_free_surfaces,
+)
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
@@ -110,7 +116,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     """Reads the files and puts the model together. Raises SceneError."""
     units = UNITS[parameters.units]
     progress(f"reading {files.mesh.name}")
-    deck = read_mesh_file(files.mesh)
+    deck = note_free_surfaces(read_mesh_file(files.mesh), parameters.contact)
     mesh = build_solid_mesh(deck, parameters, units)
     selections = Selections(deck, mesh, parameters, units)
     if not files.matrices:
