@@ -15,6 +15,7 @@ from studies.fe_models.deck.contents import Deck
 from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_digest
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.imported import check_nodes_have_dofs, import_matrices, read_recovery
+from studies.fe_models.from_files.mean_motions import equations_of_mean_motions
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import (
     Selections,
@@ -32,7 +33,7 @@ from studies.finite_element.reduced_joint import FeScene, build_fe_scene
 from studies.finite_element.reduction import PreparedModel
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
-from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
+from studies.finite_element.surfaces import describe_mesh, faces_of_elements, integrate_shapes
 from studies.scene import Progress, SurfaceMesh, build_compliant, silent
 from studies.scene_error import SceneError
 
@@ -130,6 +131,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
         imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
     nodes = mesh if imported is None else imported.mesh
+    deck = replace(deck, equations=(*deck.equations, *equations_of_mean_motions(selections)))
     supported = find_constraints(deck, nodes.numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
@@ -196,8 +198,8 @@ def _preload(selections: Selections, supported: Supported) -> FloatArray:
     for each in selections.deck.pressures:
         kept = np.isin(each.elements, np.concatenate([group.numbers for group in mesh.groups]))
         faces = faces_of_elements(mesh, each.place, each.elements[kept], each.faces[kept])
-        pressure = each.value * selections.units.stress
-        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, faces, pressure)
+        pressed = integrate_shapes(mesh.coordinates, faces)[1].ravel()
+        forces[: 3 * mesh.n_nodes] -= each.value * selections.units.stress * pressed
     return np.asarray(supported.forces + forces)
 
 
