@@ -1,10 +1,12 @@
 """Reduced models against dense linear algebra, the bundled dovetail and closed forms."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy import linalg
+from scipy.sparse import triu
 
 from studies.fe_models.from_files.check import describe_rest
 from studies.finite_element import reduction
@@ -265,6 +267,15 @@ def test_what_cannot_be_is_said():
         build_fe_scene(model, replace(joint, held=np.zeros_like(joint.held)), ReductionOptions(), 1)
     with pytest.raises(SceneError, match=r"nodal_diameter: 2; only a cyclic sector has one"):
         build_fe_scene(model, joint, ReductionOptions(nodal_diameter=2), 1)
+    # free along x, in matrices of few digits, which hold it or push it
+    loose = replace(joint, held=joint.held & [False, True, True])
+    stiffness, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
+    for digits, scale in product((10, 14), 1.0 + 1e-3 * np.arange(8)):
+        upper = triu(scale * stiffness)
+        upper.data = np.array([float(f"{value:.{digits - 1}e}") for value in upper.data])
+        free = replace(model, forms={"stiffness": (upper + triu(upper, 1).T).tocsr(), "mass": mass})
+        with pytest.raises(SceneError, match="stiffness is singular, as far as the digits of the matrices tell"):
+            prepare_model(free, loose).frequencies(0, 1)
     sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 2, 1))
     with pytest.raises(SceneError, match="use at most n_sectors // 2 = 6"):
         build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=7), 1)
