@@ -274,7 +274,7 @@ def read_recovery(
     matrices = imported.matrices
     own = pd.MultiIndex.from_arrays([matrices.node, matrices.direction + 1]).get_indexer(rows)
     if not names or (own < 0).any():
-        unknown = "no quantity" if not names else f"node {rows[own < 0][0][0]} with dof {rows[own < 0][0][1]} is no row"
+        unknown = "no quantity" if not names else f"node {node[own < 0][0]} with dof {dof[own < 0][0]} is no row"
         remedy = f"give a column for each quantity, over the rows of {matrices.files[0]}"
         raise SceneError("recovery", f"{path.name}: {unknown}", remedy)
     given = int(np.count_nonzero((matrices.node < 0) & (matrices.direction < 0)))
