@@ -268,15 +268,11 @@ def test_a_long_body_that_turns_freely_is_not_held():
     mesh, ground = replace(lap.mesh, coordinates=lap.mesh.coordinates + [5.0, 3.0, 2.0]), lap.sets["GROUND"]
     contact = ContactSurfaces(*(surface_of_nodes(mesh, name, lap.sets[name]) for name in ("UNDER", "OVER")))
     load = mean_motion(lap.sets["TIP"], Z, mesh.n_nodes)
-    for held_across in (ground[:1], ground):
-        held = np.zeros((mesh.n_nodes, 3), dtype=bool)
-        held[ground, 0] = held[held_across] = True
-        prepared = prepare_model(FeModel(mesh), JointDefinition((contact,), held, load, {}))
-        if len(held_across) > 1:
-            assert prepared.frequencies(0, 1)[0] == pytest.approx(1128.04, rel=1e-4)
-            continue
-        with pytest.raises(SceneError, match="nothing holds the glued structure"):
-            prepared.frequencies(0, 1)
+    held = np.zeros((mesh.n_nodes, 3), dtype=bool)
+    held[ground, 0] = held[ground[0]] = True
+    prepared = prepare_model(FeModel(mesh), JointDefinition((contact,), held, load, {}))
+    with pytest.raises(SceneError, match="nothing holds the glued structure"):
+        prepared.frequencies(0, 1)
 
 
 def test_what_cannot_be_is_said():

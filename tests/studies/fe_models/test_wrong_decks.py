@@ -65,7 +65,7 @@ MEAN += "*COUPLING, REF NODE=900, SURFACE=SE\n*DISTRIBUTING\n"
         (BLOCKS + "*EQUATION\n2\n1,1,1.,15,1,-1.\n", "displacement 1 of node 1 depends on others and is held"),
         (BLOCKS + "*EQUATION\n2\n105,1,1.,15,1,-1.\n2\n20,1,1.,15,1,-1.\n", "node 105 depends on others and moves in"),
         (BLOCKS + "*TRANSFORM, NSET=XM, TYPE=C\n40,0,0,40,0,1\n*BOUNDARY\nXM,1\n", r"\*TRANSFORM: node 5 is on the"),
-        (MEAN + "*BOUNDARY\n900, 4, 6\n", r"\*DISTRIBUTING: the rotations of the reference node 900 are held; hold"),
+        (MEAN + "*BOUNDARY\n900, 4, 6\n", r"\*DISTRIBUTING: the rotations of node 900 are held; hold"),
         (MEAN + "*BOUNDARY\n900, 1\n", r"\*DISTRIBUTING: displacement 1 of node 900 depends on others and is held"),
         (MEAN + "*TRANSFORM, NSET=XE\n0,1,0,-1,0,0\n", r"\*DISTRIBUTING: node 5 has \*TRANSFORM; leave"),
         (MEAN + "*STEP\n*STATIC\n*CLOAD\n900, 5, 1.\n", r"\*CLOAD: a load along dof 5; give forces"),
