@@ -77,7 +77,7 @@ def describe_model(
     if held:
         verb = "motion is" if held == 1 else "motions are"
         rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
-    total = prepared.static_load.reshape(-1, 3)[placed].sum(axis=0)
+    total = total_force(loaded, prepared.static_load)
     rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
     progress("state at rest")
     friction = parameters.friction_coefficient
@@ -85,6 +85,15 @@ def describe_model(
     rows.append(("static", describe_rest(stiff, friction if isinstance(friction, float) else None)))
     rows += deck.remarks
     return rows
+
+
+def total_force(loaded: LoadedModel, load: FloatArray) -> FloatArray:
+    """Sum (3,) of nodal forces (3 n_nodes,), those on reference nodes included."""
+    acting = np.flatnonzero(~np.isnan(loaded.model.mesh.coordinates[:, 0]))
+    if loaded.deck.contact_nodes is None:  # reference nodes have no place; their rotations have the same number again
+        numbers, first = np.unique(loaded.model.mesh.numbers, return_index=True)
+        acting = first[numbers > 0]
+    return np.asarray(load.reshape(-1, 3)[acting].sum(axis=0))
 
 
 def _free(model: ReducedModel, linear: LinearModel) -> IntArray:

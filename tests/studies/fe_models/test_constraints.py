@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
+from studies.fe_models.from_files.check import total_force
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 from tests.studies.fe_models.solid_meshes import needs_ccx
@@ -108,7 +109,8 @@ def test_forces_of_the_deck_and_gravity(tmp_path):
     coupling = BLOCKS + "*NODE\n900, 40., 5., 2.5\n*RIGID BODY, NSET=XE, REF NODE=900\n*STEP\n*STATIC\n*CLOAD\n"
     moved = []
     for force in ("900, 1, 6.", "XE, 1, 1."):
-        pulled, _ = prepared_deck(tmp_path, f"{coupling}{force}\n*END STEP\n")
+        pulled, loaded = prepared_deck(tmp_path, f"{coupling}{force}\n*END STEP\n")
+        np.testing.assert_allclose(total_force(loaded, pulled.static_load), [6.0, 0.0, 0.0], atol=1e-12)
         moved.append(pulled.solve_static(pulled.static_load))
     np.testing.assert_allclose(moved[0], moved[1], atol=1e-9 * abs(moved[0]).max())
 
