@@ -119,7 +119,10 @@ class PreparedModel:
                 raise SceneError("rotation_speed", speed, f"reduce it: {at} {found}") from error
             digits = ", as far as the digits of the matrices tell" if self.rounding else ""
             found = f"{at} nothing holds the glued structure: its stiffness is singular{digits}"
-            remedy = "clamp nodes, or hang a free body on soft elements: with all pairs glued none may move as a whole"
+            more = ", or write the matrices with more digits" if self.rounding else ""
+            remedy = (
+                f"clamp nodes, or hang a free body on soft elements{more}: with all pairs glued none may move freely"
+            )
             raise SceneError("clamp", found, remedy) from error
 
 

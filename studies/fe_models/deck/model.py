@@ -92,9 +92,8 @@ class Model:
     def check_coupling(self) -> None:
         """Raises SceneError where a coupling does not say what it couples."""
         if self.coupling is not None:
-            raise self.coupling.place.wrong(
-                "no *KINEMATIC or *DISTRIBUTING below it", "write it there, or remove the coupling"
-            )
+            found = "no *KINEMATIC or *DISTRIBUTING below it"
+            raise self.coupling.place.wrong(found, "write it there, or remove the coupling")
 
     def end_step(self) -> None:
         """Of a step that writes matrices nothing stays, of one that is not static no load."""
