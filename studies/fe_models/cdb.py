@@ -74,9 +74,10 @@ _KEYS = "rotation_speed, axis, n_sectors, material, preload or matrices"
 _REMEDY = f"delete it, and give {_KEYS} in the study where it matters"
 _FREE = "export without constraint equations: CEDELE,ALL and CPDELE,ALL"
 _IN_BLOCKS = "write nodes and elements in blocks: CDWRITE,DB,file,cdb"
+_AGAIN = "let ANSYS read the file and write it again, in the form EBLOCK,19,SOLID: CDWRITE,DB,file,cdb"
 _REMEDIES = {
     **dict.fromkeys(_short("CE CEINTF CERIG CP CPINTF CPLGEN CECYC RBE3"), _FREE),
-    **dict.fromkeys(_short("N EN E EMORE EBLOCK"), _IN_BLOCKS),
+    **dict.fromkeys(_short("N EN E EMORE"), _IN_BLOCKS),
 }
 
 
@@ -91,9 +92,9 @@ class _Commands:
 def read_cdb(path: Path) -> Deck:
     """The mesh of a .cdb file with the displacements that it holds. Raises SceneError."""
     with library_errors(path, "ansys.mapdl.reader", "ansys-mapdl-reader", "model"):
+        commands = _read_commands(path)  # what cannot be read needs no library
         from ansys.mapdl import reader
 
-        commands = _read_commands(path)
         return _deck(path, reader.Archive(str(path), parse_vtk=False), commands)
 
 
@@ -166,7 +167,9 @@ def _read_commands(path: Path) -> _Commands:
             _check_option(found.kinds.get(int(number) if number.isdigit() else 0, (0, place))[0], option, value, place)
         elif command == "D":
             _add_displacement(found, fields, place)
-        elif (command == "EBLO" and "SOLID" not in fields) or not _is_skipped(command, fields):
+        elif command == "EBLO" and "SOLID" not in fields:
+            raise place.wrong(f"{shown(','.join(fields))}: elements in this form are not read", _AGAIN)
+        elif not _is_skipped(command, fields):
             raise place.wrong(f"{shown(fields[0])} may change the model", _REMEDIES.get(command, _REMEDY))
     return found
 

@@ -31,7 +31,11 @@ Dense = NDArray[Any]
 _SMALLEST = 40  # nodes of a region that is not cut any more
 _SMALLER_HALF = 0.2  # of a region: the least that a cut leaves on one side
 _UNEVEN = 4.0  # how much a cut away from the middle is penalised, against the size of its layer
-_SINGULAR = 1e-13  # a pivot that small against its diagonal entry is round-off
+_SINGULAR = 1e-12  # a pivot that small against its diagonal entry is round-off
+_BY_HAND = 200  # entries: numbers of fewer may be exact however few digits they have
+_FEWEST_DIGITS, _MOST_DIGITS = 4, 14  # that are looked for; double precision has 16
+_SAFETY = 10.0  # of two lapping plates that are free along x, with 10 and 14 digits, the largest was 3.6 times the sum
+_LOOKED_AT = 10_000  # entries, at most
 _NEGATIVE = 1e-10  # of the largest eigenvalue of a front: one that is more negative is no round-off
 
 
@@ -108,8 +112,28 @@ def dissect(matrix: sparse.csr_matrix, node: IntArray, positions: FloatArray) ->
     return Dissection(order, tuple(fronts))
 
 
-def factorise(matrix: sparse.csr_matrix, dissection: Dissection) -> Factor:
-    """Factors of a Hermitian matrix (n, n). Raises NotPositiveDefiniteError where it is not positive definite."""
+def rounding_of(matrix: sparse.csr_matrix) -> float:
+    """What the digits of a text leave of the stiffness against a motion of all nodes, over an entry of the diagonal.
+
+    0 of full precision, and of few entries, which may be exact. Errors of entries add up at random.
+    """
+    values = np.abs(matrix.data[matrix.data != 0.0])
+    if len(values) < _BY_HAND:
+        return 0.0
+    chosen = values[:: len(values) // _LOOKED_AT + 1]
+    mantissa = chosen / 10.0 ** np.floor(np.log10(chosen))
+    for digits in range(_FEWEST_DIGITS, _MOST_DIGITS + 1):
+        whole = mantissa * 10.0 ** (digits - 1)
+        if (np.abs(whole - np.round(whole)) < 0.1).all():
+            return float(_SAFETY * 0.5 * 10.0 ** (1 - digits) * np.sqrt(len(values)))
+    return 0.0
+
+
+def factorise(matrix: sparse.csr_matrix, dissection: Dissection, rounding: float = 0.0) -> Factor:
+    """Factors of a Hermitian matrix (n, n). Raises NotPositiveDefiniteError where it is not positive definite.
+
+    rounding: part of a diagonal entry that is none, as in `rounding_of`.
+    """
     ordered = matrix[dissection.order][:, dissection.order].tocsc()
     waiting: dict[int, Dense] = {}
     blocks: list[tuple[Dense, Dense]] = []
@@ -117,7 +141,7 @@ def factorise(matrix: sparse.csr_matrix, dissection: Dissection) -> Factor:
         whole = _gathered(ordered, front)
         for child in front.children:
             _add(whole, waiting.pop(child), _places(front, dissection.fronts[child].boundary))
-        lower, below, waiting[number] = _eliminate(whole, front.stop - front.first)
+        lower, below, waiting[number] = _eliminate(whole, front.stop - front.first, rounding)
         blocks.append((lower, below))
     return Factor(dissection, tuple(blocks))
 
@@ -229,15 +253,15 @@ def _add(whole, part, places):  # type: ignore[no-untyped-def]
             target[places[row]] += source[row]
 
 
-def _eliminate(whole: Dense, e: int) -> tuple[Dense, Dense, Dense]:
+def _eliminate(whole: Dense, e: int, rounding: float) -> tuple[Dense, Dense, Dense]:
     """L, W and what is left of a front from its lower triangle; the upper one of what is left is no part of it."""
     kind = "z" if np.iscomplexobj(whole) else "d"
     own, below, left = (np.asfortranarray(each) for each in (whole[:e, :e], whole[e:, :e], whole[e:, e:]))
     lower, info = getattr(lapack, f"{kind}potrf")(own, lower=1, clean=1)
     if info != 0:
         values = eigvalsh(own, lower=True)
-        raise NotPositiveDefiniteError(unstable=bool(values[0] < -_NEGATIVE * np.abs(values).max()))
-    if (np.diag(lower).real ** 2 <= _SINGULAR * np.diag(own).real).any():
+        raise NotPositiveDefiniteError(unstable=bool(values[0] < -max(_NEGATIVE, rounding) * np.abs(values).max()))
+    if (np.diag(lower).real ** 2 <= max(_SINGULAR, rounding) * np.diag(own).real).any():
         raise NotPositiveDefiniteError(unstable=False)
     if len(below) == 0:
         return lower, below, left

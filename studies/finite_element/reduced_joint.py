@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
+from studies.finite_element.elimination import rounding_of
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduction import PreparedModel
 from studies.finite_element.solid_mesh import (
@@ -116,7 +117,8 @@ def prepare_model(model: FeModel, joint: JointDefinition, progress: Progress = s
     along_x = placed * np.array([1.0, 0.0, 0.0])
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
     positions = _positions(mesh.coordinates, structure, forms.values())
-    prepared = PreparedModel(structure, forms, positions, load, weight, rotation)
+    rounding = 0.0 if model.forms is None else rounding_of(forms["stiffness"])
+    prepared = PreparedModel(structure, forms, positions, load, weight, rotation, rounding)
     if model.forms is not None or not model.prestress or rotation is None:
         return prepared
     progress("static state of the glued structure under the centrifugal load")

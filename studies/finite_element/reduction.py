@@ -35,7 +35,8 @@ class PreparedModel:
     forms: matrices (3 n_nodes, 3 n_nodes), symmetric and unconstrained, by name: "stiffness", "mass", "elastic" for the
     stiffness without prestress where that differs, "damping" where the model has one. positions (n_nodes,
     n_directions): of the nodes, for the order of elimination. static_load (3 n_nodes,): N. weight (n_nodes,): kg of
-    each node. rotation: None at rest. dissections: filled by the first factorisation; all others have the same order.
+    each node. rotation: None at rest. rounding: of the stiffness, as in `rounding_of`. dissections: filled by the first
+    factorisation; all others have the same order.
 
     All methods raise SceneError where the glued structure is not held, or unstable.
     """
@@ -46,6 +47,7 @@ class PreparedModel:
     static_load: FloatArray
     weight: FloatArray
     rotation: Rotation | None
+    rounding: float = 0.0
     dissections: list[Dissection] = field(default_factory=list)
 
     @property
@@ -107,7 +109,7 @@ class PreparedModel:
             everything = _projected(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
             self.dissections.append(dissect(everything, coordinates.node, self.positions))
         try:
-            return stiffness, factorise(stiffness, self.dissections[0])
+            return stiffness, factorise(stiffness, self.dissections[0], self.rounding)
         except NotPositiveDefiniteError as error:
             at = f"at nodal diameter {nodal_diameter}"
             if error.unstable:
@@ -115,8 +117,12 @@ class PreparedModel:
                 speed = "that of the matrices" if rpm is None else f"{rpm:.6g}"
                 found = "the glued structure is unstable: spin softening exceeds its stiffness"
                 raise SceneError("rotation_speed", speed, f"reduce it: {at} {found}") from error
-            found = f"{at} nothing holds the glued structure: its stiffness is singular"
-            remedy = "clamp nodes, so that with all contact pairs glued no body can move as a whole"
+            digits = ", as far as the digits of the matrices tell" if self.rounding else ""
+            found = f"{at} nothing holds the glued structure: its stiffness is singular{digits}"
+            more = ", or write the matrices with more digits" if self.rounding else ""
+            remedy = (
+                f"clamp nodes, or hang a free body on soft elements{more}: with all pairs glued none may move freely"
+            )
             raise SceneError("clamp", found, remedy) from error
 
 

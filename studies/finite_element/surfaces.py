@@ -161,16 +161,18 @@ def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntA
     return _surface(mesh, name, faces_of_elements(mesh, name, elements, faces))
 
 
-def pressure_forces(coordinates: FloatArray, faces: list[Face], pressure: float) -> FloatArray:
-    """Consistent nodal forces (3 n_nodes,), N, of a pressure, Pa, into the body."""
-    forces = np.zeros(coordinates.shape)
+def integrate_shapes(coordinates: FloatArray, faces: list[Face]) -> tuple[FloatArray, FloatArray]:
+    """Integrals of shape functions over faces, (n_nodes,), m2, and of these times the outward normals, (n_nodes, 3)."""
+    areas, vectors = np.zeros(len(coordinates)), np.zeros(coordinates.shape)
     for size, shape in FACE_SHAPES.items():
         own = np.array([face.nodes for face in faces if len(face.nodes) == size], dtype=np.int64).reshape(-1, size)
         points, weights = _TRIANGLE_RULE if size in (3, 6) else _QUAD_RULE
         tangents = np.einsum("pna,fnj->fapj", shape.derivatives(points), coordinates[own])
         outward = np.cross(tangents[:, 0], tangents[:, 1])
-        np.add.at(forces, own, -pressure * np.einsum("p,pn,fpj->fnj", weights, shape.values(points), outward))
-    return forces.ravel()
+        values = weights[:, None] * shape.values(points)
+        np.add.at(areas, own, np.linalg.norm(outward, axis=2) @ values)
+        np.add.at(vectors, own, np.einsum("pn,fpj->fnj", values, outward))
+    return areas, vectors
 
 
 def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:

@@ -127,6 +127,19 @@ class RigidMotion:
 
 
 @dataclass(frozen=True)
+class MeanMotion:
+    """A reference node that follows the mean motion of a surface of faces.
+
+    turns: which of its rotations, dofs 4 to 6, do so beside its displacements.
+    """
+
+    place: str
+    surface: str
+    reference: int
+    turns: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class Pressure:
     """A constant pressure on faces (f,) of elements (f,), positive into the body."""
 
@@ -194,6 +207,7 @@ class Deck:
     transforms: tuple[Transform, ...] = ()
     equations: tuple[Equation, ...] = ()
     rigid_motions: tuple[RigidMotion, ...] = ()
+    mean_motions: tuple[MeanMotion, ...] = ()
     materials: Mapping[str, Material] = field(default_factory=dict)
     sections: tuple[Section, ...] = ()
     centrifugal: tuple[CentrifugalLoad, ...] = ()

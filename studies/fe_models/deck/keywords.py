@@ -225,7 +225,7 @@ _INSTEAD = {
     **dict.fromkeys(("CONTACT", "CONTACTINCLUSIONS"), "give *CONTACT PAIR for the surfaces that touch"),
     "DAMPING": "remove it: the damping is loss_factor of the study",
     "EMBEDDEDELEMENT": "give *TIE, or meshes that share their nodes",
-    "DISTRIBUTING": "write *KINEMATIC, or give the load on the surface",
+    "DISTRIBUTINGCOUPLING": "write *COUPLING with *DISTRIBUTING, of a surface of element faces",
     "PARAMETER": "write numbers in place of <names>",
     "PLASTIC": "remove it: materials are elastic",
     "PRE-TENSIONSECTION": "remove it, and give the force of the bolt with `preload` in the study",

@@ -92,7 +92,8 @@ class Model:
     def check_coupling(self) -> None:
         """Raises SceneError where a coupling does not say what it couples."""
         if self.coupling is not None:
-            raise self.coupling.place.wrong("no *KINEMATIC below it", "write it there, or remove the coupling")
+            found = "no *KINEMATIC or *DISTRIBUTING below it"
+            raise self.coupling.place.wrong(found, "write it there, or remove the coupling")
 
     def end_step(self) -> None:
         """Of a step that writes matrices nothing stays, of one that is not static no load."""
@@ -116,7 +117,7 @@ class Model:
         solid = [(block, ~np.isin(block.numbers, gone)) for block in mesh.solid_blocks]
         faces = {name: (surface, ~np.isin(surface.elements, gone)) for name, surface in mesh.surfaces.items()}
         kept = np.setdiff1d(np.concatenate([NONE, *(block.numbers for block in mesh.solid_blocks)]), gone)
-        names = ("boundaries", "transforms", "equations", "rigid_motions", "forces", "pressures")
+        names = ("boundaries", "transforms", "equations", "rigid_motions", "mean_motions", "forces", "pressures")
         fields: dict[str, Any] = {name: tuple(self.get(name)) for name in names}
         loads = [load for load in self.get("centrifugal") if np.isin(load.elements, kept).any() or not kept.size]
         changes = [text for taken, _, text in (*self.get("removed"), *self.get("apart")) if taken]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.contents import Equation, RigidMotion, Section, Transform
+from studies.fe_models.deck.contents import Equation, MeanMotion, RigidMotion, Section, Transform
 from studies.fe_models.deck.keywords import Block, Row, keyword, unit
 from studies.fe_models.deck.model import MaterialRows, Model
 from studies.fe_models.files import IntArray, Place, is_integer, shown
@@ -184,7 +184,7 @@ def _rigid_body(model: Model, block: Block) -> None:
 
 @keyword("COUPLING", "REFNODE SURFACE", "CONSTRAINTNAME")
 def _coupling(model: Model, block: Block) -> None:
-    """A reference node and a surface; *KINEMATIC below it says what is coupled."""
+    """A reference node and a surface; *KINEMATIC or *DISTRIBUTING below it says what is coupled."""
     model.check_coupling()
     model.coupling = block
 
@@ -200,6 +200,20 @@ def _kinematic(model: Model, block: Block) -> None:
         _follow(model, block.place, nodes, following, model.mesh.node(head.reference("REFNODE")))
 
 
+@keyword("DISTRIBUTING", "COUPLING WEIGHTINGMETHOD")
+def _distributing(model: Model, block: Block) -> None:
+    """The reference node of *COUPLING follows the mean motion of the surface; data: its dofs, all of them without."""
+    head, model.coupling = block.below(model.coupling, "COUPLING"), None
+    block.chosen("COUPLING", ("CONTINUUM",), "CONTINUUM")
+    block.chosen("WEIGHTINGMETHOD", ("UNIFORM",), "UNIFORM")
+    lines = [_dofs(row.fields, row.place, (4, 5, 6)) for row in block.rows()]
+    turns = tuple(dof for dof in (4, 5, 6) if not lines or any(dof in dofs for dofs in lines))
+    name = model.mesh.surface(head.reference("SURFACE"))
+    if not model.mesh.surfaces[name].faces.size:
+        raise head.place.wrong("a surface of nodes", "give one of element faces: the mean is weighted by their areas")
+    model.add("mean_motions", MeanMotion(str(block.place), name, model.mesh.node(head.reference("REFNODE")), turns))
+
+
 @keyword("KINEMATICCOUPLING", "REFNODE")
 def _kinematic_coupling(model: Model, block: Block) -> None:
     """Node or set, first and last dof that follow the reference node."""
@@ -210,9 +224,9 @@ def _kinematic_coupling(model: Model, block: Block) -> None:
             _follow(model, row.place, nodes, dofs, reference)
 
 
-def _dofs(fields: list[str], place: Place) -> tuple[int, ...]:
-    """Displacements from the first to the last dof of a line; all of them without. Raises SceneError."""
+def _dofs(fields: list[str], place: Place, known: tuple[int, ...] = _ALL) -> tuple[int, ...]:
+    """Those of some dofs from the first to the last one of a line; all of them without. Raises SceneError."""
     found = [int(text) if is_integer(text) else 0 for text in fields] or [1, 6]
     if len(found) > 2 or not 1 <= found[0] <= found[-1] <= 6:
         raise place.wrong(f"no first and last dof: {shown(', '.join(fields))}", "give numbers from 1 to 6")
-    return tuple(dof for dof in _ALL if found[0] <= dof <= found[-1])
+    return tuple(dof for dof in known if found[0] <= dof <= found[-1])

@@ -75,7 +75,7 @@ def describe_model(
     progress("reduction with twice the modes")
     rows.append(("reduction", _reduction_error(loaded, scene, parameters)))
     rows += _rigid(loaded, scene, turning[-1])
-    total = prepared.static_load.reshape(-1, 3)[placed].sum(axis=0)
+    total = total_force(loaded, prepared.static_load)
     rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
     progress("state at rest")
     friction = parameters.friction_coefficient
@@ -98,6 +98,15 @@ def _rigid(loaded: LoadedModel, scene: FeScene, highest: float) -> Iterator[tupl
     if held:
         verb = "motion is" if held == 1 else "motions are"
         yield "warning", f"{held} {verb} held by friction alone: give retention_stiffness"
+
+
+def total_force(loaded: LoadedModel, load: FloatArray) -> FloatArray:
+    """Sum (3,) of nodal forces (3 n_nodes,), those on reference nodes included."""
+    acting = np.flatnonzero(~np.isnan(loaded.model.mesh.coordinates[:, 0]))
+    if loaded.deck.contact_nodes is None:  # reference nodes have no place; their rotations have the same number again
+        numbers, first = np.unique(loaded.model.mesh.numbers, return_index=True)
+        acting = first[numbers > 0]
+    return np.asarray(load.reshape(-1, 3)[acting].sum(axis=0))
 
 
 def _free(model: ReducedModel, linear: LinearModel) -> IntArray:

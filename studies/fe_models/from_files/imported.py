@@ -19,7 +19,7 @@ from studies.fe_models.deck.contents import Deck
 from studies.fe_models.files import ModelFiles, Units, library_errors
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.from_files.solid import SPEED_AGREES, check_units
-from studies.fe_models.matrices.matrices import Matrices
+from studies.fe_models.matrices.matrices import Matrices, number_modes
 from studies.fe_models.matrices.read import read_matrices
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces
@@ -268,13 +268,19 @@ def read_recovery(
         table.columns = [str(name).strip() for name in table]
         names = [name for name in table if name not in ("node", "dof")]
         values = table[names].fillna(0.0).to_numpy(dtype=np.float64)
-        rows = pd.MultiIndex.from_frame(table[["node", "dof"]])
+        node, dof = table[["node", "dof"]].to_numpy(dtype=np.int64).T
+        rows = pd.MultiIndex.from_arrays([number_modes(node, dof), dof])
+        n_modes = int(np.count_nonzero((node == 0) & (dof == 0)))
     matrices = imported.matrices
     own = pd.MultiIndex.from_arrays([matrices.node, matrices.direction + 1]).get_indexer(rows)
     if not names or (own < 0).any():
-        unknown = "no quantity" if not names else f"node {rows[own < 0][0][0]} with dof {rows[own < 0][0][1]} is no row"
+        unknown = "no quantity" if not names else f"node {node[own < 0][0]} with dof {dof[own < 0][0]} is no row"
         remedy = f"give a column for each quantity, over the rows of {matrices.files[0]}"
         raise SceneError("recovery", f"{path.name}: {unknown}", remedy)
+    given = int(np.count_nonzero((matrices.node < 0) & (matrices.direction < 0)))
+    if 0 < n_modes < given:
+        found = f"{path.name}: {n_modes} rows of node 0 and dof 0, {matrices.files[0]} has {given}"
+        raise SceneError("recovery", found, "give all of them, in the order of the matrices")
     twice = [name for name in names if name in taken]
     if twice:
         raise SceneError("recovery", f"{path.name}: a response has the name {twice[0]} as well", "give another name")

@@ -15,8 +15,15 @@ from studies.fe_models.deck.contents import Deck
 from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_digest
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.imported import check_nodes_have_dofs, import_matrices, read_recovery
+from studies.fe_models.from_files.mean_motions import equations_of_mean_motions
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
-from studies.fe_models.from_files.selections import Selections, find_clamped, find_cut, find_surfaces
+from studies.fe_models.from_files.selections import (
+    Selections,
+    find_clamped,
+    find_cut,
+    find_surfaces,
+    note_free_surfaces,
+)
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
@@ -27,7 +34,7 @@ from studies.finite_element.reduction import PreparedModel
 from studies.finite_element.rigid_motions import rigid_motions
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
-from studies.finite_element.surfaces import describe_mesh, faces_of_elements, pressure_forces
+from studies.finite_element.surfaces import describe_mesh, faces_of_elements, integrate_shapes
 from studies.scene import Progress, SurfaceMesh, build_compliant, silent
 from studies.scene_error import SceneError
 
@@ -113,7 +120,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     """Reads the files and puts the model together. Raises SceneError."""
     units = UNITS[parameters.units]
     progress(f"reading {files.mesh.name}")
-    deck = read_mesh_file(files.mesh)
+    deck = note_free_surfaces(read_mesh_file(files.mesh), parameters.contact)
     mesh = build_solid_mesh(deck, parameters, units)
     selections = Selections(deck, mesh, parameters, units)
     if not files.matrices:
@@ -127,6 +134,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
         imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
     nodes = mesh if imported is None else imported.mesh
+    deck = replace(deck, equations=(*deck.equations, *equations_of_mean_motions(selections)))
     supported = find_constraints(deck, nodes.numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
@@ -198,8 +206,8 @@ def _preload(selections: Selections, supported: Supported) -> FloatArray:
     for each in selections.deck.pressures:
         kept = np.isin(each.elements, np.concatenate([group.numbers for group in mesh.groups]))
         faces = faces_of_elements(mesh, each.place, each.elements[kept], each.faces[kept])
-        pressure = each.value * selections.units.stress
-        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, faces, pressure)
+        pressed = integrate_shapes(mesh.coordinates, faces)[1].ravel()
+        forces[: 3 * mesh.n_nodes] -= each.value * selections.units.stress * pressed
     return np.asarray(supported.forces + forces)
 
 

@@ -130,8 +130,44 @@ def find_surfaces(
         replace(each, friction_coefficient=value, sector=sector)
         for each, value, sector in zip(named, friction, sectors, strict=True)
     ]
-    stay = [pair for pair in (*deck.ties, *glued) if not any(_same(pair, each) for each in chosen)]
-    return tuple(contacts), tuple(_surfaces(selections, pair, "model") for pair in stay)
+    ties = (_surfaces(selections, pair, "model") for pair in (*deck.ties, *glued))
+    of_deck = given is None and bool(touching)
+    return tuple(contacts), tuple(tie for tie in ties if not _released(tie, contacts, of_deck=of_deck))
+
+
+def note_free_surfaces(deck: Deck, given: Sequence[tuple[str, str]] | None) -> Deck:
+    """The deck with a note on each contact pair that is none of the study. given: contacts of the study."""
+    chosen = [SurfacePair(capital(one), capital(other)) for one, other in given or ()]
+    free = [pair for pair in deck.contact_pairs if chosen and not any(_same(pair, each) for each in chosen)]
+    why = "is not in `contact` of the study: nothing joins these surfaces, unless they are there by other names."
+    notes = (f"*CONTACT PAIR {pair.labels[-1]} {why}" for pair in free if not pair.glued)
+    return replace(deck, notes=(*deck.notes, *notes))
+
+
+def _released(tie: ContactSurfaces, contacts: Sequence[ContactSurfaces], *, of_deck: bool) -> bool:
+    """Whether surfaces that the deck glues are those of a contact of the study, by whatever names, or of its default.
+
+    of_deck: whether the deck has the contacts beside the tie. Raises SceneError where one of these, or one with other
+    surfaces, has facets of both surfaces of the tie.
+    """
+    for each in contacts:
+        for first, second in ((each.first, each.second), (each.second, each.first)):
+            sides = (tie.first, first), (tie.second, second)
+            common = min(_common_facets(one, other) for one, other in sides)
+            same = all(np.array_equal(one.nodes, other.nodes) for one, other in sides)
+            if common and same and not of_deck:
+                return True
+            if common:
+                found = f"{tie.name} is glued, and {each.name} in contact has {common} of its facets"
+                remedy = "remove one of them from the deck, or name in `contact` the surfaces that move, all of them"
+                raise SceneError("contact", found, remedy)
+    return False
+
+
+def _common_facets(one: Surface, other: Surface) -> int:
+    """How many facets are in both surfaces."""
+    own, others = (np.unique(np.sort(each.facets, axis=1), axis=0) for each in (one, other))
+    return len(own) + len(others) - len(np.unique(np.concatenate([own, others]), axis=0))
 
 
 def _same(one: SurfacePair, other: SurfacePair) -> bool:

@@ -72,6 +72,12 @@ def label(node: IntArray, dof: IntArray, file: str) -> IntArray:
     return np.asarray(_DOFS * node + dof, dtype=np.int64)
 
 
+def number_modes(node: IntArray, dof: IntArray) -> IntArray:
+    """Nodes (m,) of rows; those of node 0 with dof 0, each a coordinate of no place, have -1, -2 and so on."""
+    of_mode = (node == 0) & (dof == 0)
+    return np.where(of_mode, -np.cumsum(of_mode), node).astype(np.int64)
+
+
 def entries_of_tables(
     found: Mapping[str, Any], files: Mapping[str, Path], labels: IntArray | None = None
 ) -> dict[str, Entries]:
@@ -87,8 +93,10 @@ def entries_of_tables(
         with library_errors(path, "pandas", "pandas", "matrices"):
             table = pd.read_csv(path, skipinitialspace=True)
         if not {"node", "dof"} <= set(table) or any(table[name].dtype.kind != "i" for name in ("node", "dof")):
-            wrong(path.name, "no columns node and dof of whole numbers", "give a line for each row of the matrices")
-        labels = label(table["node"].to_numpy(), table["dof"].to_numpy(), path.name)
+            remedy = "give a line for each row of the matrices, 0 and 0 for a mode"
+            wrong(path.name, "no columns node and dof of whole numbers", remedy)
+        node, dof = table["node"].to_numpy(), table["dof"].to_numpy()
+        labels = label(number_modes(node, dof), dof, path.name)
     if np.unique(labels).size < labels.size:
         wrong(first, "a dof has two rows", "give node and dof of each row once")
     names = {name: files[name if name in files else "matrices"].name for name in found}

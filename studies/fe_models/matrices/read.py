@@ -11,7 +11,7 @@ which may be repeated, their dofs, and the upper triangle of each `*MATRIX` colu
 
 MATLAB (.mat), MatrixMarket and Harwell-Boeing files have no labels. Node and dof of each row, in the order of the rows,
 are the variable `rows` (n, 2) of a .mat file, or stand beside the files in job_rows.csv with the columns node and dof;
-dof 0 is a coordinate of no place, as of a mode.
+dof 0 is a coordinate of no place, as of a mode, whose node may be 0 as well.
 """
 
 from __future__ import annotations
@@ -29,7 +29,17 @@ import numpy as np
 from scipy import io, sparse
 
 from studies.fe_models.files import check_file, library_errors, shown
-from studies.fe_models.matrices.matrices import NAMES, Entries, Matrices, assemble, entries_of_tables, label, wrong
+from studies.fe_models.matrices.harwell_boeing import read_harwell_boeing
+from studies.fe_models.matrices.matrices import (
+    NAMES,
+    Entries,
+    Matrices,
+    assemble,
+    entries_of_tables,
+    label,
+    number_modes,
+    wrong,
+)
 from studies.fe_models.matrices.nastran import read_op4, read_punch
 from studies.scene_error import SceneError
 
@@ -159,9 +169,16 @@ def _read_tables(files: Files) -> dict[str, Entries]:
     found = {}
     for name in [name for name in NAMES if name in files]:
         path = files[name]
-        with library_errors(path, "scipy.io", "scipy", "matrices"):
-            found[name] = io.mmread(path) if path.suffix.lower() == ".mtx" else io.hb_read(path)
+        found[name] = _read_market(path) if path.suffix.lower() == ".mtx" else read_harwell_boeing(path)
     return entries_of_tables(found, files)
+
+
+def _read_market(path: Path) -> Any:
+    with library_errors(path, "scipy.io", "scipy", "matrices"):
+        *_, field, symmetry = io.mminfo(path)
+        if field == "pattern" or symmetry == "skew-symmetric":
+            wrong(path.name, f"its header says {field} {symmetry}", "write the numbers of a symmetric matrix")
+        return io.mmread(path)
 
 
 def _read_matlab(files: Files) -> dict[str, Entries]:
@@ -176,7 +193,8 @@ def _read_matlab(files: Files) -> dict[str, Entries]:
         table = np.asarray(found["rows"])
         if table.ndim != 2 or table.shape[1] != 2 or table.dtype.kind not in "iuf":
             wrong(path.name, f"rows have the shape {table.shape}", "give node and dof of each row of the matrices")
-        labels = label(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), path.name)
+        node, dof = table.astype(np.int64).T
+        labels = label(number_modes(node, dof), dof, path.name)
     return entries_of_tables({name: found[name] for name in NAMES if name in found}, files, labels)
 
 

@@ -124,6 +124,25 @@ def write_harwell_boeing(folder, named, rows):
         io.hb_write(folder / f"job_{name}.rb", sparse.csc_matrix(np.atleast_2d(values.T).T))
 
 
+def write_one_triangle(folder, named, rows):
+    """Harwell-Boeing: RSA, exponents with D, and fields that touch."""
+    write_rows(folder, rows)
+    for name, values in named.items():
+        matrix = sparse.csc_array(np.tril(values) if values.ndim == 2 else values[:, None])
+        matrix.sort_indices()
+        lists = (matrix.indptr + 1, matrix.indices + 1, matrix.data)
+        forms = (("(8I9)", 8, "{:9d}"), ("(I6)", 1, "{:6d}"), ("(1P,3D23.16)", 3, "{:23.16E}"))
+        lines = []
+        for numbers, (_, each, form) in zip(lists, forms, strict=True):
+            texts = [form.format(number).replace("E", "D") for number in numbers]
+            lines += ["".join(texts[at : at + each]) for at in range(0, len(texts), each)]
+        head = "".join(f"{n:14d}" for n in (*matrix.shape, matrix.nnz, 0))
+        kind = "RSA" if values.ndim == 2 else "RRA"
+        formats = "".join(form.ljust(16) for form, *_ in forms)
+        start = [name.upper().ljust(72), f"{len(lines):14d}{1:14d}{1:14d}{1:14d}{0:14d}", f"{kind:14}{head}", formats]
+        (folder / f"job_{name}.hb").write_text("\n".join([*start, *lines]) + "\n")
+
+
 def op4_strings(column, sparsely):
     """First row, from 1, and values of the parts of a column: one of all rows, or those between zeros."""
     if not sparsely:
@@ -172,6 +191,7 @@ REDUCED = {
     "mat 7.3": write_mat_73,
     "market": write_market,
     "harwell boeing": write_harwell_boeing,
+    "one triangle": write_one_triangle,
     "matrix input": write_matrix_input,
     "user element": write_user_element,
     "punch": write_punch,

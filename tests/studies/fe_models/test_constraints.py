@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from studies.finite_element.rigid_motions import find_resistance
+from studies.fe_models.from_files.check import total_force
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 from tests.studies.fe_models.solid_meshes import needs_ccx
@@ -60,6 +61,7 @@ def test_constraints_on_matrices_of_calculix(name, tmp_path):
     np.testing.assert_allclose(own, frequencies(tmp_path, text), rtol=1e-8)
 
 
+MEAN = "*COUPLING, REF NODE=901, SURFACE=SE\n*DISTRIBUTING\n"
 PINNED = "".join(f"*EQUATION\n2\n{a},{k},1.,{b},{k},-1.\n" for a, b in ((5, 15), (10, 3)) for k in (1, 2, 3))
 SAME = {
     "PIN": ("*MPC\nPIN, 5, 15\nTIE, 10, 3\n", PINNED),
@@ -71,6 +73,10 @@ SAME = {
         f"*NODE\n901, 9, 9, 9\n{END}, ROT NODE=901\n*BOUNDARY\n901, 1, 2\n",
     ),
     "a reference node that is held": (f"{END}\n*BOUNDARY\n900, 1, 6\n", "*BOUNDARY\nXE, 1, 3\n"),
+    "mean motion of a rigid end": (
+        f"{END}\n*NODE\n901, 3, 5, 9\n{MEAN}*NSET, NSET=X2\n116, 121, 126\n*RIGID BODY, NSET=X2, REF NODE=901\n",
+        f"{REFERENCE}*NSET, NSET=X2\nXE, 116, 121, 126\n*RIGID BODY, NSET=X2, REF NODE=900\n",
+    ),
     "axes that are turned": (
         "*TRANSFORM, NSET=XE, TYPE=R\n0, 1, 0, -1, 0, 0\n*BOUNDARY\nXE, 1\n",
         "*BOUNDARY\nXE, 2\n",
@@ -143,9 +149,23 @@ def test_forces_of_the_deck_and_gravity(tmp_path):
     coupling = BLOCKS + "*NODE\n900, 40., 5., 2.5\n*RIGID BODY, NSET=XE, REF NODE=900\n*STEP\n*STATIC\n*CLOAD\n"
     moved = []
     for force in ("900, 1, 6.", "XE, 1, 1."):
-        pulled, _ = prepared_deck(tmp_path, f"{coupling}{force}\n*END STEP\n")
+        pulled, loaded = prepared_deck(tmp_path, f"{coupling}{force}\n*END STEP\n")
+        np.testing.assert_allclose(total_force(loaded, pulled.static_load), [6.0, 0.0, 0.0], atol=1e-12)
         moved.append(pulled.solve_static(pulled.static_load))
     np.testing.assert_allclose(moved[0], moved[1], atol=1e-9 * abs(moved[0]).max())
+
+
+@needs_ccx
+def test_a_force_on_the_mean_motion_of_a_surface_as_calculix(tmp_path):
+    """By a reference node that is off the centre; the mean is weighted by the integrals of the shape functions."""
+    mean = f"*NODE\n901, 45., 5., 0.\n{MEAN.replace('SE', 'SE, CONSTRAINT NAME=C')}1, 3\n"
+    step = "*STEP\n*STATIC\n*CLOAD\n901, 1, 60.\n901, 3, 5.\n*NODE PRINT, NSET=XE\nU\n*END STEP\n"
+    job = run_tied(tmp_path, BLOCKS + mean, step)
+    table = np.array([line.split() for line in job.with_suffix(".dat").read_text().splitlines()[3:] if line], float)
+    prepared, loaded = prepared_deck(tmp_path, BLOCKS + mean + step)
+    moved = 1e3 * prepared.solve_static(prepared.static_load).reshape(-1, 3)
+    own = np.searchsorted(loaded.model.mesh.numbers[:-1], table[:, 0])
+    np.testing.assert_allclose(moved[own], table[:, 1:], atol=1e-6 * abs(table[:, 1:]).max())
 
 
 @needs_ccx

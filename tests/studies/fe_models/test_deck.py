@@ -244,6 +244,20 @@ def test_glued_contact_pairs(tmp_path):
     assert prepared_deck(tmp_path, alone, contact=(("SUP", "SLOW"),), friction_coefficient=0.3)[0].pairs.n_contact == 15
 
 
+@pytest.mark.parametrize("names", [("SUP", "SLOW"), ("SLOW", "SUP"), ("NU", "NL")])
+def test_a_contact_of_the_study_releases_a_tie(names, tmp_path):
+    """By whatever names; not where they have some of the facets in common, or the deck has both."""
+    both = BLOCKS + "*TIE, NAME=T\nSUP, SLOW\n*NSET, NSET=NU, GENERATE\n101, 115\n*NSET, NSET=NL, GENERATE\n16, 30\n"
+    own = {"contact": (names,), "friction_coefficient": 0.3}
+    prepared, loaded = prepared_deck(tmp_path, both, **own)
+    assert (loaded.joint.ties, prepared.pairs.n_contact) == ((), 15)
+    said = [text for text in loaded.deck.notes if text.startswith("*CONTACT PAIR SUP-SLOW is not in `contact` of")]
+    assert len(said) == (names[0] == "NU")
+    for text, given in ((both, {}), (both.replace("101, 115", "101, 114"), {**own, "contact": (("NU", "NL"),)})):
+        with pytest.raises(SceneError, match=r"SUP-SLOW is glued, and .* in contact has \d of its facets; remove one"):
+            prepared_deck(tmp_path, text, **given)
+
+
 @pytest.mark.parametrize(
     ("text", "gap"),
     [

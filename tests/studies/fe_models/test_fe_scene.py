@@ -1,10 +1,12 @@
 """Reduced models against dense linear algebra, the bundled dovetail and closed forms."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy import linalg
+from scipy.sparse import triu
 
 from studies.fe_models.from_files.check import describe_rest
 from studies.finite_element import reduction
@@ -15,6 +17,7 @@ from studies.finite_element.structure import FeModel, JointDefinition, Reduction
 from studies.finite_element.surfaces import surface_of_nodes
 from studies.model_check import check_model
 from studies.scene_error import SceneError
+from tests.studies.fe_models.plates import Plates
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, surface_where, wedge_shape
 from tests.studies.fe_models.solid_meshes import block, joined
 
@@ -259,12 +262,34 @@ def test_retainer_acts_on_the_mean_relative_displacement():
     assert np.linalg.matrix_rank(added, tol=1.0) == 1
 
 
+def test_a_long_body_that_turns_freely_is_not_held():
+    """What round-off leaves of its stiffness is 1.5e-13 of an entry; of a blade of 1000 times its thickness 1.6e-10."""
+    lap = Plates("C3D8I", (100, 1, 1), (100, 1, 1))
+    mesh, ground = replace(lap.mesh, coordinates=lap.mesh.coordinates + [5.0, 3.0, 2.0]), lap.sets["GROUND"]
+    contact = ContactSurfaces(*(surface_of_nodes(mesh, name, lap.sets[name]) for name in ("UNDER", "OVER")))
+    load = mean_motion(lap.sets["TIP"], Z, mesh.n_nodes)
+    held = np.zeros((mesh.n_nodes, 3), dtype=bool)
+    held[ground, 0] = held[ground[0]] = True
+    prepared = prepare_model(FeModel(mesh), JointDefinition((contact,), held, load, {}))
+    with pytest.raises(SceneError, match="nothing holds the glued structure"):
+        prepared.frequencies(0, 1)
+
+
 def test_what_cannot_be_is_said():
     model, joint = plates()
     with pytest.raises(SceneError, match="nothing holds the glued structure"):
         build_fe_scene(model, replace(joint, held=np.zeros_like(joint.held)), ReductionOptions(), 1)
     with pytest.raises(SceneError, match=r"nodal_diameter: 2; only a cyclic sector has one"):
         build_fe_scene(model, joint, ReductionOptions(nodal_diameter=2), 1)
+    # free along x, in matrices of few digits, which hold it or push it
+    loose = replace(joint, held=joint.held & [False, True, True])
+    stiffness, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
+    for digits, scale in product((10, 14), (1.001, 1.002)):
+        upper = triu(scale * stiffness)
+        upper.data = np.array([float(f"{value:.{digits - 1}e}") for value in upper.data])
+        free = replace(model, forms={"stiffness": (upper + triu(upper, 1).T).tocsr(), "mass": mass})
+        with pytest.raises(SceneError, match="stiffness is singular, as far as the digits of the matrices tell"):
+            prepare_model(free, loose).frequencies(0, 1)
     sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 2, 1))
     with pytest.raises(SceneError, match="use at most n_sectors // 2 = 6"):
         build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=7), 1)

@@ -13,7 +13,7 @@ from studies.finite_element.rigid_motions import rigid_motions
 from studies.finite_element.surfaces import (
     closest_points,
     faces_of_elements,
-    pressure_forces,
+    integrate_shapes,
     surface_of_faces,
     surface_of_nodes,
 )
@@ -37,7 +37,9 @@ def test_forces_of_a_pressure(kind):
     """5 Pa on a face of 2 by 3 m: its resultant and moments, of quadratic faces the second moment as well."""
     mesh, _ = block(kind, (2, 2, 2), lambda points: points * [2.0, 3.0, 1.0])
     faces = faces_where(mesh, np.abs(mesh.coordinates[:, 2] - 1.0) < 1e-9)
-    forces = pressure_forces(mesh.coordinates, faces_of_elements(mesh, "TOP", *faces), 5.0).reshape(-1, 3)
+    areas, vectors = integrate_shapes(mesh.coordinates, faces_of_elements(mesh, "TOP", *faces))
+    forces = -5.0 * vectors
+    np.testing.assert_allclose(areas, vectors[:, 2], atol=1e-12)
     np.testing.assert_allclose(forces.sum(axis=0), [0.0, 0.0, -30.0], atol=1e-12)
     np.testing.assert_allclose(np.cross(mesh.coordinates, forces).sum(axis=0), [-45.0, 30.0, 0.0], atol=1e-12)
     if ELEMENT_KINDS[kind].reference.edges:

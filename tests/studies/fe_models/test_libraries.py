@@ -101,6 +101,15 @@ def test_cdb(tmp_path, types):
     assert held == [([1], 1, 1, 0.0), ([2], 1, 3, 0.0)]
 
 
+@pytest.mark.parametrize("form", ["9,COMPACT,,32", "10,,,1"])
+def test_elements_of_a_cdb_in_another_form(tmp_path, form):
+    """Without the library as well."""
+    path = write_cdb(tmp_path, "", "ET,1,185")
+    path.write_text(path.read_text().replace("19,SOLID,        1,        1", form))
+    with pytest.raises(SceneError, match=rf"mesh.cdb, line 19: EBLOCK,{form}: elements in this form .*EBLOCK,19,SOLID"):
+        read_mesh_file(path)
+
+
 def test_meshes_by_their_ending(tmp_path):
     assert read_mesh_file(write(tmp_path, "*NODE\n1,0,0,0\n", "mesh.inp")).node_numbers.tolist() == [1]
     with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):

@@ -56,7 +56,14 @@ def test_names_of_files(tmp_path):
         read_matrices(tmp_path / "other")
 
 
-WRITERS = {".sti": write_calculix, ".dof": write_calculix, "_STIF1.mtx": write_matrix_input, ".pch": write_punch}
+WRITERS = {
+    ".sti": write_calculix,
+    ".dof": write_calculix,
+    "_STIF1.mtx": write_matrix_input,
+    ".pch": write_punch,
+    "_mass.mtx": REDUCED["market"],
+    "_stiffness.hb": REDUCED["one triangle"],
+}
 
 
 @pytest.mark.parametrize(
@@ -74,6 +81,11 @@ WRITERS = {".sti": write_calculix, ".dof": write_calculix, "_STIF1.mtx": write_m
         (".pch", "KAAX           0", "LAAX           0", "in DMIG KAAX: its header is missing"),
         (".pch", "D[+]10", "D+10         1.0D+10", "has an imaginary part"),
         (".pch", "GRID,1,,0.,0.,0.", "GRID,1,,0.,0.,0.,3", r"line 2: GRID 1 has displacements in the .*system 3"),
+        ("_mass.mtx", "real symmetric", "real skew-symmetric", "job_mass.mtx: its header says real skew-symmetric"),
+        ("_mass.mtx", "real symmetric", "pattern symmetric", "job_mass.mtx: its header says pattern symmetric"),
+        ("_stiffness.hb", "RSA", "RZA", "job_stiffness.hb: a matrix of type RZA; write a real symmetric one"),
+        ("_stiffness.hb", r" 0\nRSA", " 2\nRSA", "right-hand sides beside the matrix; write it without them"),
+        ("_stiffness.hb", r"(?s)[^\n]*\n$", "", "no Harwell-Boeing file, or damaged"),
     ],
 )  # fmt: skip
 def test_wrong_files(tmp_path, end, old, new, sentence):
@@ -161,6 +173,7 @@ DAMAGED = {
     "job.pch": write_punch,
     "job.mtx": REDUCED["user element"],
     "job.mat": REDUCED["mat"],
+    "job_mass.hb": REDUCED["one triangle"],
     "job.op4": REDUCED["op4 binary sparse"],
 }
 

@@ -80,11 +80,10 @@ class Sector:
             lines.append(",".join(map(str, [self.mesh.numbers[node], *place, sets, *more])))
         return "\n".join(lines) + "\n"
 
-    def recovery_table(self):
-        """Weights of the quantity in MPa with the labels of their rows, in another order."""
-        rows = zip(self.rows, self.weights[1].tolist(), strict=True)
-        lines = [f"{node},{dof},{weight!r}" for (node, dof), weight in rows]
-        return "\n".join(["node,dof,root [MPa]", *reversed(lines)]) + "\n"
+    def recovery_table(self, rows):
+        """Weights of the quantity in MPa with the labels of their rows, those of the nodes in another order."""
+        lines = [f"{node},{dof},{weight!r}" for (node, dof), weight in zip(rows, self.weights[1].tolist(), strict=True)]
+        return "\n".join(["node,dof,root [MPa]", *reversed(lines[:-N_MODES]), *lines[-N_MODES:]]) + "\n"
 
     def scene(self):
         """The scene for three harmonics: `u_right = exp(2 pi i k / N) R u_left`, relative displacements first."""
@@ -134,9 +133,11 @@ def expected_scene():
 
 
 def write(folder, kind="mat"):
+    """Modes are nodes of their own, or all of them node 0."""
+    rows = np.where(sector().rows[:, 1:] == 0, 0, sector().rows) if kind == "one triangle" else sector().rows
     (folder / "nodes.csv").write_text(sector().table())
-    (folder / "stress.csv").write_text(sector().recovery_table())
-    REDUCED[kind](folder, sector().named, sector().rows)
+    (folder / "stress.csv").write_text(sector().recovery_table(rows))
+    REDUCED[kind](folder, sector().named, rows)
     return folder
 
 
@@ -158,9 +159,9 @@ def seen(model, k, omega):
     return outer @ np.linalg.solve(stiffness, inner)
 
 
-@pytest.mark.parametrize("kind", ["mat", "user element"])
+@pytest.mark.parametrize("kind", ["mat", "user element", "one triangle"])
 def test_tables_of_nodes_and_matrices_give_the_complex_matrices_of_each_nodal_diameter(tmp_path, kind):
-    """Of one format with forces, and one without."""
+    """Of formats with forces, and one without."""
     expected = expected_scene()
     forces = [{"set": "TIP", "direction": [1, 0, 0], "force": sector().named["load"].sum()}]
     found = model_of(write(tmp_path, kind), preload=forces if kind == "user element" else ())
@@ -199,6 +200,7 @@ def test_mistakes_are_named(tmp_path, changes, sentence):
         ("nodes.csv", "$", "7777,0.3,0.0,0.0,,,,,,\n", r"matrices: 1 nodes of nodes.csv have no row in job.mat"),
         ("nodes.csv", ",sets", ",set", r"model: nodes.csv has no column sets"),
         ("stress.csv", "$", "1,7,1.0\n", r"recovery: stress.csv: node 1 with dof 7 is no row"),
+        ("stress.csv", "$", "0,0,1.0\n", r"recovery: stress.csv: node 0 with dof 0 is no row"),
         ("stress.csv", "root [MPa]", "tip", r"recovery: stress.csv: a response has the name tip as well"),
     ],
 )
@@ -208,6 +210,15 @@ def test_tables_that_do_not_fit_are_named(tmp_path, file, old, new, sentence):
     path.write_text(text + new if old == "$" else text.replace(old, new))
     with pytest.raises(SceneError, match=sentence):
         model_of(tmp_path)
+
+
+def test_a_table_without_some_of_the_modes_is_named(tmp_path):
+    path = write(tmp_path, "one triangle") / "stress.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+    with pytest.raises(
+        SceneError, match=rf"{N_MODES - 1} rows of node 0 and dof 0, job_stiffness.hb has {N_MODES}; give"
+    ):
+        load(tmp_path)
 
 
 def test_a_scene_file_and_a_model_in_python_are_the_same(tmp_path):

@@ -47,11 +47,15 @@ def with_friction(lines):
 NO_FRICTION = [with_friction("*FRICTION, TAUMAX=100.\n0.4"), with_friction("*FRICTION\n0.4, 0.\n0.3, 1.")]
 
 
+MEAN = BLOCKS + "*SURFACE, NAME=SN, TYPE=NODE\nXE\n*NODE\n900, 45., 5., 0.\n"
+MEAN += "*COUPLING, REF NODE=900, SURFACE=SE\n*DISTRIBUTING\n"
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         (BLOCKS + "*CONTACT\n", r"\*CONTACT: .* may change the model; give \*CONTACT PAIR for"),
-        (BLOCKS + "*COUPLING, REF NODE=5, SURFACE=SUP\n", r"\*COUPLING: no \*KINEMATIC below it"),
+        (BLOCKS + "*COUPLING, REF NODE=5, SURFACE=SUP\n", r"\*COUPLING: no \*KINEMATIC or \*DISTRIBUTING below it"),
         (BLOCKS + "*NONSENSE\n", r"\*NONSENSE: .* may change the model; remove it"),
         (BLOCKS + "*MATERIAL, NAME=STEEL\n*ELASTIC\n7e4, 0.3\n", r"\*ELASTIC: one material again \(before: deck.inp"),
         (BLOCKS + "*INITIAL CONDITIONS, TYPE=STRESS\n", r"\*INITIAL CONDITIONS: TYPE=STRESS is not read"),
@@ -61,6 +65,14 @@ NO_FRICTION = [with_friction("*FRICTION, TAUMAX=100.\n0.4"), with_friction("*FRI
         (BLOCKS + "*EQUATION\n2\n1,1,1.,15,1,-1.\n", "displacement 1 of node 1 depends on others and is held"),
         (BLOCKS + "*EQUATION\n2\n105,1,1.,15,1,-1.\n2\n20,1,1.,15,1,-1.\n", "node 105 depends on others and moves in"),
         (BLOCKS + "*TRANSFORM, NSET=XM, TYPE=C\n40,0,0,40,0,1\n*BOUNDARY\nXM,1\n", r"\*TRANSFORM: node 5 is on the"),
+        (MEAN + "*BOUNDARY\n900, 4, 6\n", r"\*DISTRIBUTING: the rotations of node 900 are held; hold"),
+        (MEAN + "*BOUNDARY\n900, 1\n", r"\*DISTRIBUTING: displacement 1 of node 900 depends on others and is held"),
+        (MEAN + "*TRANSFORM, NSET=XE\n0,1,0,-1,0,0\n", r"\*DISTRIBUTING: node 5 has \*TRANSFORM; leave"),
+        (MEAN + "*STEP\n*STATIC\n*CLOAD\n900, 5, 1.\n", r"\*CLOAD: a load along dof 5; give forces"),
+        (MEAN.replace("TING\n", "TING, WEIGHTING METHOD=CUBIC\n"), r"\*DISTRIBUTING: WEIGHTINGMETHOD=CUBIC is not"),
+        (MEAN.replace("SE\n*D", "SN\n*D"), r"\*COUPLING: a surface of nodes; give one of element faces"),
+        (MEAN.replace("NODE=900", "NODE=5"), r"\*DISTRIBUTING: the reference node 5 is on the surface"),
+        (BLOCKS + "*DISTRIBUTING COUPLING, ELSET=E\n", r"\*DISTRIBUTING COUPLING: .*; write \*COUPLING with \*DIST"),
         (BLOCKS + "*BOUNDARY\nXM, 1, 1, 0.1\n", r"\*BOUNDARY moves nodes by 0.1"),
         (BLOCKS + "*STEP\n*STATIC\n*DLOAD\nELOW, BX, 1.\n*END STEP\n", r"\*DLOAD: a load of type BX is not read"),
     ],
