@@ -8,9 +8,8 @@ the first harmonic only, which is then exact. Masses that ratchet are brought to
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from solver.accuracy.resolved_state import (
     HARMONIC_LEVELS,
@@ -115,7 +114,7 @@ class _Search:
             by_samples, by_harmonics = self._samples_error(here), self._harmonics_error(here)
             estimate = by_samples + by_harmonics
             if not settings.automatic:
-                return replace(here, estimate=estimate)
+                return replace(here, estimate=estimate, accurate=math.isfinite(estimate.largest))
             holds = here.holds()
             if holds and estimate.largest <= settings.rtol:
                 return self._relaxed(here, estimate)

@@ -1,10 +1,7 @@
 """A state at one resolution (harmonics and samples), the same state at others, and their difference as an error; levels
 of harmonics, and the events in the period of a state that decide about them.
 
-"One level up" is the next entry of `HARMONIC_LEVELS`. Two effects hide an error from a comparison with only a few more
-harmonics: a contact that is shorter than the period of the highest harmonic, whose force is nearly equal in all of
-them; and a structure that answers higher harmonics otherwise than the penalty E does. With the compliance G of a pair,
-the harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n`, which need not decrease.
+"One level up" is the next entry of `HARMONIC_LEVELS`.
 """
 
 from __future__ import annotations
@@ -19,23 +16,18 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import State, first_response, largest_responses, transfer
-from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
+from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, SolverSettings, all_orders, samples_for
 from solver.structure.joint import Case, Joint
-from solver.structure.penalty import build_penalty, compliance_at
 
 HARMONIC_LEVELS = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
 """Highest harmonics between which "auto" chooses; the last two for comparison only. Without 7: for the dovetail at 212
 Hz 5 and 7 agree by chance (errors of the worn volume with 5, 7, 9: 1.9, 1.2, 0.1 %)."""
 
-STIFFNESS_MISMATCH = 0.25
-"""Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
-
 FAINT_SHARE = 0.1
-"""Fraction of rtol: part of the slip work that may be creep, and normal force over the largest one below which a
-contact need not be resolved."""
+"""Fraction of rtol: part of the slip work that may be creep."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
@@ -82,8 +74,8 @@ class ResolvedState:
     """A state with the case and the joint of its solution.
 
     estimate: estimated errors, as far as estimated.
-    accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given.
-        Always true for fixed settings.
+    accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given; for
+        fixed settings whether it is known.
     """
 
     case: Case
@@ -214,24 +206,6 @@ def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
     return Resolution(orders, samples)
 
 
-def reach(model: ReducedModel, omega: float, highest: int) -> int:
-    """Lowest harmonic of the levels, not below `highest`, beyond which |1 - E G| is small for all pairs.
-
-    G is evaluated at real rates (growth instead of vibration), where the structure has no resonances. omega: rad/s.
-    The last level where there is none.
-    """
-    pair, component = np.divmod(model.contact.component_index, 3)
-    tangent = np.minimum(component, 1)
-    for level in (highest, *(level for level in HARMONIC_LEVELS if level > highest)):
-        penalty = build_penalty(model, omega, level)
-        half_octaves = np.arange(0.0, 2.0 * np.log2(HARMONIC_LEVELS[-1] / (level + 1)) + 1.0)
-        rates = (level + 1) * omega * 2.0 ** (0.5 * half_octaves)
-        apart = (1.0 - penalty.at_rate(rate)[pair, tangent] * compliance_at(model, rate) for rate in rates)
-        if all(np.abs(each).max(initial=0.0) <= STIFFNESS_MISMATCH for each in apart):
-            return level
-    return HARMONIC_LEVELS[-1]
-
-
 def nothing_happens(evaluation: Evaluation) -> bool:
     """Whether every pair sticks or is open throughout the period, so that the joint is linear.
 
@@ -257,25 +231,6 @@ def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
     total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
     size = np.abs(evaluation.force_t).max(initial=0.0)
     return bool(np.ptp(total, axis=2).max(initial=0.0) <= fraction * size)
-
-
-def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:
-    """Duration of the shortest contact of all pairs that open, as a fraction of the period; 1 where no pair opens.
-
-    status_t, normal_force_t (n_contact, N): at the samples; N. felt: pairs are left out whose normal force stays below
-    this fraction of the largest one.
-    """
-    n_samples = status_t.shape[1]
-    shortest = n_samples
-    pressed = normal_force_t.max(axis=1, initial=0.0)
-    for closed in status_t[pressed >= felt * pressed.max(initial=0.0)] != SEPARATED:
-        begins = np.flatnonzero(closed & ~np.roll(closed, 1))
-        ends = np.flatnonzero(~closed & np.roll(closed, 1))
-        if begins.size:
-            # where the period begins in contact, the first end belongs to the last beginning
-            lasted = (ends - begins if ends[0] > begins[0] else np.roll(ends, -1) - begins) % n_samples
-            shortest = min(shortest, int(lasted.min()))
-    return float(shortest / n_samples)
 
 
 def left_out(orders: tuple[int, ...], evaluation: Evaluation) -> float:

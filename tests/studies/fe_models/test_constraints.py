@@ -6,8 +6,8 @@ import shutil
 import numpy as np
 import pytest
 
-from studies.finite_element.rigid_motions import find_resistance
 from studies.fe_models.from_files.check import total_force
+from studies.finite_element.rigid_motions import find_resistance
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 from tests.studies.fe_models.solid_meshes import needs_ccx
