@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solver.accuracy.refinement import refine
+from solver.accuracy.resolved_state import ResolvedState
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
@@ -182,9 +183,7 @@ def _reported(path: LoadingPath, branch: _Branch, errors: bool) -> ResponseCurve
         joint, run = balance.joint, Run(case.settings.tolerance)
         response[index], peak[index] = first_response(joint, at), largest_responses(joint, at)
         if errors:
-            # NaN where no state with other harmonics is found
-            estimate = refine(case, joint, point, run).estimate.response
-            error[index] = estimate if np.isfinite(estimate) else np.inf
+            error[index] = refine(ResolvedState(case, joint, point), run).estimate.response
         found.append(find_multipliers(case, joint, at, run))
         stability.append(found[-1].stability(odd=not run.fresh().is_stable(joint, at)))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import reduce
 
 from solver.accuracy.resolved_state import (
     HARMONIC_LEVELS,
@@ -21,12 +22,10 @@ from solver.accuracy.resolved_state import (
     shifted,
     with_highest,
 )
-from solver.harmonic_balance.state import State
 from solver.newton.linear_solver import SMALL_JOINT
 from solver.newton.run import Run
 from solver.settings import FINE_SAMPLES, Resolution, first_resolution
 from solver.stability.disturbances import EXPENSIVE_UNKNOWNS
-from solver.structure.joint import Case, Joint
 
 TWO_LEVELS_SAFETY = 1.5
 """Error over the difference to the state two levels up, 2 to 1.2 where it falls as 1/H to 1/H^3, and to the state with
@@ -36,9 +35,6 @@ STEPS_SAFETY = 2.0
 """Error over the change in two Newton steps towards a longer series. 16 friction oscillators with 3 to 79 harmonics and
 a higher mode near a multiple of the excitation: none is short by more than 2 % (by up to 60 % with one step, or with a
 series of two levels more). Dovetail, 16 and 48 pairs, 3 to 27 harmonics: 1.6 to 2.4 times the error."""
-
-CONTRACTED = 1e-2
-"""Residual after both steps up to which the first of them, which may be 15 times too long, does not count."""
 
 FEWEST_OF_SERIES = 27
 """Fewest harmonics of the longer series of these steps."""
@@ -81,16 +77,16 @@ REFINEMENT_WORK = 1.2e6
 """Most Newton iterations of one refinement, times the unknowns two levels up: 200 of 48 pairs with nine harmonics."""
 
 
-def refine(case: Case, joint: Joint, point: State, run: Run, *, node: bool = False) -> ResolvedState:
+def refine(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedState:
     """Estimate the error of a state at fixed wear depth; refine the state to an error below rtol in automatic settings.
 
     Returns the state with the harmonics and samples that it needs, or the last state found where none is accurate.
 
-    case, joint, point: the state, its joint, and the case with its harmonics and samples.
+    here: the state with its harmonics and samples.
     node: whether the state is a node of a sweep: with at least the first harmonics of automatic settings, as the next
         node may slip, and limited unknowns, as the difference to the reference sweep shows what they miss.
     """
-    return _Search(run, run.budget.iterations, node).refined(ResolvedState(case, joint, point).at_rest(run))
+    return _Search(run, run.budget.iterations, node).refined(here.at_rest(run))
 
 
 @dataclass(frozen=True)
@@ -167,17 +163,19 @@ class _Search:
         return here.difference(finer).times(TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY)
 
     def _harmonics_error(self, here: ResolvedState) -> Estimate:
-        """Estimated error by missing harmonics: the change in two Newton steps towards a much longer series. Unknown
-        where the model has no more harmonics. No solution is needed: with many more harmonics it may not be found from
-        here, and a solution with a few more may agree with the state by chance.
+        """Estimated error by missing harmonics: the change in Newton steps towards a much longer series, the largest
+        change where they do not contract. Unknown where the model has no more harmonics.
+
+        No solution is needed: with many more harmonics it may not be found from here, and a solution with a few more
+        may agree with the state by chance.
         """
-        series = _longer_series(here)
+        series = longer_series(here)
         if series is None:
             return UNKNOWN
-        first, second = here.steps_to(series, self.run)
-        change = here.difference(second).times(STEPS_SAFETY)
-        contracts = second.point.evaluation.scaled_residual() <= CONTRACTED
-        return change if contracts else change.larger(here.difference(first))
+        reached, contracts = here.steps_to(series, self.run)
+        changes = [here.difference(each) for each in reached] or [UNKNOWN]
+        change = changes.pop().times(STEPS_SAFETY)
+        return change if contracts else reduce(Estimate.larger, changes, change)
 
     def _next(self, here: ResolvedState, wanted: Resolution) -> ResolvedState | None:
         """The state with the wanted resolution, or with one more level of harmonics; None where none is found."""
@@ -230,7 +228,7 @@ class _Search:
         return replace(here, estimate=estimate)
 
 
-def _longer_series(here: ResolvedState) -> Resolution | None:
+def longer_series(here: ResolvedState) -> Resolution | None:
     """Resolution with `FEWEST_OF_SERIES` harmonics, or three times as many as now: the longest with at most
     `COMPARED_UNKNOWNS` that the model has; at least two levels up, None where the model does not have these.
     """

@@ -29,6 +29,10 @@ Hz 5 and 7 agree by chance (errors of the worn volume with 5, 7, 9: 1.9, 1.2, 0.
 FAINT_SHARE = 0.1
 """Fraction of rtol: part of the slip work that may be creep."""
 
+MOST_STEPS, CONTRACTED = 5, 1e-2
+"""Most Newton steps towards a longer series, and residual after two or more of them at which they end: two for the
+dovetail, three with the fewest harmonics. The friction oscillators of `STEPS_SAFETY` often do not come so near."""
+
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
 
@@ -92,19 +96,25 @@ class ResolvedState:
         # the mean position of a mass depends a little on the harmonics
         return None if point is None else ResolvedState(case, joint, point).at_rest(run)
 
-    def steps_to(self, resolution: Resolution, run: Run) -> list[ResolvedState]:
-        """The state after each of two Newton steps with other harmonics and samples; no solutions of them."""
+    def steps_to(self, resolution: Resolution, run: Run) -> tuple[list[ResolvedState], bool]:
+        """The states after each of some Newton steps towards other harmonics and samples, and whether they contract.
+
+        The steps end where the scaled residual is small: they come near to a solution, but not to its tolerance.
+        """
         case, own, reached = self.case.at(resolution), run.fresh(), list[ResolvedState]()
         joint = self._joint_of(case)
         balance, predicted = transfer(self.case, joint, self.point.evaluation)
         at = balance.evaluate(predicted)
         # a step that goes too far ends by its values, without a warning of numpy
         with np.errstate(over="ignore", invalid="ignore"):
-            for _ in range(2):
+            while len(reached) < MOST_STEPS:
                 at = balance.evaluate(at.predicted_h + own.steps(balance, at, [-at.residual])[0])
                 reached.append(ResolvedState(case, joint, State(at, balance.history)))
-        run.budget.iterations += 2
-        return reached
+                contracts = at.scaled_residual() <= CONTRACTED
+                if (contracts and len(reached) > 1) or not np.isfinite(at.residual).all():
+                    break
+        run.budget.iterations += len(reached)
+        return reached, contracts
 
     def _joint_of(self, case: Case) -> Joint:
         return case.joint(self.joint.omega, self.joint.excitation_amplitude)

@@ -183,7 +183,7 @@ class FrequencySweep:
                 return _lost(present, first)
             path, reached = first[0], Step(first[1])
         found = self._at_known(path, reached.state) if self.known else None
-        found = found or refine(path.case, path.joint_of(reached.state), reached.state, run)
+        found = found or refine(ResolvedState(path.case, path.joint_of(reached.state), reached.state), run)
         return self._judged(found, present, reached.folds)
 
     def _without_state(self, failure: Failure) -> StartState:

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Self, cast
 
 import numpy as np
 
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import NOTHING, Estimate
+from solver.accuracy.resolved_state import NOTHING, Estimate, ResolvedState, shifted
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
@@ -29,7 +29,7 @@ from solver.modes.modal_model import LinearMode, linear_mode, modal_model
 from solver.newton.run import MOST_ITERATIONS, Bordered, Run
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.settings import DIFFERENCE, SolverSettings
+from solver.settings import DIFFERENCE, Resolution, SolverSettings
 from solver.structure.condensation import whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
@@ -161,14 +161,42 @@ class NonlinearMode(Path[ModeState]):
     def refined(self, state: ModeState, run: Run, *, node: bool = False, part: float = 1.0) -> tuple[Self, ModeState]:
         """Mode and state with the harmonics that the state needs for a part of rtol. node: as in `refine`."""
         settings = replace(self.case.settings, rtol=part * self.case.settings.rtol)
-        case = replace(self.case_of(state.values), settings=settings)
-        other = self.at(refine(case, self.joint_of(state), state, run, node=node).case.resolution)
-        moved = None if other.case is self.case else self.move(state, other, run)
-        return (self, state) if moved is None else (other, moved)
+        chosen = refine(_resolved(replace(self, case=replace(self.case, settings=settings)), state), run, node=node)
+        return self.at(chosen.case.resolution), cast("ModeState", chosen.point)
 
     def describe(self, state: ModeState) -> str:
         """As in Path."""
         return f"at the modal amplitude {state.parameter:.4g} m sqrt(kg)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResolvedMode(ResolvedState):
+    """A point of a mode: with other harmonics at the same amplitude. As a forced state its Jacobian is nearly singular,
+    for the damping of the structure is that of the mode.
+    """
+
+    mode: NonlinearMode
+
+    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedMode | None:  # noqa: ARG002
+        """As in ResolvedState."""
+        other = self.mode.at(resolution)
+        found = self.mode.move(cast("ModeState", self.point), other, run)
+        return None if found is None else _resolved(other, found)
+
+    def steps_to(self, _: Resolution, run: Run) -> tuple[list[ResolvedState], bool]:
+        """As in ResolvedState, by a solution two levels up: without damping the first steps towards more harmonics go
+        too far.
+        """
+        found = self.solve_at(shifted(self.case.resolution, 2), run)
+        return ([], False) if found is None else ([found], True)
+
+    def at_rest(self, _: Run) -> ResolvedMode:
+        """As in ResolvedState: the mode itself says where its masses rest."""
+        return self
+
+
+def _resolved(mode: NonlinearMode, state: ModeState) -> ResolvedMode:
+    return ResolvedMode(case=mode.case_of(state.values), joint=mode.joint_of(state), point=state, mode=mode)
 
 
 @dataclass(frozen=True)

@@ -221,14 +221,15 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
 
 
 def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> FloatArray:
-    """Errors (3,) of frequency, rad/s, damping ratio and drive by harmonics and samples; inf where not known."""
-    for levels in (2, 1, -1):
-        other = shifted(mode.case.resolution, levels)
-        # twice as many samples come last: an event may stay next to the same sample
-        for samples in (3 * other.samples + 2, 4 * other.samples + 2, 2 * other.samples):
-            richer = mode.at(Resolution(other.orders, samples))
-            if mode.model.has_harmonics(other.highest) and (found := mode.move(state, richer, run)) is not None:
-                return ERROR_OVER_CHANGE * np.abs(found.values - state.values)
+    """Errors (3,) of frequency, rad/s, damping ratio and drive by harmonics and samples, by a state two levels up; inf
+    where it is not found.
+    """
+    other = shifted(mode.case.resolution, 2)
+    # another number of samples, as an event may stay next to the same one
+    for samples in (3 * other.samples + 2, 4 * other.samples + 2) if mode.model.has_harmonics(other.highest) else ():
+        found = mode.move(state, mode.at(Resolution(other.orders, samples)), run)
+        if found is not None:
+            return ERROR_OVER_CHANGE * np.abs(found.values - state.values)
     return np.full(3, math.inf)
 
 

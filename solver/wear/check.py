@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, Certificate, certify
 from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine
-from solver.accuracy.resolved_state import lacks_even, left_out
+from solver.accuracy.resolved_state import ResolvedState, lacks_even, left_out
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome, in_digits
@@ -107,7 +107,7 @@ def needs_new_choice(wearing: WearingJoint, state: WearState) -> bool:
 
 def choose_anew(wearing: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    refined = refine(*wearing.case_and_joint(state), state.point, wearing.run)
+    refined = refine(ResolvedState(*wearing.case_and_joint(state), state.point), wearing.run)
     resolution, point = refined.case.resolution, refined.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
     state = replace(state, estimate=refined.estimate, accurate=refined.accurate)

@@ -137,7 +137,7 @@ def slider(settings, resolution=None):
 
 def refined_of(level):
     """What the refinement of a state comes to."""
-    return refine(level.case, level.joint, level.point, Run(level.case.settings.tolerance))
+    return refine(level, Run(level.case.settings.tolerance))
 
 
 def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics():
