@@ -29,9 +29,10 @@ Hz 5 and 7 agree by chance (errors of the worn volume with 5, 7, 9: 1.9, 1.2, 0.
 FAINT_SHARE = 0.1
 """Fraction of rtol: part of the slip work that may be creep."""
 
-MOST_STEPS, CONTRACTED = 5, 1e-2
-"""Most Newton steps towards a longer series, and residual after two or more of them at which they end: two for the
-dovetail, three with the fewest harmonics. The friction oscillators of `STEPS_SAFETY` often do not come so near."""
+CONTRACTED = 1e-2
+"""Residual after two steps towards a longer series up to which the first of them does not count: it may be 15 times too
+long where the second is right (dovetail). The friction oscillators of `STEPS_SAFETY` often do not come so near, as
+their solutions of 27 harmonics have half of the error of those of 9."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
@@ -97,9 +98,8 @@ class ResolvedState:
         return None if point is None else ResolvedState(case, joint, point).at_rest(run)
 
     def steps_to(self, resolution: Resolution, run: Run) -> tuple[list[ResolvedState], bool]:
-        """The states after each of some Newton steps towards other harmonics and samples, and whether they contract.
-
-        The steps end where the scaled residual is small: they come near to a solution, but not to its tolerance.
+        """The states after each of two Newton steps towards other harmonics and samples, and whether these contract: to
+        a small residual, which is no solution.
         """
         case, own, reached = self.case.at(resolution), run.fresh(), list[ResolvedState]()
         joint = self._joint_of(case)
@@ -107,14 +107,11 @@ class ResolvedState:
         at = balance.evaluate(predicted)
         # a step that goes too far ends by its values, without a warning of numpy
         with np.errstate(over="ignore", invalid="ignore"):
-            while len(reached) < MOST_STEPS:
+            for _ in range(2):
                 at = balance.evaluate(at.predicted_h + own.steps(balance, at, [-at.residual])[0])
                 reached.append(ResolvedState(case, joint, State(at, balance.history)))
-                contracts = at.scaled_residual() <= CONTRACTED
-                if (contracts and len(reached) > 1) or not np.isfinite(at.residual).all():
-                    break
-        run.budget.iterations += len(reached)
-        return reached, contracts
+        run.budget.iterations += 2
+        return reached, at.scaled_residual() <= CONTRACTED
 
     def _joint_of(self, case: Case) -> Joint:
         return case.joint(self.joint.omega, self.joint.excitation_amplitude)

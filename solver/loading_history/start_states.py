@@ -20,7 +20,7 @@ import numpy as np
 
 from solver.accuracy.certificate import certify
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import ResolvedState
+from solver.accuracy.resolved_state import UNKNOWN, ResolvedState
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
@@ -243,6 +243,8 @@ class FrequencySweep:
         reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
+        elif present.here is not None and present.reference is not None:
+            estimate, found = UNKNOWN, replace(found, accurate=False)
         known = estimate.response, estimate.wear_rate
         # folds of a ramp are load factors
         fold = (present.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan

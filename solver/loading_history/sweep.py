@@ -122,7 +122,12 @@ class Sweep(Generic[S]):
         of, node = self.path.at(self.reference.resolution), self.reference.states[-1]
         at = replace(node.evaluation, history=of.joint_of(node).law.history_at_rest(node.evaluation, node.history))
         history = carried_history(of.case, path.joint_of(state), at)
-        return path.near(state, state.evaluation.predicted_h, history, run.fresh())
+        own, fresh = state.evaluation.history, run.fresh()
+        if (found := path.near(state, state.evaluation.predicted_h, history, fresh)) is not None:
+            return found
+        # over a state in between where the whole difference is too much at once
+        half = path.near(state, state.evaluation.predicted_h, 0.5 * (own + history), fresh)
+        return None if half is None else path.near(half, half.evaluation.predicted_h, history, fresh)
 
     def begin(self, path: Path[S], state: S) -> bool:
         """Take the first state, which has the harmonics and samples of a path; False where it is rejected.

@@ -30,7 +30,7 @@ BUNDLED = (
     "vibro_impact",
 )
 
-AUTOMATIC_HARMONICS_OF_A_WAVE = 13
+AUTOMATIC_HARMONICS_OF_A_WAVE = 39
 """Harmonics whose nodal diameters a cyclic scene is built with where their number is automatic."""
 
 

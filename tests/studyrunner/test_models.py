@@ -14,6 +14,7 @@ import pytest
 from scipy import io
 
 from solver import SolverSettings, march_wear, with_contact_stiffness
+from solver.outcome import Outcome
 from studies.fe_models.from_files import model as scene_of_files
 from studies.finite_element.solid_mesh import Material
 from studies.finite_element.surfaces import surface_of_nodes
@@ -281,8 +282,9 @@ def test_cylinder_on_a_flat():
     assert wear[np.abs(x) < 0.1e-3].max() < 1e-6 * wear.max()
     assert wear[(np.abs(x) > 0.35e-3) & (np.abs(x) < 0.5e-3)].min() > 0.1 * wear.max()
     assert worn.worn_volume.values[-1] > 0.0
-    assert worn.outcome == 0
-    assert worn.error_estimate < 0.05
+    # the wear at the edges converges as 1/H: 13 % more with 81 harmonics than with 27, the most there are
+    assert worn.outcome == Outcome.INACCURATE
+    assert 0.13 < worn.error_estimate < 0.5
 
 
 # --- the page on a model of one's own ---
