@@ -1,9 +1,9 @@
 """Estimated error of a state by its harmonics and samples, and the choice of both.
 
-A state is solved again with more harmonics and with more samples. Each solve begins from the state. The change, times a
-safety factor for the rest of the series, is the error. Automatic settings take more harmonics or more samples until the
-error is below `rtol`. A state without even harmonics goes on without them; one in which nothing slips or opens keeps
-the first harmonic only, which is then exact. Masses that ratchet are brought to rest first.
+A state is solved again with more samples, and is led by two Newton steps towards a series of many more harmonics. The
+changes, times safety factors, are the errors. Automatic settings take more harmonics or more samples until their sum is
+below `rtol`. A state without even harmonics goes on without them; one in which nothing slips or opens keeps the first
+harmonic only, which is then exact. Masses that ratchet are brought to rest first.
 """
 
 from __future__ import annotations
