@@ -22,7 +22,7 @@ from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure, carried_history
 from solver.loading_history.path import FREE_STEP, Path, S, Step
-from solver.newton.run import Budget, Run
+from solver.newton.run import SHORTEST_STEP, Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
 from solver.settings import Resolution
@@ -122,12 +122,13 @@ class Sweep(Generic[S]):
         of, node = self.path.at(self.reference.resolution), self.reference.states[-1]
         at = replace(node.evaluation, history=of.joint_of(node).law.history_at_rest(node.evaluation, node.history))
         history = carried_history(of.case, path.joint_of(state), at)
-        own, fresh = state.evaluation.history, run.fresh()
-        if (found := path.near(state, state.evaluation.predicted_h, history, fresh)) is not None:
-            return found
-        # over a state in between where the whole difference is too much at once
-        half = path.near(state, state.evaluation.predicted_h, 0.5 * (own + history), fresh)
-        return None if half is None else path.near(half, half.evaluation.predicted_h, history, fresh)
+        own, fresh, here, done, part = state.evaluation.history, run.fresh(), state, 0.0, 1.0
+        # over states in between where the whole difference is too much at once
+        while done < 1.0 and part >= SHORTEST_STEP:
+            there = own + (done + part) * (history - own)
+            found = path.near(here, here.evaluation.predicted_h, there, fresh)
+            here, done, part = (here, done, 0.5 * part) if found is None else (found, done + part, part)
+        return here if done == 1.0 else None
 
     def begin(self, path: Path[S], state: S) -> bool:
         """Take the first state, which has the harmonics and samples of a path; False where it is rejected.

@@ -224,10 +224,13 @@ def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> Fl
     """Errors (3,) of frequency, rad/s, damping ratio and drive by harmonics and samples, by a state two levels up; inf
     where it is not found.
     """
-    other = shifted(mode.case.resolution, 2)
+    above, two_up = (shifted(mode.case.resolution, levels) for levels in (1, 2))
     # another number of samples, as an event may stay next to the same one
-    for samples in (3 * other.samples + 2, 4 * other.samples + 2) if mode.model.has_harmonics(other.highest) else ():
-        found = mode.move(state, mode.at(Resolution(other.orders, samples)), run)
+    for samples in (3 * two_up.samples + 2, 4 * two_up.samples + 2) if mode.model.has_harmonics(two_up.highest) else ():
+        wanted, between = (mode.at(Resolution(each.orders, samples)) for each in (two_up, above))
+        found = mode.move(state, wanted, run)
+        if found is None and (near := mode.move(state, between, run)) is not None:
+            found = between.move(near, wanted, run)
         if found is not None:
             return ERROR_OVER_CHANGE * np.abs(found.values - state.values)
     return np.full(3, math.inf)

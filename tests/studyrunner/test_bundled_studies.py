@@ -27,7 +27,7 @@ SMALL = {
     "extremes": "axes.frequency=212.86 axes.wear_coefficient=[1.1e-14,1.1e-7] axes.step=1000 slow_time.cycles=20"
     " slow_time.outputs=3 solver.harmonics=3 solver.samples=64",
     "mission": "slow_time.missions=1 slow_time.outputs=2 solver.harmonics=3 solver.samples=64",
-    "modes": "axes.modal_amplitude=[2e-4,4e-4]",
+    "modes": "axes.modal_amplitude=[2e-4,5e-4]",
     "scatter": "scatter.samples=2 scene.mesh=1 axes.frequency=212.45 slow_time.cycles=3000 slow_time.outputs=3"
     " solver.harmonics=3 solver.samples=64",
     "sdof_slider": "axes.frequency=160.0 slow_time.cycles=4000 slow_time.outputs=5",

@@ -101,6 +101,8 @@ def test_an_ending_is_not_lost_where_something_else_is_raised(end, error):
 
 LOADING = """
 import os, signal, sys
+# a background job of a shell ignores it
+signal.signal(signal.SIGINT, signal.default_int_handler)
 class Finder:
     @staticmethod
     def find_spec(name, *_):
