@@ -109,6 +109,7 @@ class JacobianSolver:
 
     _factor: Factor | None = None
     _corrections: tuple[tuple[FloatArray, FloatArray], ...] = ()
+    _orders: tuple[int, ...] = ()
 
     def solve(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, residual: float = FORCING
@@ -131,11 +132,12 @@ class JacobianSolver:
 
     def _solve_large(self, tangent: Linearisation, right: FloatArray, residual: float) -> FloatArray:
         """Solution in the rows of the active pairs, with an earlier factorisation while products are few."""
-        if self._factor is not None:
+        # one of other harmonics is of no use, and may have another size
+        if self._factor is not None and self._orders == tangent.joint.basis.orders:
             solution, found = self._iterate(self._factor, tangent, right, residual, REUSE_PRODUCTS)
             if found:
                 return solution
-        self._factor, self._corrections = build_factor(tangent), ()
+        self._factor, self._corrections, self._orders = build_factor(tangent), (), tangent.joint.basis.orders
         # convergence is not required: Newton's method judges by the true residual
         return self._iterate(self._factor, tangent, right, residual, MOST_PRODUCTS)[0]
 
@@ -174,11 +176,12 @@ class JacobianSolver:
         For a large joint, that of an earlier factorisation P times (-1)^k, with k real negative eigenvalues of J P^-1.
         Where these outliers do not converge, this Jacobian is factorised instead.
         """
-        if self._factor is not None and not self._factor.exact:
+        known = self._factor is not None and self._orders == tangent.joint.basis.orders
+        if known and self._factor is not None and not self._factor.exact:
             sign, settled = _sign_by_eigenvalues(self._factor, tangent)
             if settled:
                 return sign
-        self._factor, self._corrections = build_factor(tangent), ()
+        self._factor, self._corrections, self._orders = build_factor(tangent), (), tangent.joint.basis.orders
         if self._factor.exact:
             return self._factor.sign
         return _sign_by_eigenvalues(self._factor, tangent)[0]

@@ -130,6 +130,15 @@ def test_a_kept_factorisation_follows_jacobians_that_change(kinds, seed, wear):
         predicted = predicted + 0.05 * np.abs(predicted).mean() * random.normal(size=predicted.shape)
 
 
+def test_a_kept_factorisation_is_of_no_use_for_other_harmonics():
+    solver = JacobianSolver()
+    for highest, samples in ((5, 48), (3, 24), (5, 48)):
+        tangent = tangent_of(*case(6, highest=highest, samples=samples))
+        for right in np.random.default_rng(6).normal(size=(3, *tangent.at.predicted_h.shape)):
+            assert residual(tangent, solver.solve(tangent, [right])[0], right) < ACCURACY
+        assert solver.determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0]
+
+
 def test_pairs_that_stay_stuck_are_left_out_and_found_again():
     solver, random = JacobianSolver(), np.random.default_rng(11)
     # in steps ever more pairs are pressed so that they neither slip nor open, then they are let go again
