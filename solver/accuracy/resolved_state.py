@@ -31,8 +31,8 @@ FAINT_SHARE = 0.1
 
 CONTRACTED = 1e-2
 """Residual after two steps towards a longer series up to which the first of them does not count: it may be 15 times too
-long where the second is right (dovetail). The friction oscillators of `STEPS_SAFETY` often do not come so near, as
-their solutions of 27 harmonics have half of the error of those of 9."""
+long where the second is right (dovetail). The friction oscillators of `STEPS_SAFETY` often do not come so near; of one
+of them the solution with 27 harmonics is as wrong as that with 9."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
