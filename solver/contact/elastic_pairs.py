@@ -135,10 +135,12 @@ def _slip_work(normal_t: FloatArray, state_t: FloatArray) -> float:
 
 
 @njit(cache=True)
-def march_tangent(pairs: IntArray, period: Period, synthesis: FloatArray, analysis: FloatArray, out: Tangents) -> None:
+def march_tangent(
+    pairs: IntArray, period: Period, starts: FloatArray, synthesis: FloatArray, analysis: FloatArray, out: Tangents
+) -> None:
     """Derivatives of the results of `march_period` of some pairs (n,), with the periodicity, into `out`.
 
-    synthesis (m, N), analysis (N, m): as in `FourierBasis`.
+    starts (n_contact, 2, 3m): of the start. synthesis (m, N), analysis (N, m): as in `FourierBasis`.
     """
     # rows of the transposes are contiguous, as the loops over columns need
     basis_t, analysis_t = np.ascontiguousarray(synthesis.T), np.ascontiguousarray(analysis.T)
@@ -152,8 +154,8 @@ def march_tangent(pairs: IntArray, period: Period, synthesis: FloatArray, analys
             before[:, :] = dstate
             if _advance(dstate, dforce_t[n], predicted_t[:, n], first, second, friction, basis_t[n])[2] != STICK:
                 _add_slip_work(work, n, predicted_t[0], state_t, dstate - before, basis_t)
-        plain = min(period.periods[pair] - 1, PLAIN_PERIODS)
-        dstart = _start_tangent(dstate, predicted_t, friction, period.start[pair], plain, basis_t)
+        plain, start = min(period.periods[pair] - 1, PLAIN_PERIODS), period.start[pair]
+        dstart = _start_tangent(dstate, predicted_t, friction, start, starts[pair], plain, basis_t)
         assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_t)
 
 
@@ -219,17 +221,25 @@ def _add_slip_work(
 
 @njit(cache=True)
 def _start_tangent(
-    dstate: FloatArray, predicted_t: FloatArray, friction: float, start: FloatArray, periods: int, basis_t: FloatArray
+    dstate: FloatArray,
+    predicted_t: FloatArray,
+    friction: float,
+    start: FloatArray,
+    dfirst: FloatArray,
+    periods: int,
+    basis_t: FloatArray,
 ) -> FloatArray:
     """Derivative (2, w - 2) of the start of the last period, from that of its end (2, w). Where a pair has come to
-    stick, the periodicity does not determine it: then through the `periods` before, from the `start` (2,), N.
+    stick, the periodicity does not determine it: then through the `periods` before, from the `start` (2,), N, with its
+    own derivative `dfirst` (2, w - 2).
     """
     width = dstate.shape[1] - 2
     if periods == 0:
-        return np.zeros((2, width))
+        return dfirst
     dstart, found = periodic_start(dstate)
     if not found:
         moved, dforce = np.zeros_like(dstate), np.empty_like(dstate)
+        moved[:, :width] = dfirst
         first, second = start
         for _ in range(periods):
             for n in range(predicted_t.shape[1]):

@@ -20,6 +20,7 @@ import numpy as np
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit, mean_normal_force, mean_normal_tangent
 from solver.contact.elastic_pairs import MOST_PERIODS, Period, march_period, march_tangent, new_period
+from solver.contact.slow_slide import Path, slide_along, slide_tangent
 from solver.contact.sliding_masses import Masses, march_masses, mass_slopes, mass_tangent, step_gains
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
 from solver.settings import ROUND_OFF
@@ -37,6 +38,7 @@ class Marched:
       the steps. force_h (n_contact, 3, m): harmonics of the contact force, N.
     - state_t (n_contact, 2, N+1): tangential state, N of elastic and m of inertial pairs.
     - start (n_contact, 2): state at the start of the first period, N; of inertial pairs the velocity at the start, m/s.
+    - slid (n_contact,): whether the pair slid there on the way from another state (`slow_slide`).
     - status_t (n_contact, N): SEPARATED, STICK or SLIP. periods (n_contact,): number of periods marched.
     - periodicity_error: change of the tangential state over the last period, N.
     - slip_work (n_contact,): integral of normal force times slip distance over a period, J.
@@ -47,6 +49,7 @@ class Marched:
     force_h: FloatArray
     state_t: FloatArray
     start: FloatArray
+    slid: BoolArray
     status_t: IntArray
     periods: IntArray
     periodicity_error: float
@@ -56,7 +59,7 @@ class Marched:
     def stuck(self) -> BoolArray:
         """Pairs (n_contact,) that stick during the whole period and transmit the predicted force."""
         # the start of a period that was marched more than once may depend on the force
-        return np.asarray((self.status_t == STICK).all(axis=1) & (self.periods == 1))
+        return np.asarray((self.status_t == STICK).all(axis=1) & (self.periods == 1) & ~self.slid)
 
 
 @dataclass(frozen=True)
@@ -89,12 +92,21 @@ class ContactLaw:
 
     # --- forces ---
 
-    def march(self, predicted_h: FloatArray, history: FloatArray) -> Marched:
-        """March all pairs through the period under a predicted force (n_contact, 3, m), N."""
+    def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None = None) -> Marched:
+        """March all pairs through the period under a predicted force (n_contact, 3, m), N.
+
+        first (n_contact, 3, N): predicted force, N, from which it has slowly come; None where it was always the same.
+        """
         basis, inertial, penalty = self.basis, self.penalty.inertial, self.penalty
         predicted_t = predicted_h @ basis.synthesis
         predicted_t[inertial, 1:] = (predicted_h[inertial, 1:] * basis.step_mean) @ basis.synthesis
-        period = new_period(predicted_t, self.friction_coefficient, history * penalty.tangential[:, None])
+        start, slid = history * penalty.tangential[:, None], np.zeros(len(history), bool)
+        if first is not None:
+            path = Path(first, predicted_t, self.friction_coefficient, start)
+            start = start.copy()
+            slide_along(np.flatnonzero(~inertial), path, start)
+            slid = (start != path.state).any(axis=1)
+        period = new_period(predicted_t, self.friction_coefficient, start)
         limit = friction_limit(self.friction_coefficient, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
         # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
         march_period(np.flatnonzero(~inertial), period, 0.1 * ROUND_OFF * float(limit.max(initial=0.0)), MOST_PERIODS)
@@ -109,6 +121,7 @@ class ContactLaw:
             force_h=force_h,
             state_t=period.state_t,
             start=period.start,
+            slid=slid,
             status_t=period.status_t,
             periods=period.periods,
             periodicity_error=float(period.change.max(initial=0.0)),
@@ -119,8 +132,11 @@ class ContactLaw:
         """Work that friction dissipates in a period (n_contact,), J. Friction is at its limit during slip."""
         return friction_limit(self.friction_coefficient, at.slip_work)
 
-    def tangent(self, at: Marched) -> tuple[FloatArray, FloatArray]:
-        """Exact derivatives by the harmonics of the predicted force of each pair, with the periodicity.
+    def tangent(
+        self, at: Marched, history: FloatArray | None = None, first: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Exact derivatives by the harmonics of the predicted force of each pair, with the periodicity and, where the
+        history and the `first` force of `march` are given, the way from there.
 
         Returns those of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the slip work
         (n_contact, 3m), m. Entries of displacements that a pair does not have are without meaning.
@@ -131,9 +147,13 @@ class ContactLaw:
         # an open pair transmits nothing
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
         slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
+        starts = np.zeros((n_contact, 2, size))
+        if first is not None and history is not None:
+            path = Path(first, at.predicted_t, self.friction_coefficient, history * self.penalty.tangential[:, None])
+            slide_tangent(np.flatnonzero(at.slid), path, basis.synthesis, starts)
         marched = at.predicted_t, self.friction_coefficient, at.start, at.force_t, at.state_t, at.status_t
         period, out = Period(*marched, at.periods, none, none), (tangent, work_tangent)
-        march_tangent(np.flatnonzero(slides & ~inertial), period, basis.synthesis, basis.analysis, out)
+        march_tangent(np.flatnonzero(slides & ~inertial), period, starts, basis.synthesis, basis.analysis, out)
         if self.rate_dependent:
             series = basis.synthesis, basis.step_mean, basis.analysis
             mass_tangent(np.flatnonzero(slides & inertial), period, self._masses, *series, out)
@@ -181,6 +201,10 @@ class ContactLaw:
         at_end = at.state_t[:, :, -1] / self.state_stiffness[:, None]
         return np.where(self.penalty.inertial[:, None], displacement_h[:, 1:, 0], at_end)
 
+    def started_from(self, at: Marched, history: FloatArray) -> FloatArray:
+        """The history (n_contact, 2), m, with which the periods of a state begin after the way from another history."""
+        return np.where(at.slid[:, None], at.start / self.state_stiffness[:, None], history)
+
     def history_at_rest(self, at: Marched, history: FloatArray) -> FloatArray:
         """The history for a next state in which pairs that slip now may stick: the middle of their slip in closed
         samples, at which a range of slip that shrinks ends. Behind the resonance of the dovetail the motion after a
@@ -192,22 +216,6 @@ class ContactLaw:
         middle = history.copy()
         middle[slips] = 0.5 * (low + high) / self.penalty.tangential[slips, None]
         return middle
-
-    def history_along(
-        self, history: FloatArray, pairs: BoolArray, first: FloatArray, last: FloatArray, parts: FloatArray
-    ) -> FloatArray:
-        """The history after marches at some `parts` of the way between two predicted forces (n_contact, 3, N), N.
-
-        pairs (n_contact,): pairs that are marched; inertial ones keep their history.
-        """
-        moving, stiffness = pairs & ~self.penalty.inertial, self.state_stiffness[:, None]
-        limit = friction_limit(self.friction_coefficient, last[:, 0].max(axis=1))[moving].max(initial=0.0)
-        state = history * stiffness
-        for part in parts:
-            period = new_period(first + part * (last - first), self.friction_coefficient, state)
-            march_period(np.flatnonzero(moving), period, ROUND_OFF * float(limit), MOST_PERIODS)
-            state[moving] = period.state_t[moving, :, -1]
-        return np.where(moving[:, None], state / stiffness, history)
 
     def history_from(self, other: Penalty, history: FloatArray, mean: FloatArray, last: FloatArray) -> FloatArray:
         """The history of a state with another penalty.

@@ -31,7 +31,8 @@ from solver.structure.joint import Joint
 class Balance:
     """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
-    - history (n_contact, 2): tangential history, m (`ContactLaw`).
+    - history (n_contact, 2): tangential history, m (`ContactLaw`). first (n_contact, 3, N): predicted force, N, with
+      this history, from which that of the state has slowly come; None where it was always the same.
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6). Default: 0.
     - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given. wearing: this work.
     """
@@ -41,6 +42,7 @@ class Balance:
     wear_depth: FloatArray = field(default_factory=lambda: np.zeros(1))
     wear_gain: FloatArray | float = 0.0
     wearing: WearingWork = ARCHARDS_WORK
+    first: FloatArray | None = None
 
     def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
         """Predicted force (n_rel, m), N, Eq. (10), of a motion, m, and a contact force, N, both (n_contact, 3, m)."""
@@ -55,7 +57,7 @@ class Balance:
         pairs = joint.to_pairs(predicted_h)
         given = ~joint.contact.has_normal
         pairs[given, 0, 0] = joint.contact.normal_load[given]
-        marched = joint.law.march(pairs, self.history)
+        marched = joint.law.march(pairs, self.history, self.first)
         wear_depth = self.wear_depth + self.wearing.growth(
             self.wear_gain, marched.slip_work, marched.force_h[:, 0, 0], self.wear_depth
         )
@@ -70,14 +72,14 @@ class Balance:
             predicted_h=predicted_h,
             residual=residual,
             scale=_residual_scale(reduced_force, force),
-            history=self.history,
+            history=joint.law.started_from(marched, self.history),
             displacement_h=displacement_h,
             wear_depth=wear_depth,
         )
 
     def linearise(self, at: Evaluation) -> Linearisation:
         """Exact derivative of the residual, Eqs. (16)-(18), including wear and the periodicity of friction."""
-        force_tangent, slip_work_tangent = self.joint.law.tangent(at)
+        force_tangent, slip_work_tangent = self.joint.law.tangent(at, self.history, self.first)
         growth_tangent = self.wearing.growth_tangent(
             self.wear_gain, worn_by(at), slip_work_tangent, force_tangent[:, 0, :]
         )
@@ -90,7 +92,7 @@ class Evaluation(Marched):
     """Residual for a predicted force, with the contact forces and states of the pairs.
 
     - predicted_h, residual (n_rel, 2H+1): N. scale: of the residual in the static and in the other harmonics, N.
-    - history (n_contact, 2): as in `Balance`, m. displacement_h (n_contact, 3, 2H+1): motion, m.
+    - history (n_contact, 2): with which the period begins, m. displacement_h (n_contact, 3, 2H+1): motion, m.
     - wear_depth (n_contact,): m; at the end of the step in an implicit step.
     """
 

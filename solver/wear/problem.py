@@ -27,11 +27,9 @@ from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, ROUND_OFF, Resolution, Scheme, SolverSettings, ToTheEnd
 from solver.structure.joint import Case
 from solver.wear.check import full_check, is_final, report_only, unstable_at_end, vibrates_otherwise, wears_without_end
-from solver.wear.jump import jump
+from solver.wear.jump import free_slide, jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import (
-    PARTS_OF_REFERENCE,
-    PARTS_OF_STEP,
     allowed_error,
     attempt_step,
     explicit_step_limit,
@@ -69,7 +67,6 @@ class WearProblem(WearingJoint):
     guide: of a reference solution; None for a history. A reference solution takes a step that is `too_long`: its
         difference is the warning, and in a last long step nearly all of the force of a joint at rest is moved.
     stable_end: whether the stability of the last state is tested.
-    parts: of a step, in each of which the pairs slide.
     limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`.
     """
 
@@ -87,7 +84,6 @@ class WearProblem(WearingJoint):
     ) -> None:
         super().__init__(case, start, request)
         self.steps, self.guide, self.stable_end = request.steps, guide, stable_end
-        self.parts = PARTS_OF_STEP if guide is None else PARTS_OF_REFERENCE
         if guide is not None:
             self.run = self.run.with_tolerance(case.settings.rough_tolerance)
             coarse = tuple((count, coarser(resolution, case.model)) for count, resolution in guide.resolutions)
@@ -190,10 +186,15 @@ class WearProblem(WearingJoint):
         be unstable at constant frequency.
         """
         scheme = scheme or self.steps.scheme
-        end = attempt_step(self, state, length, scheme, self.parts)
+        end = attempt_step(self, self.held_state(state), length, scheme)
         if end is None or self.follow is not None or (scheme == "adaptive" and not vibrates_otherwise(end)):
             return end
         return end if self.run.is_stable(self.joint_of(end), end.at) else None
+
+    def held_state(self, state: WearState) -> WearState:
+        """The state with a hold of its mean position where the joint slides as a whole: else round-off moves it."""
+        hold = None if state.hold is not None else free_slide(self.joint_of(state), state.at)
+        return state if hold is None else replace(state, hold=hold, held_from=state.cycle)
 
     def ratio(self, state: WearState, end: WearState, length: float) -> float:
         """As in SteppedProblem: an Euler step counts whatever its error, the shortest adaptive step where the vibration
@@ -231,7 +232,7 @@ class WearProblem(WearingJoint):
             length = 2.0**doubling * shortest
             if state.cycle + length > self.limit:
                 break
-            end = attempt_step(self, state, length, "adaptive", self.parts)
+            end = attempt_step(self, self.held_state(state), length, "adaptive")
             if end is not None and vibration_change(state.at, end.at) < SMOOTH_CHANGE:
                 return end
         self.run = before

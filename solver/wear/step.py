@@ -44,28 +44,13 @@ from solver.settings import Scheme
 from solver.structure.joint import Joint
 from solver.wear.wearing_joint import LastStep, WearingJoint, WearState
 
-PARTS_OF_STEP = 32
-"""Parts of a step in each of which the pairs slide at their friction limit. Dovetail, 16 pairs, 212.6 Hz, 1e5 cycles:
-1.795, 1.813, 1.819, 1.819 mm3 with 1, 8, 32, 128 parts (`rtol` 2e-4: 1.823). A tenth of the time of a history."""
-
-PARTS_OF_REFERENCE = 8
-"""The same of a reference solution. With 32 it has nearly the error of its history where pairs slide for long in one
-direction: 16 pairs, 0.769 N, mu 0.336, 4.65e5 cycles: 0.8 % estimated, 2.4 % true, with 16 parts 2.3, with 8 3.6 %. Of
-44 random histories of 16 pairs two had less than half of their true error, none with 8; the median ratio of both is 4.2
-for 3.9."""
-
 LARGEST_MOVED_LOAD = 10.0
 """Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of the
 worn volume is a sufficient warning (27 % with 0.6)."""
 
 
-def attempt_step(
-    wearing: WearingJoint, state: WearState, length: float, scheme: Scheme, parts: int
-) -> WearState | None:
-    """The state after a step of `length` cycles by one balance; None where none is found near its prediction.
-
-    parts: of the step, in each of which the pairs slide.
-    """
+def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme: Scheme) -> WearState | None:
+    """The state after a step of `length` cycles by one balance; None where none is found near its prediction."""
     depth, rate = state.depth, state.rate
     worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
     w, grown = 0.0, np.zeros_like(depth)
@@ -74,8 +59,8 @@ def attempt_step(
         worn_before = depth + w**2 / (1.0 + 2.0 * w) * grown
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
     gain = wearing.gain(implicit_cycles)
-    balance = Balance(wearing.joint_of(state), state.point.history, worn_before, gain, wearing.wearing_work)
-    balance, predicted = first_guess(wearing, state, balance, length, parts)
+    start = wearing.joint_of(state), state.point.history, worn_before, gain, wearing.wearing_work
+    balance, predicted = first_guess(wearing, state, Balance(*start, state.at.predicted_t), length)
     end = wearing.solve(balance, predicted, state)
     if end is None or _surprise(state, end, predicted) > SMOOTH_CHANGE:
         return None
@@ -99,7 +84,7 @@ def _surprise(state: WearState, end: WearState, predicted: FloatArray) -> float:
 
 
 def first_guess(
-    wearing: WearingJoint, state: WearState, balance: Balance, length: float, parts: int
+    wearing: WearingJoint, state: WearState, balance: Balance, length: float
 ) -> tuple[Balance, FloatArray]:
     """The balance of a step with its first frequency and its history, and the first predicted force (n_rel, 2H+1), N:
     extrapolated from the last step, or those of the state where this residual is lower.
@@ -116,10 +101,7 @@ def first_guess(
     end = there.evaluate(ahead)
     if end.scaled_residual() > balance.evaluate(now).scaled_residual():
         return balance, now
-    # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line
-    sticks = (state.at.status_t == STICK).all(axis=1) & (end.status_t == STICK).all(axis=1) & (end.periods == 1)
-    way = state.at.predicted_t, end.predicted_t, np.linspace(0.0, 1.0, parts + 1)[1:-1]
-    return replace(there, history=there.joint.law.history_along(state.point.history, ~sticks, *way)), ahead
+    return there, ahead
 
 
 def allowed_error(share: float, before: float, after: float, count: float, length: float) -> float:
