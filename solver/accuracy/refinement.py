@@ -90,6 +90,16 @@ def refine(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedStat
     return _Search(run, run.budget.iterations, node).refined(here.at_rest(run))
 
 
+def with_level_above(here: ResolvedState, run: Run) -> ResolvedState:
+    """The state with one more level of automatic harmonics, and its estimated error; the same where it is not found."""
+    above, settings = shifted(here.case.resolution, 1), here.case.settings
+    search = _Search(run, run.budget.iterations, False)
+    if settings.harmonics != "auto" or nothing_happens(here.point.evaluation) or not search.allows(here, above):
+        return here
+    found = here.solve_at(above, run)
+    return here if found is None else replace(found, estimate=search.estimate(found), accurate=here.accurate)
+
+
 @dataclass(frozen=True)
 class _Search:
     """The search for a resolution. begun: Newton iterations at its start. run, node: as in `refine`."""
@@ -151,6 +161,10 @@ class _Search:
                 return level, True
         return finest, True
 
+    def estimate(self, here: ResolvedState) -> Estimate:
+        """Estimated error of a state by its samples and harmonics."""
+        return self._samples_error(here) + self._harmonics_error(here)
+
     def _samples_error(self, here: ResolvedState) -> Estimate:
         """Estimated error by missing samples, by a state with 3 N + 2, as an event may stay next to the same one of 2 N
         samples. Many unknowns mean many events: then 2 N suffice. Unknown where this state is not found.
@@ -187,14 +201,14 @@ class _Search:
         for resolution in (wanted, shifted(wanted, 1)) if more else (wanted,):
             # impacts: Newton's method diverges from a start without force in the new harmonics
             for with_tail in (False, True) if more else (False,):
-                if not self._allowed(here, resolution):
+                if not self.allows(here, resolution):
                     return None
                 found = here.solve_at(resolution, self.run, with_tail=with_tail)
                 if found is not None:
                     return found
         return None
 
-    def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
+    def allows(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
         unknowns, most = here.unknowns(resolution), here.most_unknowns(NODE_UNKNOWNS if self.node else MOST_UNKNOWNS)
         if 2 * resolution.highest >= resolution.samples:  # which are given

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, Certificate, certify
-from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine
+from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine, with_level_above
 from solver.accuracy.resolved_state import ResolvedState, lacks_even, left_out
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
@@ -107,7 +107,19 @@ def needs_new_choice(wearing: WearingJoint, state: WearState) -> bool:
 
 def choose_anew(wearing: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    refined = refine(ResolvedState(*wearing.case_and_joint(state), state.point), wearing.run)
+    return _resolved(wearing, state, refine(_resolved_state(wearing, state), wearing.run))
+
+
+def at_level_above(wearing: WearingJoint, state: WearState) -> WearState | Failure:
+    return _resolved(wearing, state, _resolved_state(wearing, state))
+
+
+def _resolved_state(wearing, state):
+    return replace(ResolvedState(*wearing.case_and_joint(state), state.point), estimate=state.estimate, accurate=state.accurate)
+
+
+def _resolved(wearing, state, refined):
+    refined = with_level_above(refined, wearing.run)
     resolution, point = refined.case.resolution, refined.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
     state = replace(state, estimate=refined.estimate, accurate=refined.accurate)

@@ -26,7 +26,7 @@ from solver.outcome import Outcome, in_digits
 from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, ROUND_OFF, Resolution, Scheme, SolverSettings, ToTheEnd
 from solver.structure.joint import Case
-from solver.wear.check import full_check, is_final, report_only, unstable_at_end, vibrates_otherwise, wears_without_end
+from solver.wear.check import at_level_above, full_check, is_final, report_only, unstable_at_end, vibrates_otherwise, wears_without_end
 from solver.wear.jump import free_slide, jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import (
@@ -98,7 +98,7 @@ class WearProblem(WearingJoint):
         """As in SlowProblem: the next state is checked and stored."""
         request, local = self.request, 0.0
         if state is None:
-            end = self.at_followed(self.unworn_state() if self.guide is None else self.unworn_state_of_reference())
+            end = at_level_above(self, self.unworn_state()) if self.guide is None else self.at_followed(self.unworn_state_of_reference())
         elif self._is_complete(state, course):
             return unstable_at_end(self, state) if self.stable_end else None
         elif (failure := self._gives_up(state, course)) is not None:
