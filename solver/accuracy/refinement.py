@@ -53,7 +53,7 @@ far side of the resonance: 5 % with 1.0, 0.5 % with 0.3."""
 MOST_MIXED_HARMONICS = 79
 """Highest harmonic of "auto" with even harmonics: motions with impacts gain nothing from more."""
 
-NODE_UNKNOWNS = 1600
+NODE_UNKNOWNS = 2800
 """Most unknowns of a node of a sweep, those of the dovetail of 48 pairs with five harmonics. Also of a small joint:
 impacts couple all harmonics, and no preconditioner helps."""
 
@@ -90,14 +90,16 @@ def refine(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedStat
     return _Search(run, run.budget.iterations, node).refined(here.at_rest(run))
 
 
-def with_level_above(here: ResolvedState, run: Run) -> ResolvedState:
+def with_level_above(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedState:
     """The state with one more level of automatic harmonics, and its estimated error; the same where it is not found."""
     above, settings = shifted(here.case.resolution, 1), here.case.settings
-    search = _Search(run, run.budget.iterations, False)
+    search = _Search(run, run.budget.iterations, node)
     if settings.harmonics != "auto" or nothing_happens(here.point.evaluation) or not search.allows(here, above):
         return here
     found = here.solve_at(above, run)
-    return here if found is None else replace(found, estimate=search.estimate(found), accurate=here.accurate)
+    if found is None:
+        return here
+    return found if node else replace(found, estimate=search.estimate(found), accurate=here.accurate)
 
 
 @dataclass(frozen=True)

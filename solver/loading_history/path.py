@@ -16,7 +16,7 @@ from typing import ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine
+from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine, with_level_above
 from solver.accuracy.resolved_state import Estimate, ResolvedState, left_out, nothing_happens
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
@@ -277,6 +277,7 @@ class LoadingPath(Path[State]):
     def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:
         """As in Path."""
         found = refine(ResolvedState(self.case, self.joint_of(state), state), run, node=True)
+        found = replace(with_level_above(found, run, node=True), estimate=found.estimate)
         return replace(self, case=found.case), found.point, found.estimate
 
     def describe(self, state: State) -> str:
