@@ -138,7 +138,7 @@ class ContactLaw:
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
         slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
         period, out = self.period(at), (tangent, work_tangent)
-        basis_t, analysis_h = (np.ascontiguousarray(part.T) for part in (basis.synthesis, basis.analysis))
+        basis_t, analysis_h = (part.T.copy() for part in (basis.synthesis, basis.analysis))
         by_column_t = by_columns(basis_t)
         march_tangent(np.flatnonzero(slides & ~inertial), period, by_column_t, analysis_h, out)
         if self.rate_dependent:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.linalg
+from scipy.linalg.blas import dgemv, dnrm2
 
 from solver.model import ComplexArray, FloatArray
 from solver.settings import NEGLIGIBLE
@@ -121,14 +122,14 @@ def _extend(basis: FloatArray, k: int, image: FloatArray) -> FloatArray:
     """Vector k + 1 of an orthonormal basis, in place; returns the components (k + 2,) of the image (n,), the last one 0
     where the new part is round-off.
     """
-    column, there, left = np.zeros(k + 2), basis[: k + 1], image
+    column, there, left = np.zeros(k + 2), basis[: k + 1].T, image
     for _ in range(2):
-        components = there @ left
+        components = dgemv(1.0, there, left, trans=1)
         column[: k + 1] += components
-        left = left - components @ there
-    rest = math.sqrt(left @ left)
+        left = left - dgemv(1.0, there, components)
+    rest = dnrm2(left)
     # the negation also ends at what is not a number
-    if not rest <= NO_DIRECTION * math.sqrt(image @ image):
+    if not rest <= NO_DIRECTION * dnrm2(image):
         column[k + 1] = rest
-        np.divide(left, rest, out=basis[k + 1])
+        basis[k + 1] = left / rest
     return column

@@ -103,7 +103,7 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     blocks = square[np.ix_(components, components)].reshape(pairs.size, 3, components.size)
     tangential = np.flatnonzero(np.arange(components.size) % 3)
     nonzero = own.any(axis=3).reshape(n_samples, -1)
-    row = np.argsort(~nonzero, axis=1, kind="stable")[:, : nonzero.sum(axis=1).max()]
+    row = np.argsort(~nonzero, axis=1, kind="stable")[:, : nonzero.sum(axis=1).max()].copy()
     # single precision suffices for a preconditioner and halves the memory read in a solve
     swept = np.empty((*row.shape, tangential.size), np.float32)
     systems = np.empty((*row.shape, row.shape[1]), np.float32)
