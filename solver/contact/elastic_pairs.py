@@ -104,9 +104,7 @@ def march_period(pairs: IntArray, period: Period, periodicity: float, most_perio
             # a plain period never increases the change; a period from a start of Newton's method may
             if tracked and change < 0.5 * before:
                 before = change
-                missing_1, missing_2, found = solve_periodicity(
-                    monodromy[0, 0], monodromy[0, 1], monodromy[1, 0], monodromy[1, 1], change_1, change_2
-                )
+                missing_1, missing_2, found = solve_periodicity(monodromy, 0, change_1, change_2)
                 if found:
                     first, second = state_t[0, 0] + missing_1, state_t[1, 0] + missing_2
             else:
@@ -115,12 +113,12 @@ def march_period(pairs: IntArray, period: Period, periodicity: float, most_perio
 
 
 @register_jitable
-def solve_periodicity(
-    to_11: float, to_12: float, to_21: float, to_22: float, change_1: float, change_2: float
-) -> tuple[float, float, bool]:
-    """Solution of `(I - monodromy) x = change`, and whether the determinant is large enough for one."""
-    a, b = 1.0 - to_11, -to_12
-    c, d = -to_21, 1.0 - to_22
+def solve_periodicity(of: FloatArray, first: int, change_1: float, change_2: float) -> tuple[float, float, bool]:
+    """Solution of `(I - monodromy) x = change`, and whether the determinant is large enough for one; the monodromy is
+    in two columns of an array, from the `first` on.
+    """
+    a, b = 1.0 - of[0, first], -of[0, first + 1]
+    c, d = -of[1, first], 1.0 - of[1, first + 1]
     determinant = a * d - b * c
     if determinant <= SMALLEST_DETERMINANT:
         return 0.0, 0.0, False
@@ -240,9 +238,7 @@ def periodic_start(dend: FloatArray, dstart: FloatArray) -> bool:
     """
     w, found = dend.shape[1], False
     for column in range(w - 2):
-        dstart[0, column], dstart[1, column], found = solve_periodicity(
-            dend[0, w - 2], dend[0, w - 1], dend[1, w - 2], dend[1, w - 1], dend[0, column], dend[1, column]
-        )
+        dstart[0, column], dstart[1, column], found = solve_periodicity(dend, w - 2, dend[0, column], dend[1, column])
     return found
 
 

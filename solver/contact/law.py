@@ -144,7 +144,7 @@ class ContactLaw:
         if self.rate_dependent:
             pairs, means = np.flatnonzero(slides & inertial), by_columns(basis_t * basis.step_mean)
             slopes, analysis = mass_slopes(pairs, period, self.masses), analysis_h / basis.step_mean[:, None]
-            mass_tangent(pairs, period, *slopes, self.sample_step, by_column_t, means, analysis, out)
+            mass_tangent(pairs, period, slopes, self.sample_step, by_column_t, means, analysis, out)
         closing = np.flatnonzero(contact.has_normal & switching)
         mean_normal_tangent(closing, at.predicted_t, basis_t, analysis_h, tangent)
         tangent[stuck] = np.eye(size)

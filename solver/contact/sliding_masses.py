@@ -33,6 +33,9 @@ PARTS = 8  # parts of a step of a pair with two tangents
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
 
 
+Pair = tuple[float, float]
+
+
 class Masses(NamedTuple):
     """Mass, kg, drag, N s/m, and line (`ContactInterface`) of each pair (n_contact,); time between two samples, s."""
 
@@ -43,7 +46,7 @@ class Masses(NamedTuple):
 
 
 @register_jitable
-def step_gains(mass: float, drag: float, step: float) -> tuple[float, float]:
+def step_gains(mass: float, drag: float, step: float) -> Pair:
     """`m/dt + c/2` and `m/dt - c/2`, so that `gain * velocity after = force - friction + loss * velocity before`."""
     return mass / step + 0.5 * drag, mass / step - 0.5 * drag
 
@@ -114,15 +117,7 @@ def _add_speed(tangent: FloatArray, first: float, second: float, inner: FloatArr
 
 
 @register_jitable
-def step_plane(
-    force_1: float,
-    force_2: float,
-    velocity: FloatArray,
-    limit: float,
-    gains: tuple[float, float],
-    out: FloatArray,
-    by: FloatArray,
-) -> None:
+def step_plane(force: Pair, velocity: FloatArray, limit: float, gains: Pair, out: FloatArray, by: FloatArray) -> None:
     """One step in the plane, in `PARTS` implicit parts; arguments as in `step_line`, velocity (2,).
 
     gains: see `step_gains`. out (7,), by (5, 5): receive results and derivatives.
@@ -136,7 +131,7 @@ def step_plane(
     inner[0, 2] = inner[1, 3] = 1.0
     drive = np.empty((2, 5))
     for _ in range(PARTS):
-        drive_1, drive_2 = force_1 + loss * first, force_2 + loss * second
+        drive_1, drive_2 = force[0] + loss * first, force[1] + loss * second
         for i in range(2):
             for k in range(5):
                 drive[i, k] = loss * inner[i, k]
@@ -168,23 +163,16 @@ def step_plane(
 
 @register_jitable
 def step_mass(
-    force_1: float,
-    force_2: float,
-    velocity: FloatArray,
-    limit: float,
-    gains: tuple[float, float],
-    line: int,
-    out: FloatArray,
-    tangent: FloatArray,
+    force: Pair, velocity: FloatArray, limit: float, gains: Pair, line: int, out: FloatArray, tangent: FloatArray
 ) -> None:
     """One step of a pair, as `step_plane`. line: index of the only tangent; -1 for two."""
     if line < 0:
-        step_plane(force_1, force_2, velocity, limit, gains, out, tangent)
+        step_plane(force, velocity, limit, gains, out, tangent)
         return
     out[:] = 0.0
     tangent[:, :] = 0.0
-    small, force = np.empty((3, 3)), force_1 if line == 0 else force_2
-    out[line], out[2 + line], out[4 + line], out[6] = step_line(force, velocity[line], limit, *gains, small)
+    small = np.empty((3, 3))
+    out[line], out[2 + line], out[4 + line], out[6] = step_line(force[line], velocity[line], limit, *gains, small)
     places = (line, 2 + line, 4)
     for i in range(3):
         for j in range(3):
@@ -215,8 +203,8 @@ def march_masses(pairs: IntArray, period: Period, masses: Masses) -> None:
                 normal = max(predicted_t[0, n], 0.0)
                 rests = velocity[0] == 0.0 and velocity[1] == 0.0
                 limit = friction_limit(period.friction[pair], normal)
-                force_1, force_2 = predicted_t[1, n], predicted_t[2, n]
-                step_mass(force_1, force_2, velocity, limit, gains, masses.line[pair], out, tangent)
+                force = predicted_t[1, n], predicted_t[2, n]
+                step_mass(force, velocity, limit, gains, masses.line[pair], out, tangent)
                 force_t[0, n], force_t[1, n], force_t[2, n] = normal, out[0], out[1]
                 for i in range(2):
                     velocity[i] = out[2 + i]
@@ -246,8 +234,8 @@ def mass_slopes(pairs: IntArray, period: Period, masses: Masses) -> tuple[FloatA
         velocity[0], velocity[1] = period.start[pair, 0], period.start[pair, 1]
         for n in range(n_samples):
             limit = friction_limit(period.friction[pair], max(predicted_t[0, n], 0.0))
-            force_1, force_2 = predicted_t[1, n], predicted_t[2, n]
-            step_mass(force_1, force_2, velocity, limit, gains, masses.line[pair], out, slopes[place, n])
+            force = predicted_t[1, n], predicted_t[2, n]
+            step_mass(force, velocity, limit, gains, masses.line[pair], out, slopes[place, n])
             velocity[0], velocity[1], speed_t[place, n] = out[2], out[3], out[6]
     return slopes, speed_t
 
@@ -256,8 +244,7 @@ def mass_slopes(pairs: IntArray, period: Period, masses: Masses) -> tuple[FloatA
 def mass_tangent(
     pairs: IntArray,
     period: Period,
-    slopes: FloatArray,
-    speed_t: FloatArray,
+    steps: tuple[FloatArray, FloatArray],
     step: float,
     by_column_t: FloatArray,
     by_mean_t: FloatArray,
@@ -266,11 +253,11 @@ def mass_tangent(
 ) -> None:
     """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity, into `out`.
 
-    slopes, speed_t: as `mass_slopes` gives them. step: between samples, s. by_column_t, by_mean_t: synthesis of samples
+    steps: as `mass_slopes` gives them. step: between samples, s. by_column_t, by_mean_t: synthesis of samples
     and of means over steps, as `by_columns` gives them. analysis_h (m, N): harmonics from such means; contiguous.
     """
     m, n_samples = analysis_h.shape
-    w = 3 * m + 2
+    w, (slopes, speed_t) = 3 * m + 2, steps
     dforce_t, after, dstart = np.empty((n_samples, 2 * w)), np.empty((5, w)), np.zeros((2, w))
     for place in range(pairs.size):
         pair = pairs[place]
