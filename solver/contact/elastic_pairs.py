@@ -160,7 +160,8 @@ def march_tangent(
     dforce_t = np.empty((n_samples, 2 * w))
     for pair in pairs:
         predicted_t, friction, start = period.predicted_t[pair], period.friction[pair], period.start[pair]
-        dstate, dstart, work = start_columns(w), np.zeros((2, w)), np.zeros(w)
+        dstate, dstart, work = np.zeros((2, w)), np.zeros((2, w)), np.zeros(w)
+        dstate[0, w - 2] = dstate[1, w - 1] = 1.0
         first, second = period.state_t[pair, 0, 0], period.state_t[pair, 1, 0]
         _pass_tangent(dstate, dforce_t, work, predicted_t, friction, first, second, by_column_t)
         plain = min(period.periods[pair] - 1, PLAIN_PERIODS)
@@ -169,18 +170,9 @@ def march_tangent(
             first, second = start[0], start[1]
             unused_t, unused = np.empty((n_samples, 2 * w)), np.zeros(w)
             for _ in range(plain):
-                first, second = _pass_tangent(
-                    dstart, unused_t, unused, predicted_t, friction, first, second, by_column_t
-                )
+                end = _pass_tangent(dstart, unused_t, unused, predicted_t, friction, first, second, by_column_t)
+                first, second = end
         assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_h)
-
-
-@register_jitable
-def start_columns(w: int) -> FloatArray:
-    """Derivative (2, w) of the state at the start of the period by all columns."""
-    columns = np.zeros((2, w))
-    columns[0, w - 2] = columns[1, w - 1] = 1.0
-    return columns
 
 
 @register_jitable

@@ -98,7 +98,9 @@ class ContactLaw:
         period = new_period(predicted_t, self.friction_coefficient, history * penalty.tangential[:, None])
         limit = friction_limit(self.friction_coefficient, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
         # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
-        march_period(np.flatnonzero(~inertial), period, 0.1 * ROUND_OFF * float(limit.max(initial=0.0)), MOST_PERIODS)
+        if not inertial.all():
+            periodicity = 0.1 * ROUND_OFF * float(limit.max(initial=0.0))
+            march_period(np.flatnonzero(~inertial), period, periodicity, MOST_PERIODS)
         if self.rate_dependent:
             march_masses(np.flatnonzero(inertial), period, self.masses)
         force_h = period.force_t @ basis.analysis
@@ -140,7 +142,8 @@ class ContactLaw:
         period, out = self.period(at), (tangent, work_tangent)
         basis_t, analysis_h = (part.T.copy() for part in (basis.synthesis, basis.analysis))
         by_column_t = by_columns(basis_t)
-        march_tangent(np.flatnonzero(slides & ~inertial), period, by_column_t, analysis_h, out)
+        if not inertial.all():
+            march_tangent(np.flatnonzero(slides & ~inertial), period, by_column_t, analysis_h, out)
         if self.rate_dependent:
             pairs, means = np.flatnonzero(slides & inertial), by_columns(basis_t * basis.step_mean)
             slopes, analysis = mass_slopes(pairs, period, self.masses), analysis_h / basis.step_mean[:, None]

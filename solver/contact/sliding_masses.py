@@ -26,7 +26,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_force, friction_limit, slip_tangent
-from solver.contact.elastic_pairs import MOST_PERIODS, Period, Tangents, assemble, periodic_start, start_columns
+from solver.contact.elastic_pairs import MOST_PERIODS, Period, Tangents, assemble, periodic_start
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # parts of a step of a pair with two tangents
@@ -261,7 +261,8 @@ def mass_tangent(
     dforce_t, after, dstart = np.empty((n_samples, 2 * w)), np.empty((5, w)), np.zeros((2, w))
     for place in range(pairs.size):
         pair = pairs[place]
-        work, velocity = np.zeros(w), start_columns(w)
+        work, velocity = np.zeros(w), np.zeros((2, w))
+        velocity[0, w - 2] = velocity[1, w - 1] = 1.0
         for n in range(n_samples):
             normal = max(period.predicted_t[pair, 0, n], 0.0)
             by_limit = period.friction[pair] if normal > 0.0 else 0.0
