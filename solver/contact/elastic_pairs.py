@@ -191,8 +191,7 @@ def _pass_tangent(
     dstate (2, w): derivative of the state, from start to end, in place. dforce_t (N, 2w): receives those of both forces
     of friction; that of the slip work is added to work (w,).
     """
-    n_samples, w = predicted_t.shape[1], work.size
-    m = (w - 2) // 3
+    n_samples, w, m = predicted_t.shape[1], work.size, (work.size - 2) // 3
     for n in range(n_samples):
         pressed, pull_1, pull_2 = predicted_t[0, n], predicted_t[1, n], predicted_t[2, n]
         normal, _, _, next_1, next_2, status = contact_sample(pressed, pull_1, pull_2, friction, first, second)

@@ -203,8 +203,9 @@ def march_masses(pairs: IntArray, period: Period, masses: Masses) -> None:
                 normal = max(predicted_t[0, n], 0.0)
                 rests = velocity[0] == 0.0 and velocity[1] == 0.0
                 limit = friction_limit(period.friction[pair], normal)
-                force = predicted_t[1, n], predicted_t[2, n]
-                step_mass(force, velocity, limit, gains, masses.line[pair], out, tangent)
+                step_mass(
+                    (predicted_t[1, n], predicted_t[2, n]), velocity, limit, gains, masses.line[pair], out, tangent
+                )
                 force_t[0, n], force_t[1, n], force_t[2, n] = normal, out[0], out[1]
                 for i in range(2):
                     velocity[i] = out[2 + i]
@@ -228,8 +229,7 @@ def mass_slopes(pairs: IntArray, period: Period, masses: Masses) -> tuple[FloatA
     """Derivatives (n, N, 5, 5) of the steps of some masses (n,) through a period, and mean speeds (n, N), m/s."""
     n_samples, out, velocity = period.status_t.shape[1], np.empty(7), np.empty(2)
     slopes, speed_t = np.empty((pairs.size, n_samples, 5, 5)), np.empty((pairs.size, n_samples))
-    for place in range(pairs.size):
-        pair = pairs[place]
+    for place, pair in enumerate(pairs):
         gains, predicted_t = step_gains(masses.mass[pair], masses.drag[pair], masses.step), period.predicted_t[pair]
         velocity[0], velocity[1] = period.start[pair, 0], period.start[pair, 1]
         for n in range(n_samples):
@@ -259,8 +259,7 @@ def mass_tangent(
     m, n_samples = analysis_h.shape
     w, (slopes, speed_t) = 3 * m + 2, steps
     dforce_t, after, dstart = np.empty((n_samples, 2 * w)), np.empty((5, w)), np.zeros((2, w))
-    for place in range(pairs.size):
-        pair = pairs[place]
+    for place, pair in enumerate(pairs):
         work, velocity = np.zeros(w), np.zeros((2, w))
         velocity[0, w - 2] = velocity[1, w - 1] = 1.0
         for n in range(n_samples):
