@@ -40,7 +40,7 @@ def friction_limit(friction: Force, normal: Force) -> Force:
     return friction * normal
 
 
-@njit(cache=True)
+@register_jitable
 def friction_force(trial_1: float, trial_2: float, limit: float) -> tuple[float, float, bool]:
     """Projection of a trial force on the friction disc, N, and whether the pair sticks, Eqs. (13)-(15)."""
     size = np.sqrt(trial_1 * trial_1 + trial_2 * trial_2)
@@ -51,7 +51,7 @@ def friction_force(trial_1: float, trial_2: float, limit: float) -> tuple[float,
     return limit * trial_1 / size, limit * trial_2 / size, False
 
 
-@njit(cache=True)
+@register_jitable
 def slip_tangent(trial_1: float, trial_2: float, limit: float) -> tuple[float, float, float, float, float, float]:
     """Derivative of `friction_force` of a slipping pair, Eq. (15); all zero where the trial force is zero.
 
@@ -65,7 +65,7 @@ def slip_tangent(trial_1: float, trial_2: float, limit: float) -> tuple[float, f
     return n_1, n_2, ratio, ratio * (1.0 - n_1 * n_1), -ratio * n_1 * n_2, ratio * (1.0 - n_2 * n_2)
 
 
-@njit(cache=True)
+@register_jitable
 def contact_sample(
     normal: float, tangent_1: float, tangent_2: float, friction: float, state_1: float, state_2: float
 ) -> tuple[float, float, float, float, float, int]:
@@ -80,7 +80,7 @@ def contact_sample(
     return normal, force_1, force_2, tangent_1 - force_1, tangent_2 - force_2, SLIP
 
 
-@njit(cache=True)
+@register_jitable
 def contact_tangent(
     status: int, normal: float, trial_1: float, trial_2: float, friction: float
 ) -> tuple[float, float, float, float, float]:
@@ -98,7 +98,7 @@ def contact_tangent(
     return friction * n_1, friction * n_2, across_11, across_12, across_22
 
 
-@njit(cache=True)
+@register_jitable
 def advance_monodromy(
     monodromy: FloatArray, status: int, normal: float, trial_1: float, trial_2: float, friction: float
 ) -> None:
@@ -118,7 +118,7 @@ def advance_monodromy(
         monodromy[1, column] = n_1 * across
 
 
-@njit(cache=True)
+@register_jitable
 def closed_fraction(force: float, neighbour: float) -> tuple[float, float, float]:
     """Mean normal force over the half step towards a neighbour, and its derivatives by both predicted normal forces.
 
@@ -149,27 +149,27 @@ def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def mean_normal_tangent(
-    pairs: IntArray, predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, out: FloatArray
+    pairs: IntArray, predicted_t: FloatArray, basis_t: FloatArray, analysis_h: FloatArray, out: FloatArray
 ) -> None:
     """Derivative of the harmonics of `mean_normal_force` of some pairs (n,) by those of the predicted normal force,
-    into the first m rows and columns of out (n_contact, 3m, 3m).
+    into the first m rows and columns of out (n_contact, 3m, 3m). basis_t (N, m), analysis_h (m, N): contiguous.
     """
-    m, n_samples = synthesis.shape
-    basis_t, analysis_t = np.ascontiguousarray(synthesis.T), np.ascontiguousarray(analysis.T)
-    rows = np.empty((n_samples, m))
+    n_samples, m = basis_t.shape
+    rows, part = np.empty((n_samples, m)), np.empty((m, m))
     for pair in pairs:
         for n in range(n_samples):
-            force = predicted_t[pair, 0, n]
-            rows[n] = 0.0
-            if force <= 0.0:
-                continue
-            ahead = (n + 1) % n_samples
-            _, own_before, other_before = closed_fraction(force, predicted_t[pair, 0, n - 1])
-            _, own_after, other_after = closed_fraction(force, predicted_t[pair, 0, ahead])
+            force, ahead = predicted_t[pair, 0, n], (n + 1) % n_samples
+            own_before = other_before = own_after = other_after = 0.0
+            if force > 0.0:
+                _, own_before, other_before = closed_fraction(force, predicted_t[pair, 0, n - 1])
+                _, own_after, other_after = closed_fraction(force, predicted_t[pair, 0, ahead])
             for j in range(m):
                 rows[n, j] = 0.5 * (
                     (own_before + own_after) * basis_t[n, j]
                     + other_before * basis_t[n - 1, j]
                     + other_after * basis_t[ahead, j]
                 )
-        out[pair, :m, :m] = np.dot(analysis_t, rows)
+        np.dot(analysis_h, rows, part)
+        for i in range(m):
+            for j in range(m):
+                out[pair, i, j] = part[i, j]

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from solver.contact.coulomb import STICK, advance_monodromy, contact_sample, contact_tangent
 from solver.model import FloatArray, IntArray
@@ -103,7 +104,7 @@ def march_period(pairs: IntArray, period: Period, periodicity: float, most_perio
             # a plain period never increases the change; a period from a start of Newton's method may
             if tracked and change < 0.5 * before:
                 before = change
-                missing_1, missing_2, found = solve_periodicity(monodromy, change_1, change_2)
+                missing_1, missing_2, found = solve_periodicity(monodromy, 0, change_1, change_2)
                 if found:
                     first, second = state_t[0, 0] + missing_1, state_t[1, 0] + missing_2
             else:
@@ -111,18 +112,20 @@ def march_period(pairs: IntArray, period: Period, periodicity: float, most_perio
         period.slip_work[pair] = _slip_work(force_t[0], state_t)
 
 
-@njit(cache=True)
-def solve_periodicity(monodromy: FloatArray, change_1: float, change_2: float) -> tuple[float, float, bool]:
-    """Solution of `(I - monodromy) x = change`, and whether the determinant is large enough for one."""
-    a, b = 1.0 - monodromy[0, 0], -monodromy[0, 1]
-    c, d = -monodromy[1, 0], 1.0 - monodromy[1, 1]
+@register_jitable
+def solve_periodicity(of: FloatArray, first: int, change_1: float, change_2: float) -> tuple[float, float, bool]:
+    """Solution of `(I - monodromy) x = change`, and whether the determinant is large enough for one; the monodromy is
+    in two columns of an array, from the `first` on.
+    """
+    a, b = 1.0 - of[0, first], -of[0, first + 1]
+    c, d = -of[1, first], 1.0 - of[1, first + 1]
     determinant = a * d - b * c
     if determinant <= SMALLEST_DETERMINANT:
         return 0.0, 0.0, False
     return (d * change_1 - b * change_2) / determinant, (a * change_2 - c * change_1) / determinant, True
 
 
-@njit(cache=True)
+@register_jitable
 def _slip_work(normal_t: FloatArray, state_t: FloatArray) -> float:
     """Slip work of a period times the tangential penalty, N * N, by the trapezoidal rule, Eqs. (7), (21) with the
     sliding velocity (the print has the displacement).
@@ -134,152 +137,126 @@ def _slip_work(normal_t: FloatArray, state_t: FloatArray) -> float:
     return work
 
 
+def by_columns(series_t: FloatArray) -> FloatArray:
+    """Rows (N, 5m + 2) of a synthesis (N, m) between zeros: from (2 - i) m on, one has the derivative of component i of
+    the predicted force by all 3m + 2 columns.
+    """
+    n_samples, m = series_t.shape
+    rows = np.zeros((n_samples, 5 * m + 2))
+    rows[:, 2 * m : 3 * m] = series_t
+    return rows
+
+
 @njit(cache=True)
 def march_tangent(
-    pairs: IntArray, period: Period, starts: FloatArray, synthesis: FloatArray, analysis: FloatArray, out: Tangents
+    pairs: IntArray, period: Period, starts: FloatArray, by_column_t: FloatArray, analysis_h: FloatArray, out: Tangents
 ) -> None:
     """Derivatives of the results of `march_period` of some pairs (n,), with the periodicity, into `out`.
 
-    starts (n_contact, 2, 3m): of the start. synthesis (m, N), analysis (N, m): as in `FourierBasis`.
+    starts (n_contact, 2, 3m): of the start. by_column_t: the synthesis as `by_columns` gives it. analysis_h (m, N): contiguous transpose of the analysis.
     """
-    # rows of the transposes are contiguous, as the loops over columns need
-    basis_t, analysis_t = np.ascontiguousarray(synthesis.T), np.ascontiguousarray(analysis.T)
-    n_samples, m = basis_t.shape
+    m, n_samples = analysis_h.shape
+    w = 3 * m + 2
+    dforce_t = np.empty((n_samples, 2 * w))
     for pair in pairs:
-        friction, predicted_t, state_t = period.friction[pair], period.predicted_t[pair], period.state_t[pair]
-        dforce_t, work = np.empty((n_samples, 2, 3 * m + 2)), np.zeros(3 * m + 2)
-        dstate, before = start_columns(3 * m), np.empty((2, 3 * m + 2))
-        for n in range(n_samples):
-            first, second = state_t[0, n], state_t[1, n]
-            before[:, :] = dstate
-            if _advance(dstate, dforce_t[n], predicted_t[:, n], first, second, friction, basis_t[n])[2] != STICK:
-                _add_slip_work(work, n, predicted_t[0], state_t, dstate - before, basis_t)
-        plain, start = min(period.periods[pair] - 1, PLAIN_PERIODS), period.start[pair]
-        dstart = _start_tangent(dstate, predicted_t, friction, start, starts[pair], plain, basis_t)
-        assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_t)
+        predicted_t, friction, start = period.predicted_t[pair], period.friction[pair], period.start[pair]
+        dstate, dstart, work = np.zeros((2, w)), np.zeros((2, w)), np.zeros(w)
+        dstate[0, w - 2] = dstate[1, w - 1] = 1.0
+        first, second = period.state_t[pair, 0, 0], period.state_t[pair, 1, 0]
+        _pass_tangent(dstate, dforce_t, work, predicted_t, friction, first, second, by_column_t)
+        plain = min(period.periods[pair] - 1, PLAIN_PERIODS)
+        if plain == 0 or not periodic_start(dstate, dstart):
+            # a pair that has come to stick: the periodicity does not determine its start, the periods before do
+            for i in range(2):
+                for j in range(w - 2):
+                    dstart[i, j] = starts[pair, i, j]
+            first, second = start[0], start[1]
+            unused_t, unused = np.empty((n_samples, 2 * w)), np.zeros(w)
+            for _ in range(plain):
+                end = _pass_tangent(dstart, unused_t, unused, predicted_t, friction, first, second, by_column_t)
+                first, second = end
+        assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_h)
 
 
-@njit(cache=True)
-def start_columns(width: int) -> FloatArray:
-    """Derivative (2, width + 2) of the state at the start of the period by all columns."""
-    columns = np.zeros((2, width + 2))
-    columns[0, width] = columns[1, width + 1] = 1.0
-    return columns
-
-
-@njit(cache=True)
-def _advance(
+@register_jitable
+def _pass_tangent(
     dstate: FloatArray,
-    dforce: FloatArray,
-    predicted: FloatArray,
-    first: float,
-    second: float,
-    friction: float,
-    basis: FloatArray,
-) -> tuple[float, float, int]:
-    """State and status at a sample, Eqs. (13)-(15); derivatives `dforce` (2, w) of friction and `dstate` (2, w), in
-    place. dstate, first, second: at the sample before. basis (m,): derivative of a time sample by its harmonics.
-    """
-    pressed, pull_1, pull_2 = predicted[0], predicted[1], predicted[2]
-    normal, _, _, next_1, next_2, status = contact_sample(pressed, pull_1, pull_2, friction, first, second)
-    by = contact_tangent(status, normal, pull_1 - first, pull_2 - second, friction)
-    by_normal_1, by_normal_2, across_11, across_12, across_22 = by
-    m = basis.size
-    for column in range(dstate.shape[1]):
-        dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
-        dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
-    for component, by_1, by_2 in ((0, by_normal_1, by_normal_2), (1, across_11, across_12), (2, across_12, across_22)):
-        for k in range(m):
-            dforce[0, component * m + k] += by_1 * basis[k]
-            dforce[1, component * m + k] += by_2 * basis[k]
-    if status != STICK:
-        dstate[:, :] = -dforce
-        for k in range(m):
-            dstate[0, m + k] += basis[k]
-            dstate[1, 2 * m + k] += basis[k]
-    return next_1, next_2, status
-
-
-@njit(cache=True)
-def _add_slip_work(
-    work: FloatArray, n: int, normal_t: FloatArray, state_t: FloatArray, moved: FloatArray, basis_t: FloatArray
-) -> None:
-    """Add the derivative of the slip work of sample n to `work` (w,); moved (2, w): that of the slip of the sample."""
-    step_1 = state_t[0, n + 1] - state_t[0, n]
-    step_2 = state_t[1, n + 1] - state_t[1, n]
-    slip = np.hypot(step_1, step_2)
-    if slip == 0.0:
-        return
-    mean = 0.5 * (max(normal_t[n - 1], 0.0) + max(normal_t[n], 0.0))
-    for column in range(work.size):
-        work[column] += mean * (step_1 / slip * moved[0, column] + step_2 / slip * moved[1, column])
-    for end in (n - 1, n):
-        if normal_t[end] > 0.0:
-            for k in range(basis_t.shape[1]):
-                work[k] += 0.5 * slip * basis_t[end, k]
-
-
-@njit(cache=True)
-def _start_tangent(
-    dstate: FloatArray,
+    dforce_t: FloatArray,
+    work: FloatArray,
     predicted_t: FloatArray,
     friction: float,
-    start: FloatArray,
-    dfirst: FloatArray,
-    periods: int,
-    basis_t: FloatArray,
-) -> FloatArray:
-    """Derivative (2, w - 2) of the start of the last period, from that of its end (2, w). Where a pair has come to
-    stick, the periodicity does not determine it: then through the `periods` before, from the `start` (2,), N, with its
-    own derivative `dfirst` (2, w - 2).
-    """
-    width = dstate.shape[1] - 2
-    if periods == 0:
-        return dfirst
-    dstart, found = periodic_start(dstate)
-    if not found:
-        moved, dforce = np.zeros_like(dstate), np.empty_like(dstate)
-        moved[:, :width] = dfirst
-        first, second = start
-        for _ in range(periods):
-            for n in range(predicted_t.shape[1]):
-                first, second, _ = _advance(moved, dforce, predicted_t[:, n], first, second, friction, basis_t[n])
-        dstart[:, :] = moved[:, :width]
-    return dstart
+    first: float,
+    second: float,
+    by_column_t: FloatArray,
+) -> tuple[float, float]:
+    """A period from the state `first`, `second`, Eqs. (13)-(15); returns the state at its end.
 
-
-@njit(cache=True)
-def periodic_start(dend: FloatArray) -> tuple[FloatArray, bool]:
-    """Derivative (2, w - 2) of the start of a period that repeats, from that of its end (2, w), and whether there is
-    one.
+    dstate (2, w): derivative of the state, from start to end, in place. dforce_t (N, 2w): receives those of both forces
+    of friction; that of the slip work is added to work (w,).
     """
-    width, found = dend.shape[1] - 2, False
-    dstart = np.zeros((2, width))
-    for column in range(width):
-        dstart[0, column], dstart[1, column], found = solve_periodicity(
-            dend[:, width:], dend[0, column], dend[1, column]
+    n_samples, w, m = predicted_t.shape[1], work.size, (work.size - 2) // 3
+    for n in range(n_samples):
+        pressed, pull_1, pull_2 = predicted_t[0, n], predicted_t[1, n], predicted_t[2, n]
+        normal, _, _, next_1, next_2, status = contact_sample(pressed, pull_1, pull_2, friction, first, second)
+        by_normal_1, by_normal_2, across_11, across_12, across_22 = contact_tangent(
+            status, normal, pull_1 - first, pull_2 - second, friction
         )
-    return dstart, found
+        dforce, by_0, by_1, by_2 = dforce_t[n], by_column_t[n, 2 * m :], by_column_t[n, m:], by_column_t[n]
+        for j in range(w):
+            from_1 = -across_11 * dstate[0, j] - across_12 * dstate[1, j]
+            from_2 = -across_12 * dstate[0, j] - across_22 * dstate[1, j]
+            dforce[j] = from_1 + by_normal_1 * by_0[j] + across_11 * by_1[j] + across_12 * by_2[j]
+            dforce[w + j] = from_2 + by_normal_2 * by_0[j] + across_12 * by_1[j] + across_22 * by_2[j]
+        if status != STICK:
+            step_1, step_2 = next_1 - first, next_2 - second
+            slip = np.hypot(step_1, step_2)
+            mean, along_1, along_2 = 0.5 * (max(predicted_t[0, n - 1], 0.0) + max(pressed, 0.0)), 0.0, 0.0
+            if slip > 0.0:
+                along_1, along_2 = step_1 / slip, step_2 / slip
+            for j in range(w):
+                next_by_1, next_by_2 = by_1[j] - dforce[j], by_2[j] - dforce[w + j]
+                work[j] += mean * (along_1 * (next_by_1 - dstate[0, j]) + along_2 * (next_by_2 - dstate[1, j]))
+                dstate[0, j], dstate[1, j] = next_by_1, next_by_2
+            for end in (n - 1, n):
+                if predicted_t[0, end] > 0.0:
+                    for k in range(m):
+                        work[k] += 0.5 * slip * by_column_t[end, 2 * m + k]
+        first, second = next_1, next_2
+    return first, second
 
 
-@njit(cache=True)
+@register_jitable
+def periodic_start(dend: FloatArray, dstart: FloatArray) -> bool:
+    """Derivative (2, w) of the start of a period that repeats into `dstart`, from that of its end (2, w); whether there
+    is one.
+    """
+    w, found = dend.shape[1], False
+    for column in range(w - 2):
+        dstart[0, column], dstart[1, column], found = solve_periodicity(dend, w - 2, dend[0, column], dend[1, column])
+    return found
+
+
+@register_jitable
 def assemble(
     tangent: FloatArray,
     work_tangent: FloatArray,
     dforce_t: FloatArray,
     work: FloatArray,
     dstart: FloatArray,
-    analysis_t: FloatArray,
+    analysis_h: FloatArray,
 ) -> None:
     """Derivatives of a pair: of the harmonics of friction into `tangent` (3m, 3m), of the slip work into (3m,).
 
-    dforce_t (N, 2, w), work (w,): derivatives, in the last two columns by the start of the period. dstart (2, w - 2):
-    of the start.
+    dforce_t (N, 2w), work (w,): derivatives, in the last two columns by the start of the period. dstart (2, w): of the
+    start.
     """
-    (m, n_samples), width = analysis_t.shape, dstart.shape[1]
-    work_tangent[:] = work[:width] + work[width] * dstart[0] + work[width + 1] * dstart[1]
-    dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, -1)
+    m, w = analysis_h.shape[0], work.size
+    dforce_h = np.empty((m, 2 * w))
+    np.dot(analysis_h, dforce_t, dforce_h)
+    for k in range(w - 2):
+        work_tangent[k] = work[k] + work[w - 2] * dstart[0, k] + work[w - 1] * dstart[1, k]
     for row in range(m):
         for along in range(2):
-            own = dforce_h[row, along]
-            tangent[(1 + along) * m + row] = own[:width] + own[width] * dstart[0] + own[width + 1] * dstart[1]
+            own = dforce_h[row, along * w : (along + 1) * w]
+            for k in range(w - 2):
+                tangent[(1 + along) * m + row, k] = own[k] + own[w - 2] * dstart[0, k] + own[w - 1] * dstart[1, k]

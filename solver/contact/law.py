@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit, mean_normal_force, mean_normal_tangent
-from solver.contact.elastic_pairs import MOST_PERIODS, Period, march_period, march_tangent, new_period
-from solver.contact.slow_slide import Path, slide_along, slide_tangent
+from solver.contact.elastic_pairs import MOST_PERIODS, Period, by_columns, march_period, march_tangent, new_period
 from solver.contact.sliding_masses import Masses, march_masses, mass_slopes, mass_tangent, step_gains
+from solver.contact.slow_slide import Path, slide_along, slide_tangent
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
@@ -87,7 +87,8 @@ class ContactLaw:
         return bool(self.penalty.inertial.any())
 
     @property
-    def _masses(self) -> Masses:
+    def masses(self) -> Masses:
+        """The pairs as masses; elastic ones without meaning."""
         return Masses(self.penalty.mass, self.penalty.drag, self.contact.line, self.sample_step)
 
     # --- forces ---
@@ -109,9 +110,11 @@ class ContactLaw:
         period = new_period(predicted_t, self.friction_coefficient, start)
         limit = friction_limit(self.friction_coefficient, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
         # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
-        march_period(np.flatnonzero(~inertial), period, 0.1 * ROUND_OFF * float(limit.max(initial=0.0)), MOST_PERIODS)
+        if not inertial.all():
+            periodicity = 0.1 * ROUND_OFF * float(limit.max(initial=0.0))
+            march_period(np.flatnonzero(~inertial), period, periodicity, MOST_PERIODS)
         if self.rate_dependent:
-            march_masses(np.flatnonzero(inertial), period, self._masses)
+            march_masses(np.flatnonzero(inertial), period, self.masses)
         force_h = period.force_t @ basis.analysis
         force_h[inertial, 1:] /= basis.step_mean
         force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
@@ -128,6 +131,11 @@ class ContactLaw:
             slip_work=period.slip_work / self.state_stiffness,
         )
 
+    def period(self, at: Marched) -> Period:
+        """The period that a march has left, for derivatives."""
+        marched = at.predicted_t, self.friction_coefficient, at.start, at.force_t, at.state_t, at.status_t
+        return Period(*marched, at.periods, at.slip_work, at.slip_work)
+
     def friction_work(self, at: Marched) -> FloatArray:
         """Work that friction dissipates in a period (n_contact,), J. Friction is at its limit during slip."""
         return friction_limit(self.friction_coefficient, at.slip_work)
@@ -142,7 +150,7 @@ class ContactLaw:
         (n_contact, 3m), m. Entries of displacements that a pair does not have are without meaning.
         """
         contact, basis, inertial = self.contact, self.basis, self.penalty.inertial
-        n_contact, size, stuck, none = contact.n_contact, 3 * len(basis.synthesis), at.stuck, np.zeros(len(at.periods))
+        n_contact, size, stuck = contact.n_contact, 3 * len(basis.synthesis), at.stuck
         tangent, work_tangent = np.zeros((n_contact, size, size)), np.zeros((n_contact, size))
         # an open pair transmits nothing
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
@@ -151,14 +159,17 @@ class ContactLaw:
         if first is not None and history is not None:
             path = Path(first, at.predicted_t, self.friction_coefficient, history * self.penalty.tangential[:, None])
             slide_tangent(np.flatnonzero(at.slid), path, basis.synthesis, starts)
-        marched = at.predicted_t, self.friction_coefficient, at.start, at.force_t, at.state_t, at.status_t
-        period, out = Period(*marched, at.periods, none, none), (tangent, work_tangent)
-        march_tangent(np.flatnonzero(slides & ~inertial), period, starts, basis.synthesis, basis.analysis, out)
+        period, out = self.period(at), (tangent, work_tangent)
+        basis_t, analysis_h = (part.T.copy() for part in (basis.synthesis, basis.analysis))
+        by_column_t = by_columns(basis_t)
+        if not inertial.all():
+            march_tangent(np.flatnonzero(slides & ~inertial), period, starts, by_column_t, analysis_h, out)
         if self.rate_dependent:
-            series = basis.synthesis, basis.step_mean, basis.analysis
-            mass_tangent(np.flatnonzero(slides & inertial), period, self._masses, *series, out)
+            pairs, means = np.flatnonzero(slides & inertial), by_columns(basis_t * basis.step_mean)
+            slopes, analysis = mass_slopes(pairs, period, self.masses), analysis_h / basis.step_mean[:, None]
+            mass_tangent(pairs, period, slopes, self.sample_step, by_column_t, means, analysis, out)
         closing = np.flatnonzero(contact.has_normal & switching)
-        mean_normal_tangent(closing, at.predicted_t, basis.synthesis, basis.analysis, tangent)
+        mean_normal_tangent(closing, at.predicted_t, basis_t, analysis_h, tangent)
         tangent[stuck] = np.eye(size)
         return tangent, work_tangent / self.state_stiffness[:, None]
 
@@ -335,7 +346,7 @@ def _take_mass_law(found: SampledLaw, place: int, law: ContactLaw, at: Marched, 
     there = np.array([0, 1]) if line < 0 else np.array([line])
     rows, friction = 1 + there, float(law.friction_coefficient[pair])
     limit = friction_limit(friction, np.maximum(at.predicted_t[pair, 0], 0.0))
-    slopes, _ = mass_slopes(at.predicted_t[pair, 1:], limit, at.start[pair], (gain, loss), line)
+    slopes = mass_slopes(np.array([pair]), law.period(at), law.masses)[0][0]
     by_predicted, by_before = (slopes[:, there[:, None], first + there] for first in (0, 2))
     block = (slice(None), place, rows[:, None], rows)
     for part in (found.by_force, found.by_motion, found.by_last_motion):

@@ -23,13 +23,17 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_force, friction_limit, slip_tangent
-from solver.contact.elastic_pairs import MOST_PERIODS, Period, Tangents, assemble, periodic_start, start_columns
+from solver.contact.elastic_pairs import MOST_PERIODS, Period, Tangents, assemble, periodic_start
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # parts of a step of a pair with two tangents
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
+
+
+Pair = tuple[float, float]
 
 
 class Masses(NamedTuple):
@@ -41,13 +45,13 @@ class Masses(NamedTuple):
     step: float
 
 
-@njit(cache=True)
-def step_gains(mass: float, drag: float, step: float) -> tuple[float, float]:
+@register_jitable
+def step_gains(mass: float, drag: float, step: float) -> Pair:
     """`m/dt + c/2` and `m/dt - c/2`, so that `gain * velocity after = force - friction + loss * velocity before`."""
     return mass / step + 0.5 * drag, mass / step - 0.5 * drag
 
 
-@njit(cache=True)
+@register_jitable
 def step_line(
     force: float, velocity: float, limit: float, gain: float, loss: float, tangent: FloatArray
 ) -> tuple[float, float, float, float]:
@@ -93,7 +97,7 @@ def step_line(
     return friction, after, mean, 0.5 * (fraction * speed + (1.0 - fraction) * backward)
 
 
-@njit(cache=True)
+@register_jitable
 def _add_velocity(tangent: FloatArray, gain: float, loss: float) -> None:
     """Derivative of the velocity after a step, row 1, from that of the friction, row 0 of `tangent` (3, 3)."""
     for k in range(3):
@@ -102,7 +106,7 @@ def _add_velocity(tangent: FloatArray, gain: float, loss: float) -> None:
     tangent[1, 1] += loss / gain
 
 
-@njit(cache=True)
+@register_jitable
 def _add_speed(tangent: FloatArray, first: float, second: float, inner: FloatArray) -> float:
     """The speed of a velocity; adds half its derivative to that of the mean speed. inner (2, 5): of the velocity."""
     speed = float(np.hypot(first, second))
@@ -112,11 +116,9 @@ def _add_speed(tangent: FloatArray, first: float, second: float, inner: FloatArr
     return speed
 
 
-@njit(cache=True)
-def step_plane(
-    force: FloatArray, velocity: FloatArray, limit: float, gains: tuple[float, float], out: FloatArray, by: FloatArray
-) -> None:
-    """One step in the plane, in `PARTS` implicit parts; arguments as in `step_line`, force and velocity (2,).
+@register_jitable
+def step_plane(force: Pair, velocity: FloatArray, limit: float, gains: Pair, out: FloatArray, by: FloatArray) -> None:
+    """One step in the plane, in `PARTS` implicit parts; arguments as in `step_line`, velocity (2,).
 
     gains: see `step_gains`. out (7,), by (5, 5): receive results and derivatives.
     """
@@ -127,49 +129,41 @@ def step_plane(
     first, second = velocity[0], velocity[1]
     inner = np.zeros((2, 5))  # derivative of the velocity with respect to (force, velocity, limit)
     inner[0, 2] = inner[1, 3] = 1.0
-    drive, friction = np.empty((2, 5)), np.empty((2, 5))
+    drive = np.empty((2, 5))
     for _ in range(PARTS):
-        drive_1 = force[0] + loss * first
-        drive_2 = force[1] + loss * second
-        drive[:, :] = loss * inner
-        drive[0, 0] += 1.0
-        drive[1, 1] += 1.0
-        before = _add_speed(by, first, second, inner)
-        force_1, force_2, sticks = friction_force(drive_1, drive_2, limit)
-        if sticks:
-            # the whole force is friction: the mass is at rest after the part
-            friction[:, :] = drive
-        else:
-            n_1, n_2, _, across_11, across_12, across_22 = slip_tangent(drive_1, drive_2, limit)
+        drive_1, drive_2 = force[0] + loss * first, force[1] + loss * second
+        for i in range(2):
             for k in range(5):
-                friction[0, k] = across_11 * drive[0, k] + across_12 * drive[1, k]
-                friction[1, k] = across_12 * drive[0, k] + across_22 * drive[1, k]
-            friction[0, 4] += n_1
-            friction[1, 4] += n_2
-        next_1 = (drive_1 - force_1) / gain
-        next_2 = (drive_2 - force_2) / gain
-        inner[:, :] = (drive - friction) / gain
-        by[:2] += friction / PARTS
+                drive[i, k] = loss * inner[i, k]
+            drive[i, i] += 1.0
+        before = _add_speed(by, first, second, inner)
+        friction_1, friction_2, sticks = friction_force(drive_1, drive_2, limit)
+        # while it sticks the whole force is friction: the mass is at rest after the part
+        n_1, n_2, across_11, across_12, across_22 = 0.0, 0.0, 1.0, 0.0, 1.0
+        if not sticks:
+            n_1, n_2, _, across_11, across_12, across_22 = slip_tangent(drive_1, drive_2, limit)
+        for k in range(5):
+            by_1 = across_11 * drive[0, k] + across_12 * drive[1, k] + (n_1 if k == 4 else 0.0)
+            by_2 = across_12 * drive[0, k] + across_22 * drive[1, k] + (n_2 if k == 4 else 0.0)
+            inner[0, k], inner[1, k] = (drive[0, k] - by_1) / gain, (drive[1, k] - by_2) / gain
+            by[0, k] += by_1 / PARTS
+            by[1, k] += by_2 / PARTS
+        next_1, next_2 = (drive_1 - friction_1) / gain, (drive_2 - friction_2) / gain
         after = _add_speed(by, next_1, next_2, inner)
-        out[0] += force_1 / PARTS
-        out[1] += force_2 / PARTS
+        out[0] += friction_1 / PARTS
+        out[1] += friction_2 / PARTS
         out[4] += 0.5 * (first + next_1) / PARTS
         out[5] += 0.5 * (second + next_2) / PARTS
         out[6] += 0.5 * (before + after) / PARTS
         first, second = next_1, next_2
     out[2], out[3] = first, second
-    by[2:4] = inner
+    for k in range(5):
+        by[2, k], by[3, k] = inner[0, k], inner[1, k]
 
 
-@njit(cache=True)
+@register_jitable
 def step_mass(
-    force: FloatArray,
-    velocity: FloatArray,
-    limit: float,
-    gains: tuple[float, float],
-    line: int,
-    out: FloatArray,
-    tangent: FloatArray,
+    force: Pair, velocity: FloatArray, limit: float, gains: Pair, line: int, out: FloatArray, tangent: FloatArray
 ) -> None:
     """One step of a pair, as `step_plane`. line: index of the only tangent; -1 for two."""
     if line < 0:
@@ -192,21 +186,26 @@ def march_masses(pairs: IntArray, period: Period, masses: Masses) -> None:
     Tangential forces are means over the steps. The state is the displacement since the start of the period, m; `start`
     receives the velocity there, m/s.
     """
-    out, tangent = np.empty(7), np.empty((5, 5))
+    out, tangent, velocity = np.empty(7), np.empty((5, 5)), np.empty(2)
     step, n_samples = masses.step, period.status_t.shape[1]
     for pair in pairs:
         gains = step_gains(masses.mass[pair], masses.drag[pair], step)
         predicted_t, force_t, place_t = period.predicted_t[pair], period.force_t[pair], period.state_t[pair]
-        start, velocity, largest = period.start[pair], np.zeros(2), np.abs(predicted_t[1:]).max()
+        start, largest = period.start[pair], 0.0
+        velocity[:] = 0.0
+        for n in range(n_samples):
+            largest = max(largest, abs(predicted_t[1, n]), abs(predicted_t[2, n]))
         # far more periods than needed: the drag halves the change in each period
         for _ in range(MOST_PERIODS):
-            start[:] = velocity
+            start[0], start[1] = velocity[0], velocity[1]
             work = 0.0
             for n in range(n_samples):
                 normal = max(predicted_t[0, n], 0.0)
                 rests = velocity[0] == 0.0 and velocity[1] == 0.0
                 limit = friction_limit(period.friction[pair], normal)
-                step_mass(predicted_t[1:, n], velocity, limit, gains, masses.line[pair], out, tangent)
+                step_mass(
+                    (predicted_t[1, n], predicted_t[2, n]), velocity, limit, gains, masses.line[pair], out, tangent
+                )
                 force_t[0, n], force_t[1, n], force_t[2, n] = normal, out[0], out[1]
                 for i in range(2):
                     velocity[i] = out[2 + i]
@@ -226,19 +225,18 @@ def march_masses(pairs: IntArray, period: Period, masses: Masses) -> None:
 
 
 @njit(cache=True)
-def mass_slopes(
-    force_t: FloatArray, limit_t: FloatArray, start: FloatArray, gains: tuple[float, float], line: int
-) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (N, 5, 5) of the steps of a mass through a period, and its mean speeds (N,), m/s.
-
-    force_t (2, N), limit_t (N,): predicted force and friction limit, N. start (2,): velocity, m/s.
-    """
-    slopes, speed_t = np.empty((limit_t.size, 5, 5)), np.empty(limit_t.size)
-    out, velocity = np.empty(7), start.copy()
-    for n in range(limit_t.size):
-        step_mass(force_t[:, n], velocity, limit_t[n], gains, line, out, slopes[n])
-        velocity[:] = out[2:4]
-        speed_t[n] = out[6]
+def mass_slopes(pairs: IntArray, period: Period, masses: Masses) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (n, N, 5, 5) of the steps of some masses (n,) through a period, and mean speeds (n, N), m/s."""
+    n_samples, out, velocity = period.status_t.shape[1], np.empty(7), np.empty(2)
+    slopes, speed_t = np.empty((pairs.size, n_samples, 5, 5)), np.empty((pairs.size, n_samples))
+    for place, pair in enumerate(pairs):
+        gains, predicted_t = step_gains(masses.mass[pair], masses.drag[pair], masses.step), period.predicted_t[pair]
+        velocity[0], velocity[1] = period.start[pair, 0], period.start[pair, 1]
+        for n in range(n_samples):
+            limit = friction_limit(period.friction[pair], max(predicted_t[0, n], 0.0))
+            force = predicted_t[1, n], predicted_t[2, n]
+            step_mass(force, velocity, limit, gains, masses.line[pair], out, slopes[place, n])
+            velocity[0], velocity[1], speed_t[place, n] = out[2], out[3], out[6]
     return slopes, speed_t
 
 
@@ -246,38 +244,37 @@ def mass_slopes(
 def mass_tangent(
     pairs: IntArray,
     period: Period,
-    masses: Masses,
-    synthesis: FloatArray,
-    step_mean: FloatArray,
-    analysis: FloatArray,
+    steps: tuple[FloatArray, FloatArray],
+    step: float,
+    by_column_t: FloatArray,
+    by_mean_t: FloatArray,
+    analysis_h: FloatArray,
     out: Tangents,
 ) -> None:
-    """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity, into `out`; the matrices
-    as in `FourierBasis`.
+    """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity, into `out`.
+
+    steps: as `mass_slopes` gives them. step: between samples, s. by_column_t, by_mean_t: synthesis of samples
+    and of means over steps, as `by_columns` gives them. analysis_h (m, N): harmonics from such means; contiguous.
     """
-    point_t = np.ascontiguousarray(synthesis.T)
-    mean_t, analysis_t = point_t * step_mean, np.ascontiguousarray((analysis / step_mean).T)
-    n_samples, m = point_t.shape
-    for pair in pairs:
-        friction, normal_t = period.friction[pair], np.maximum(period.predicted_t[pair, 0], 0.0)
-        gains = step_gains(masses.mass[pair], masses.drag[pair], masses.step)
-        limit_t = friction_limit(friction, normal_t)
-        pulls = period.predicted_t[pair, 1:]
-        slopes, speed_t = mass_slopes(pulls, limit_t, period.start[pair], gains, masses.line[pair])
-        dforce_t, work, after = np.empty((n_samples, 2, 3 * m + 2)), np.zeros(3 * m + 2), np.empty((5, 3 * m + 2))
-        velocity = start_columns(3 * m)
+    m, n_samples = analysis_h.shape
+    w, (slopes, speed_t) = 3 * m + 2, steps
+    dforce_t, after, dstart = np.empty((n_samples, 2 * w)), np.empty((5, w)), np.zeros((2, w))
+    for place, pair in enumerate(pairs):
+        work, velocity = np.zeros(w), np.zeros((2, w))
+        velocity[0, w - 2] = velocity[1, w - 1] = 1.0
         for n in range(n_samples):
-            by_limit = friction if normal_t[n] > 0.0 else 0.0
+            normal = max(period.predicted_t[pair, 0, n], 0.0)
+            by_limit = period.friction[pair] if normal > 0.0 else 0.0
+            by_0, by_1, by_2 = by_column_t[n, 2 * m :], by_mean_t[n, m:], by_mean_t[n]
             for row in range(5):
-                by = slopes[n, row]
-                after[row] = by[2] * velocity[0] + by[3] * velocity[1]
-                for k in range(m):
-                    after[row, m + k] += by[0] * mean_t[n, k]
-                    after[row, 2 * m + k] += by[1] * mean_t[n, k]
-                    after[row, k] += by[4] * (by_limit * point_t[n, k])
-            dforce_t[n] = after[:2]
-            work += normal_t[n] * masses.step * after[4]
-            if normal_t[n] > 0.0:
-                work[:m] += speed_t[n] * masses.step * point_t[n]
-            velocity[:, :] = after[2:4]
-        assemble(out[0][pair], out[1][pair], dforce_t, work, periodic_start(velocity)[0], analysis_t)
+                by = slopes[place, n, row]
+                for j in range(w):
+                    from_before = by[2] * velocity[0, j] + by[3] * velocity[1, j]
+                    after[row, j] = from_before + by[0] * by_1[j] + by[1] * by_2[j] + by[4] * (by_limit * by_0[j])
+            speed = speed_t[place, n] if normal > 0.0 else 0.0
+            for j in range(w):
+                dforce_t[n, j], dforce_t[n, w + j] = after[0, j], after[1, j]
+                velocity[0, j], velocity[1, j] = after[2, j], after[3, j]
+                work[j] = work[j] + normal * step * after[4, j] + speed * step * by_0[j]
+        periodic_start(velocity, dstart)
+        assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_h)

@@ -223,19 +223,19 @@ def untransmitted(
     each harmonic, m/N. The others as in `Linearisation`.
     """
     m = step.shape[1]
-    rest, motion, own = np.zeros_like(step), np.zeros_like(step), np.zeros(3 * m)
+    rest, motion = np.zeros(step.shape), np.zeros(step.shape)
+    own, passed, grown = np.empty((3 * m, 1)), np.empty((3 * m, 1)), np.empty((1, 1))
     for pair in active:
-        own[:] = 0.0
         for i in range(3):
-            if rows[pair, i] >= 0:
-                own[i * m : (i + 1) * m] = step[rows[pair, i]]
-        passed = np.dot(force_tangent[pair], own)
+            for k in range(m):
+                own[i * m + k, 0] = step[rows[pair, i], k] if rows[pair, i] >= 0 else 0.0
+        np.dot(force_tangent[pair], own, passed)
         for i in range(3):
             row = rows[pair, i]
             if row < 0:
                 continue
             for k in range(m):
-                rest[row, k] = own[i * m + k] - passed[i * m + k]
+                rest[row, k] = own[i * m + k, 0] - passed[i * m + k, 0]
             motion[row, 0] = compliance[pair, i, 0].real * rest[row, 0]
             for n in range(1, m // 2 + 1):
                 cosine, sine, of = rest[row, 2 * n - 1], rest[row, 2 * n], compliance[pair, i, n]
@@ -243,5 +243,6 @@ def untransmitted(
                 motion[row, 2 * n - 1] = of.real * cosine + of.imag * sine
                 motion[row, 2 * n] = of.real * sine - of.imag * cosine
             if i == 0:
-                motion[row, 0] += np.dot(growth[pair], own)
+                np.dot(growth[pair : pair + 1], own, grown)
+                motion[row, 0] += grown[0, 0]
     return rest, motion

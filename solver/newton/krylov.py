@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.linalg
-from numba import njit
+from scipy.linalg.blas import dgemv, dnrm2
 
 from solver.model import ComplexArray, FloatArray
 from solver.settings import NEGLIGIBLE
@@ -107,7 +107,7 @@ def _arnoldi(
     basis, hessenberg = np.zeros((size + 1, start.size)), np.zeros((size + 1, size))
     basis[0] = start / np.linalg.norm(start)
     while k < size:
-        column = _extend(basis, k, np.ascontiguousarray(product(basis[k])))
+        column = _extend(basis, k, product(basis[k]))
         if not np.isfinite(column).all():
             break
         k += 1
@@ -117,22 +117,19 @@ def _arnoldi(
     return basis[: k + 1], hessenberg[: k + 1, :k]
 
 
-@njit(cache=True)
+@np.errstate(over="ignore", invalid="ignore")
 def _extend(basis: FloatArray, k: int, image: FloatArray) -> FloatArray:
     """Vector k + 1 of an orthonormal basis, in place; returns the components (k + 2,) of the image (n,), the last one 0
     where the new part is round-off.
     """
-    column = np.zeros(k + 2)
-    length = np.linalg.norm(image)
-    there = basis[: k + 1]
-    left = image
+    column, there, left = np.zeros(k + 2), basis[: k + 1].T, image
     for _ in range(2):
-        components = np.dot(there, left)
+        components = dgemv(1.0, there, left, trans=1)
         column[: k + 1] += components
-        left = left - np.dot(components, there)
-    rest = np.linalg.norm(left)
+        left = left - dgemv(1.0, there, components)
+    rest = dnrm2(left)
     # the negation also ends at what is not a number
-    if not rest <= NO_DIRECTION * length:
+    if not rest <= NO_DIRECTION * dnrm2(image):
         column[k + 1] = rest
         basis[k + 1] = left / rest
     return column

@@ -103,7 +103,7 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     blocks = square[np.ix_(components, components)].reshape(pairs.size, 3, components.size)
     tangential = np.flatnonzero(np.arange(components.size) % 3)
     nonzero = own.any(axis=3).reshape(n_samples, -1)
-    row = np.argsort(~nonzero, axis=1, kind="stable")[:, : nonzero.sum(axis=1).max()]
+    row = np.argsort(~nonzero, axis=1, kind="stable")[:, : nonzero.sum(axis=1).max()].copy()
     # single precision suffices for a preconditioner and halves the memory read in a solve
     swept = np.empty((*row.shape, tangential.size), np.float32)
     systems = np.empty((*row.shape, row.shape[1]), np.float32)
@@ -133,6 +133,7 @@ def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> Floa
     (n_samples, n_rows), n_pairs = row.shape, own.shape[1]
     state_t, after = np.zeros(right_t.shape), np.zeros((n_pairs, 2))
     before, pushed = np.zeros(2 * n_pairs, inverse.dtype), np.zeros(n_rows, inverse.dtype)
+    by_history, change = np.empty(n_rows, inverse.dtype), np.empty(n_rows, inverse.dtype)
     for _ in range(periods):
         for n in range(n_samples):
             for pair in range(n_pairs):
@@ -141,14 +142,14 @@ def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> Floa
                     left = carried[n, pair, i, 0] * after[pair, 0] + carried[n, pair, i, 1] * after[pair, 1]
                     before[2 * pair + i] = left
                     state_t[n, 3 * pair + 1 + i] = left
-            by_history = np.dot(swept[n], before)
+            np.dot(swept[n], before, by_history)
             for place in range(n_rows):
                 pair, i = row[n, place] // 3, row[n, place] % 3
                 total = 0.0
                 for k in range(3):
                     total += own[n, pair, i, k] * right_t[n, 3 * pair + k]
                 pushed[place] = total - by_history[place]
-            change = np.dot(inverse[n], pushed)
+            np.dot(inverse[n], pushed, change)
             for place in range(n_rows):
                 state_t[n, row[n, place]] += change[place]
             for pair in range(n_pairs):

@@ -38,7 +38,7 @@ AUTOMATIC_HARMONICS = 5
 
 _AUTOMATIC_HARMONICS_AT_MOST = 9  # for which the memory is estimated
 
-COMPILE_SECONDS = 9  # for the functions of the solver, once on a machine
+COMPILE_SECONDS = 7  # for the functions of the solver, once on a machine
 
 _BASE_MEMORY = 250e6
 _NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run

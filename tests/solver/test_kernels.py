@@ -1,12 +1,15 @@
 """Contact kernels and the law of a joint against plain twins and closed forms; `test_balance` has their derivatives."""
 
+import ast
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from solver.contact.coulomb import SEPARATED, SLIP, STICK, mean_normal_force
-from solver.contact.elastic_pairs import march_period, new_period
+import solver
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, mean_normal_force, mean_normal_tangent
+from solver.contact.elastic_pairs import march_period, march_tangent, new_period
 from solver.contact.sliding_masses import Masses, march_masses
 from solver.model import FloatArray, IntArray
 from solver.settings import Resolution, SolverSettings
@@ -176,6 +179,35 @@ def test_a_mass_moves_as_in_a_plain_twin_with_tiny_steps(seed, line):
     # the twin is of first order: 2 pi / N of the period, several times over
     assert force_h[0] == pytest.approx(expected, abs=3e-3 * np.abs(expected).max())
     assert period.slip_work[0] == pytest.approx((normal * speed).sum() * step, rel=3e-3)
+
+
+# --- compiling ---
+
+
+def test_no_kernel_assigns_a_slice_to_a_slice():
+    """For such an assignment numba compiles the text of an error message, 3 s in each process."""
+    kernels = [
+        function
+        for path in Path(solver.__file__).parent.rglob("*.py")
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(function, ast.FunctionDef) and "jit" in "".join(map(ast.unparse, function.decorator_list))
+    ]
+    assert len(kernels) > 20
+    for node in (node for kernel in kernels for node in ast.walk(kernel) if isinstance(node, ast.Assign)):
+        parts = [part for target in node.targets for part in ast.walk(target)]
+        assert isinstance(node.value, ast.Constant) or not any(isinstance(part, ast.Slice) for part in parts), (
+            ast.unparse(node)
+        )
+
+
+def test_a_kernel_is_compiled_once_for_any_resolution():
+    model = random_model(1, ("3d", "3d"))
+    for resolution in (Resolution((), 1), Resolution((1, 2, 3), 32)):
+        joint = build_case(model, FRICTION, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
+        predicted = PRELOAD * np.ones((2, 3, len(joint.basis.synthesis)))
+        joint.law.tangent(joint.law.march(predicted, np.zeros((2, 2))))
+    for kernel in (march_period, march_tangent, mean_normal_tangent):
+        assert len(kernel.signatures) == 1, kernel.signatures
 
 
 # --- elastic pairs and masses in one joint ---
