@@ -34,19 +34,14 @@ from studies.scene_error import SceneError
 
 @dataclass(frozen=True)
 class FeScene:
-    """A reduced model, what it was reduced from, and frequencies of the glued structure.
+    """A reduced model, what it was reduced from, with the pairs in the order of the model, and frequencies.
 
-    glued_frequencies: Hz, ascending, by nodal diameter.
+    glued_frequencies: of the glued structure, Hz, ascending, by nodal diameter.
     """
 
     model: ReducedModel
     prepared: PreparedModel
     glued_frequencies: Mapping[int, FloatArray]
-
-    @property
-    def pairs(self) -> ContactPairs:
-        """Contact pairs in the order of the model."""
-        return self.prepared.structure.pairs
 
 
 def build_fe_scene(

@@ -98,6 +98,35 @@ class PreparedModel:
             forms[name] = np.asarray(0.5 * (whole + whole.conj().T))
         return frequencies, forms, np.concatenate([shapes.conj().T @ vectors, moved.conj().T @ vectors])
 
+    def find_resistance(self, motions: FloatArray) -> tuple[float, str]:
+        """How much constraints resist a motion as one body, Hz, and which of them resists most; 0 where none does.
+
+        motions (3 n_nodes, 6): three translations and three turns, of a cyclic sector about a point on its axis. Where
+        some displacements of a motion r depend on others, all that follow these are e away from it: the frequency is
+        that of the strain energy, `omega^2 = e^H K e / (r^H M r)`. What is held does not count. Of a cyclic sector the
+        motions across the axis are waves of nodal diameter 1.
+        """
+        structure, ways = self.structure, {0: np.eye(3)}
+        if structure.cut is not None:
+            axis = structure.cut.axis.axis
+            across = np.linalg.svd(axis[None])[2][1]
+            ways = {0: axis[:, None], 1: (across + 1j * np.cross(axis, across))[:, None]}
+        worst, shares = 0.0, np.zeros(len(motions))
+        for nodal_diameter, way in ways.items():
+            for motion in np.hstack([motions[:, :3] @ way, motions[:, 3:] @ way]).T:
+                apart, total = structure.deviation(motion, nodal_diameter)
+                forces = self.forms.get("elastic", self.forms["stiffness"]) @ (total @ apart)
+                own = ((total.conj().T @ forces).conj() * apart).real
+                inertia = np.vdot(motion, self.forms["mass"] @ motion).real
+                if inertia > 0.0 and own.sum() > worst * inertia:
+                    worst, shares = own.sum() / inertia, own
+        names = {**structure.constraints.origin}
+        names.update(zip(structure.followers.tolist(), structure.labels, strict=True))
+        sums: dict[str, float] = {}
+        for node in np.flatnonzero(shares.reshape(-1, 3).any(axis=1)).tolist():
+            sums[names[node]] = sums.get(names[node], 0.0) + shares[3 * node : 3 * node + 3].sum()
+        return float(np.sqrt(worst) / (2.0 * np.pi)), max(sums, key=lambda name: sums[name], default="")
+
     def _factorise(
         self, coordinates: Coordinates, nodal_diameter: int, name: str = "stiffness"
     ) -> tuple[sparse.csr_matrix, Factor]:

@@ -130,11 +130,6 @@ class Mesh:
         found = [block.nodes[np.isin(block.numbers, elements)].ravel() for block in self.blocks]
         return np.unique(np.concatenate([NONE, *found]))
 
-    def other_kinds(self, elements: IntArray) -> list[str]:
-        """Kinds of those elements (m,) that are not read."""
-        others = [block for block in self.blocks if block.kind not in NODES_OF_KIND]
-        return sorted(block.kind for block in others if np.isin(elements, block.numbers).any())
-
     def placed(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
         """Points or vectors (n, 3) of an instance where the instance stands."""
         shift, turn = self.draft.placed.get(scope, (np.zeros(3), np.eye(3)))

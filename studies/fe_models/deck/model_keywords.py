@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.contents import Equation, MeanMotion, RigidMotion, Section, Transform
+from studies.fe_models.deck.contents import NODES_OF_KIND, Equation, MeanMotion, RigidMotion, Section, Transform
 from studies.fe_models.deck.keywords import Block, Row, keyword, unit
 from studies.fe_models.deck.model import MaterialRows, Model
 from studies.fe_models.files import IntArray, Place, is_integer, shown
@@ -69,7 +69,8 @@ def _section(model: Model, block: Block) -> None:
 def _other_section(model: Model, block: Block) -> None:
     """Elements that are not read carry something."""
     elements = model.mesh.elements(block.reference("ELSET"))
-    kinds = model.mesh.other_kinds(elements)
+    others = [each for each in model.mesh.blocks if each.kind not in NODES_OF_KIND]
+    kinds = sorted(each.kind for each in others if np.isin(elements, each.numbers).any())
     if kinds:
         text = f"{block.place} of elements of type {' and '.join(kinds)}, which are not read"
         model.add("unassembled", (text, elements))

@@ -16,7 +16,6 @@ from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduced_joint import FeScene
-from studies.finite_element.rigid_motions import find_resistance
 from studies.scene import Progress, make_compliant, silent
 
 N_FREQUENCIES = 8
@@ -87,7 +86,7 @@ def describe_model(
 
 def _rigid(loaded: LoadedModel, scene: FeScene, highest: float) -> Iterator[tuple[str, str]]:
     """Motions as one body, and of bodies. highest: of the frequencies that are shown, Hz."""
-    resistance, name = find_resistance(scene.prepared, loaded.motions)
+    resistance, name = scene.prepared.find_resistance(loaded.motions)
     resists = name if resistance > _STIFF * highest else "no constraint"
     free = f"{_count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"
     yield "rigid", f"{free}; {resists} resists a motion of all as one body"
@@ -157,7 +156,7 @@ def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters
 
 
 def _contacts(scene: FeScene) -> Iterator[str]:
-    pairs = scene.pairs
+    pairs = scene.prepared.pairs
     for place, (moving, opposite) in enumerate(zip(pairs.moving_name, pairs.opposite_name, strict=True)):
         own = pairs.surface == place
         neighbour = _NEIGHBOURS[int(pairs.sector[own][0])] if own.any() else ""
@@ -218,11 +217,11 @@ def _frequencies(values: FloatArray) -> str:
 
 def draw_pairs(loaded: LoadedModel, scene: FeScene, path: Path) -> None:
     """Writes a PNG with one part for each pair of surfaces. Raises OSError."""
-    n = len(scene.pairs.moving_name)
+    n = len(scene.prepared.pairs.moving_name)
     rows, columns = -(-n // 3), min(n, 3)
     figure = Figure(figsize=(7.0 * columns, 6.5 * rows), layout="constrained")
     for place in range(n):
-        _draw_surface(figure, (rows, columns, place + 1), loaded, scene.pairs, place)
+        _draw_surface(figure, (rows, columns, place + 1), loaded, scene.prepared.pairs, place)
     figure.suptitle("contact pairs: normal (red), first tangent (green), second tangent (blue)")
     figure.savefig(path, format="png")
 

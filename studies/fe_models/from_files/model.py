@@ -15,7 +15,6 @@ from studies.fe_models.deck.contents import Deck
 from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_digest
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.imported import check_nodes_have_dofs, import_matrices, read_recovery
-from studies.fe_models.from_files.mean_motions import equations_of_mean_motions
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import (
     Selections,
@@ -31,8 +30,7 @@ from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
 from studies.finite_element.reduced_joint import FeScene, build_fe_scene
 from studies.finite_element.reduction import PreparedModel
-from studies.finite_element.rigid_motions import rigid_motions
-from studies.finite_element.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.solid_mesh import Rotation, SolidMesh, rigid_motions
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh, faces_of_elements, integrate_shapes
 from studies.scene import Progress, SurfaceMesh, build_compliant, silent
@@ -43,7 +41,7 @@ from studies.scene_error import SceneError
 class LoadedModel:
     """A model as its files and the study describe it. deck: in units of the files. model, joint: SI.
 
-    motions (3 n_nodes, 6): of all nodes as one body, see `find_resistance`. omega_squared_held: square of the speed at
+    motions (3 n_nodes, 6): of all nodes as one body, see `PreparedModel`. omega_squared_held: square of the speed at
     which the matrices were made, rad2/s2; None where they do not tell.
     """
 
@@ -134,8 +132,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
         imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
     nodes = mesh if imported is None else imported.mesh
-    deck = replace(deck, equations=(*deck.equations, *equations_of_mean_motions(selections)))
-    supported = find_constraints(deck, nodes.numbers, clamped, units, on_cut)
+    supported = find_constraints(selections, nodes.numbers, clamped, on_cut)
     selections = replace(selections, references=supported.references)
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
     n_nodes, forms = len(supported.held), None

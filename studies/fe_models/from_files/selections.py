@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -60,7 +60,11 @@ class Selections:
             used = [block.nodes[np.isin(block.numbers, members)].ravel() for block in deck.blocks]
             found = self.rows(np.concatenate([_NONE, *used]))
         else:
-            raise self._unknown(name, key, (*deck.node_sets, *deck.surfaces, *deck.element_sets))
+            names = sorted({*deck.node_sets, *deck.surfaces, *deck.element_sets})
+            what = "physical group" if deck.path.lower().endswith(".msh") else "set or surface"
+            near = difflib.get_close_matches(known, names, n=3, cutoff=0.5) or names[:_MOST_NAMED]
+            remedy = f"give {' or '.join(near)}" if near else f"name it in {deck.path}: there is none"
+            raise SceneError(key, f'there is no {what} "{name}" in {deck.path}', remedy)
         if len(found) == 0:
             remedy = "give nodes of the mesh that no *MODEL CHANGE takes away"
             raise SceneError(key, f"{name} in {deck.path} has no node of an element", remedy)
@@ -86,14 +90,6 @@ class Selections:
         if surface is None or surface.nodes.size:
             return None
         return surface_of_faces(self.mesh, name, surface.elements, surface.faces)
-
-    def _unknown(self, name: str, key: str, known: Iterable[str]) -> SceneError:
-        """The error about a name that the deck does not have; it lists those that look like it."""
-        names = sorted(set(known))
-        what = "physical group" if self.deck.path.lower().endswith(".msh") else "set or surface"
-        near = difflib.get_close_matches(capital(name), names, n=3, cutoff=0.5) or names[:_MOST_NAMED]
-        remedy = f"give {' or '.join(near)}" if near else f"name it in {self.deck.path}: there is none"
-        return SceneError(key, f'there is no {what} "{name}" in {self.deck.path}', remedy)
 
 
 def capital(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Matrices of other programs: what reads which files, by the name that a user gives. Those of Nastran: `nastran.py`.
+"""Matrices of other programs: what reads which files, by the name that a user gives.
 
 CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes job.sti and job.mas, the upper triangle in lines "row column value"
 from 1, and job.dof with a line "node.direction" for every row, no number: 10.1 is not 10.10.
@@ -29,7 +29,7 @@ import numpy as np
 from scipy import io, sparse
 
 from studies.fe_models.files import check_file, library_errors, shown
-from studies.fe_models.matrices.harwell_boeing import read_harwell_boeing
+from studies.fe_models.matrices.fortran import read_harwell_boeing, read_op4
 from studies.fe_models.matrices.matrices import (
     NAMES,
     Entries,
@@ -40,7 +40,7 @@ from studies.fe_models.matrices.matrices import (
     number_modes,
     wrong,
 )
-from studies.fe_models.matrices.nastran import read_op4, read_punch
+from studies.fe_models.matrices.nastran import read_punch
 from studies.scene_error import SceneError
 
 Files = Mapping[str, Path]
@@ -169,16 +169,15 @@ def _read_tables(files: Files) -> dict[str, Entries]:
     found = {}
     for name in [name for name in NAMES if name in files]:
         path = files[name]
-        found[name] = _read_market(path) if path.suffix.lower() == ".mtx" else read_harwell_boeing(path)
+        if path.suffix.lower() != ".mtx":
+            found[name] = read_harwell_boeing(path)
+            continue
+        with library_errors(path, "scipy.io", "scipy", "matrices"):
+            *_, field, symmetry = io.mminfo(path)
+            if field == "pattern" or symmetry == "skew-symmetric":
+                wrong(path.name, f"its header says {field} {symmetry}", "write the numbers of a symmetric matrix")
+            found[name] = io.mmread(path)
     return entries_of_tables(found, files)
-
-
-def _read_market(path: Path) -> Any:
-    with library_errors(path, "scipy.io", "scipy", "matrices"):
-        *_, field, symmetry = io.mminfo(path)
-        if field == "pattern" or symmetry == "skew-symmetric":
-            wrong(path.name, f"its header says {field} {symmetry}", "write the numbers of a symmetric matrix")
-        return io.mmread(path)
 
 
 def _read_matlab(files: Files) -> dict[str, Entries]:

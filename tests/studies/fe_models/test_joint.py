@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from studies.finite_element.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
-from studies.finite_element.rigid_motions import rigid_motions
+from studies.finite_element.solid_mesh import rigid_motions
 from studies.finite_element.surfaces import (
     closest_points,
     faces_of_elements,
