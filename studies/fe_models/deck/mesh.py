@@ -51,6 +51,11 @@ class Draft:
     others: list[Block] = field(default_factory=list)
     included: list[str] = field(default_factory=list)
 
+    def at(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
+        """Points or vectors (n, 3) of an instance where the instance stands."""
+        shift, turn = self.placed.get(scope, (np.zeros(3), np.eye(3)))
+        return points @ turn.T + (0.0 if vectors else shift)
+
 
 class Mesh:
     """Nodes, elements, sets and surfaces of a draft under the numbers that they have in the deck.
@@ -130,11 +135,6 @@ class Mesh:
         found = [block.nodes[np.isin(block.numbers, elements)].ravel() for block in self.blocks]
         return np.unique(np.concatenate([NONE, *found]))
 
-    def placed(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
-        """Points or vectors (n, 3) of an instance where the instance stands."""
-        shift, turn = self.draft.placed.get(scope, (np.zeros(3), np.eye(3)))
-        return points @ turn.T + (0.0 if vectors else shift)
-
     def _names(self, key: Key, everything: Container[Key]) -> list[str]:
         """Names of a set or surface: where others have the same, the one of an instance has that before it."""
         scope, name = key
@@ -183,11 +183,7 @@ def _build_nodes(draft: Draft, offsets: Mapping[str, int]) -> tuple[IntArray, Fl
         what = "nodes: no *PART has an *INSTANCE" if draft.parts and not draft.placed else "nodes"
         raise SceneError("model", f"{draft.name} has no {what}", "give the deck with its mesh")
     numbers = np.concatenate([each.numbers + offsets[each.scope] for each in draft.nodes])
-    coordinates = np.concatenate([each.values.astype(np.float64) for each in draft.nodes])
-    scopes = np.repeat([each.scope for each in draft.nodes], [each.numbers.size for each in draft.nodes])
-    for scope, (shift, turn) in draft.placed.items():
-        own = scopes == scope
-        coordinates[own] = coordinates[own] @ turn.T + shift
+    coordinates = np.concatenate([draft.at(each.scope, each.values.astype(np.float64)) for each in draft.nodes])
     order = np.argsort(numbers, kind="stable")
     numbers, coordinates = numbers[order], coordinates[order]
     again = np.flatnonzero(numbers[1:] == numbers[:-1])

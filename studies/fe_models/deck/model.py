@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from studies.fe_models.deck.contents import (
-    NODES_OF_KIND,
-    CyclicSymmetry,
-    Deck,
-    ElementBlock,
-    Material,
-    Surface,
-    SurfacePair,
-)
+from studies.fe_models.deck.contents import NODES_OF_KIND, CyclicSymmetry, Deck, Material, SurfacePair
 from studies.fe_models.deck.keywords import Block
 from studies.fe_models.deck.mesh import Draft, Mesh, Records
 from studies.fe_models.deck.sets import NONE, Numbers
@@ -131,12 +123,13 @@ class Model:
             node_numbers=mesh.numbers,
             coordinates=mesh.coordinates,
             blocks=tuple(
-                ElementBlock(block.kind, block.numbers[own], block.nodes[own]) for block, own in solid if own.any()
+                replace(block, numbers=block.numbers[own], nodes=block.nodes[own]) for block, own in solid if own.any()
             ),
             node_sets=mesh.node_sets,
             element_sets={name: np.intersect1d(members, kept) for name, members in mesh.element_sets.items()},
             surfaces={
-                name: Surface(each.elements[own], each.faces[own], each.nodes) for name, (each, own) in faces.items()
+                name: replace(each, elements=each.elements[own], faces=each.faces[own])
+                for name, (each, own) in faces.items()
             },
             ties=tuple(pair for _, cyclic, pair in ties if not cyclic),
             contact_pairs=tuple(self._contact_pairs()),

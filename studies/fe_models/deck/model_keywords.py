@@ -104,7 +104,7 @@ def _transform(model: Model, block: Block) -> None:
     points = block.points()
     spans = points[1] - points[0] if kind == "C" else np.cross(points[0], points[1])
     unit(spans, block.place, "points that are apart")
-    placed = model.mesh.placed(block.scope, points, vectors=kind == "R")
+    placed = model.mesh.draft.at(block.scope, points, vectors=kind == "R")
     nodes = model.mesh.nodes(block.reference("NSET"))
     model.add("transforms", Transform(str(block.place), nodes, kind == "C", placed))
 

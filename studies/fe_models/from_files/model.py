@@ -16,13 +16,7 @@ from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.imported import check_nodes_have_dofs, import_matrices, read_recovery
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
-from studies.fe_models.from_files.selections import (
-    Selections,
-    find_clamped,
-    find_cut,
-    find_surfaces,
-    note_free_surfaces,
-)
+from studies.fe_models.from_files.selections import Selections, find_surfaces, note_free_surfaces
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
@@ -125,7 +119,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         _check_assembled(deck, units)
     rotation, axis = find_axes(deck, parameters, units)
     contacts, ties = find_surfaces(selections, axis)
-    cut, clamped = find_cut(selections, axis, contacts), find_clamped(selections)
+    cut, clamped = selections.cut(axis, contacts), selections.clamped()
     on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
     imported = None
     if files.matrices:
@@ -137,7 +131,8 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
     n_nodes, forms = len(supported.held), None
     responses = {
-        name: _motion(selections, each, f"response.{name}.set", n_nodes) for name, each in parameters.responses.items()
+        name: _motion(selections, each, f"response.{name}.set", n_nodes)
+        for name, each in (parameters.response or {"load": parameters.load}).items()
     }
     if imported is not None:
         if imported.matrices.load is not None:

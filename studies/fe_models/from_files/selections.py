@@ -84,6 +84,26 @@ class Selections:
             return surface_of_points(known, nodes)
         return surface_of_nodes(self.mesh, known, nodes)
 
+    def cut(self, axis: CyclicAxis | None, contacts: Sequence[ContactSurfaces]) -> CutFaces | None:
+        """Cut faces that the study names, else those of the deck, else all nodes that are images; None of no sector.
+
+        contacts: nodes of those with the next sector are on no cut face that is found. Raises SceneError.
+        """
+        if axis is None:
+            return None
+        given = self.parameters.cut_faces
+        names = self.deck.cut_faces if given is None else (given,)
+        if not names:
+            across = [surface.nodes for each in contacts if each.sector for surface in (each.first, each.second)]
+            return find_cut_faces(self.mesh, axis, np.concatenate([_NONE, *across]))
+        sides = ([self.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
+        return match_cut_faces(self.mesh, axis, *(np.unique(np.concatenate(each)) for each in sides))
+
+    def clamped(self) -> IntArray | None:
+        """Rows of the nodes that the study clamps; None where the deck says what is held. Raises SceneError."""
+        names = self.parameters.clamp
+        return None if names is None else np.concatenate([_NONE, *(self.nodes(name, "clamp") for name in names)])
+
     def _of_faces(self, name: str) -> Surface | None:
         """A surface that is given by faces of elements, by its name in capitals."""
         surface = self.deck.surfaces.get(name)
@@ -109,7 +129,9 @@ def find_surfaces(
     touching = [pair for pair in deck.contact_pairs if not pair.glued]
     glued = [pair for pair in deck.contact_pairs if pair.glued]
     if given is not None:
-        chosen = [_known(SurfacePair(capital(one), capital(other)), deck) for one, other in given]
+        # what the deck says of two surfaces, nothing but their names where it says nothing
+        known = (*deck.contact_pairs, *deck.ties)
+        chosen = [next((each for each in known if _same(each, pair)), pair) for pair in _pairs(given)]
     else:
         chosen = touching or list(deck.ties)
     if not chosen:
@@ -133,7 +155,7 @@ def find_surfaces(
 
 def note_free_surfaces(deck: Deck, given: Sequence[tuple[str, str]] | None) -> Deck:
     """The deck with a note on each contact pair that is none of the study. given: contacts of the study."""
-    chosen = [SurfacePair(capital(one), capital(other)) for one, other in given or ()]
+    chosen = _pairs(given or ())
     free = [pair for pair in deck.contact_pairs if chosen and not any(_same(pair, each) for each in chosen)]
     why = "is not in `contact` of the study: nothing joins these surfaces, unless they are there by other names."
     notes = (f"*CONTACT PAIR {pair.labels[-1]} {why}" for pair in free if not pair.glued)
@@ -170,9 +192,8 @@ def _same(one: SurfacePair, other: SurfacePair) -> bool:
     return {one.dependent, one.independent} == {other.dependent, other.independent}
 
 
-def _known(pair: SurfacePair, deck: Deck) -> SurfacePair:
-    """What the deck says of two surfaces, nothing but their names where it says nothing."""
-    return next((each for each in (*deck.contact_pairs, *deck.ties) if _same(each, pair)), pair)
+def _pairs(given: Sequence[tuple[str, str]]) -> list[SurfacePair]:
+    return [SurfacePair(capital(one), capital(other)) for one, other in given]
 
 
 def _surfaces(selections: Selections, pair: SurfacePair, key: str) -> ContactSurfaces:
@@ -232,26 +253,3 @@ def _friction(chosen: list[SurfacePair], parameters: Parameters, deck: Deck) -> 
             what = pair.problem or f"missing for {pair.labels[-1]} in {deck.path}"
             raise SceneError("friction_coefficient", what, "give one coefficient, in the study or there with *FRICTION")
     return found
-
-
-def find_cut(selections: Selections, axis: CyclicAxis | None, contacts: Sequence[ContactSurfaces]) -> CutFaces | None:
-    """Cut faces that the study names, else those of the deck, else all nodes that are images; None of no sector.
-
-    contacts: nodes of those with the next sector are on no cut face that is found. Raises SceneError.
-    """
-    if axis is None:
-        return None
-    mesh, given = selections.mesh, selections.parameters.cut_faces
-    names = selections.deck.cut_faces if given is None else (given,)
-    if not names:
-        across = [surface.nodes for each in contacts if each.sector for surface in (each.first, each.second)]
-        return find_cut_faces(mesh, axis, np.concatenate([_NONE, *across]))
-    sides = ([selections.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
-    first, second = (np.unique(np.concatenate(each)) for each in sides)
-    return match_cut_faces(mesh, axis, first, second)
-
-
-def find_clamped(selections: Selections) -> IntArray | None:
-    """Rows of the nodes that the study clamps; None where the deck says what is held. Raises SceneError."""
-    names = selections.parameters.clamp
-    return None if names is None else np.concatenate([_NONE, *(selections.nodes(name, "clamp") for name in names)])
