@@ -36,11 +36,6 @@ class FaceShape:
     height: float
     facets: tuple[tuple[int, ...], ...]
 
-    @property
-    def places(self) -> FloatArray:
-        """Reference coordinates (n_nodes, 2) of its nodes."""
-        return self.element.nodes[list(self.nodes), :2]
-
     def values(self, places: FloatArray) -> FloatArray:
         """Shape functions (n, n_nodes) at places (n, 2) of the face."""
         return self.element.values(np.column_stack([places, np.full(len(places), self.height)]))[:, list(self.nodes)]
@@ -231,7 +226,7 @@ def _surface(mesh: SolidMesh, name: str, chosen: list[Face]) -> Surface:
         shape = FACE_SHAPES[len(loop)]
         facets.append(loop[np.array(shape.facets)])
         faces += [np.append(loop, np.full(8 - len(loop), -1))] * len(shape.facets)
-        places.append(shape.places[np.array(shape.facets)])
+        places.append(shape.element.nodes[list(shape.nodes), :2][np.array(shape.facets)])
     return Surface(name, np.concatenate(facets), np.array(faces), np.concatenate(places), depth[np.isfinite(depth)])
 
 

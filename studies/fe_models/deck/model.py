@@ -96,10 +96,6 @@ class Model:
             if step.writes or (name in ("forces", "pressures", "gravity") and not step.loads_count):
                 self.fields[name] = step.before.get(name, {})
 
-    def skip(self, block: Block) -> None:
-        """Notes a keyword that cannot change the model."""
-        self.skipped.append(str(block.place))
-
     def deck(self) -> Deck:
         """The deck. Raises SceneError where names are missing or do not fit."""
         self.check_coupling()

@@ -81,7 +81,7 @@ def _initial_conditions(model: Model, block: Block) -> None:
     """Temperatures; velocities do not matter."""
     kind = block.value("TYPE")
     if kind == "VELOCITY":
-        model.skip(block)
+        model.skipped.append(str(block.place))
         return
     if kind != "TEMPERATURE":
         raise block.place.wrong(f"TYPE={shown(kind)} is not read", "remove it: the prestress is that of the rotation")
@@ -94,7 +94,7 @@ def _initial_conditions(model: Model, block: Block) -> None:
 def _thermal(model: Model, block: Block) -> None:
     """They change nothing but where there are both, or values at several temperatures."""
     model.thermal[block.keyword] = block.place
-    model.skip(block)
+    model.skipped.append(str(block.place))
 
 
 @keyword("TRANSFORM", "NSET TYPE")

@@ -49,7 +49,7 @@ def read_deck(path: Path) -> Deck:
     for block in draft.others:
         unused = model.step is not None and not model.step.loads_count
         if block.keyword in HARMLESS or (unused and block.keyword in _LOADS):
-            model.skip(block)
+            model.skipped.append(str(block.place))
         else:
             find_keyword(block, any_parameters=unused and block.keyword == "DLOAD").reader(model, block)
     model.end_step()

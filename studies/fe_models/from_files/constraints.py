@@ -83,9 +83,7 @@ class _Builder:
         held = self._held_by_deck() if clamped is None else {3 * row + k for row in clamped.tolist() for k in range(3)}
         for equation in deck.equations:
             self._equation(equation)
-        forces = np.zeros(3 * (len(self.numbers) + len(self.extra)))
-        for dof, value in self._forces():
-            forces[dof] += value
+        forces = self._forces()
         own: BoolArray = np.isin(np.arange(len(forces)), list(held)).reshape(-1, 3)
         extra = np.array(self.extra, dtype=np.int64)
         references = {node: row for (kind, node), row in self.rows.items() if not kind and row >= len(self.numbers)}
@@ -231,8 +229,9 @@ class _Builder:
         rows = np.zeros(len(others), dtype=np.int64)
         self.entries.append(Dependence(np.array([dependent]), rows, columns, values, equation.place))
 
-    def _forces(self) -> Iterator[tuple[int, float]]:
-        """Displacement and force, N, of each component."""
+    def _forces(self) -> FloatArray:
+        """Forces (3 n,), N."""
+        forces = np.zeros((len(self.numbers) + len(self.extra), 3))
         for force in self.deck.forces:
             for node in force.nodes:
                 if ("", int(node)) not in self.rows or force.first_dof > 3:
@@ -240,9 +239,9 @@ class _Builder:
                         continue
                     found = f"{force.place}: node {node} has no dof {force.first_dof}"
                     raise SceneError("model", found, "give forces on nodes of elements, or of reference nodes")
-                for k, share in enumerate(self._frame(int(node))[force.first_dof - 1]):
-                    if share:
-                        yield 3 * self.rows["", int(node)] + k, self.units.force * force.value * float(share)
+                direction = self._frame(int(node))[force.first_dof - 1]
+                forces[self.rows["", int(node)]] += self.units.force * force.value * direction
+        return forces.ravel()
 
 
 def _mean_motion(selections: Selections, motion: MeanMotion) -> Iterator[Equation]:

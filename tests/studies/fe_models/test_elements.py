@@ -5,7 +5,7 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from studies.fe_models.matrices.read import read_matrices
-from studies.finite_element.elements import ASSEMBLED_KINDS
+from studies.finite_element.elements import ASSEMBLED_KINDS as KINDS
 from studies.finite_element.solid_mesh import (
     ElementGroup,
     Material,
@@ -29,8 +29,6 @@ from tests.studies.fe_models.solid_meshes import (
     node_set,
     run_ccx,
 )
-
-KINDS = ASSEMBLED_KINDS
 
 
 def skewed(points):
