@@ -4,8 +4,6 @@ What is legal and may surprise: a massless displacement that has stiffness, a ri
 contact can hold, a negative gap (interference), a stiffness that is not positive definite (spin softening).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

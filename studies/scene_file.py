@@ -10,8 +10,6 @@ For pictures a file may hold outer faces of the mesh, without influence on the m
 pairs of one surface are (`contact/position`) are drawn in contact, as are faces of other bodies that lie on these.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping

@@ -3,8 +3,6 @@
 Commands that may change the model and are not acted upon are refused.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ them; of nodes that touch area, normal_x, normal_y, normal_z out of the body, an
 interference. All are in the units of the model.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

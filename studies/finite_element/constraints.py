@@ -1,7 +1,5 @@
 """Linear constraints: displacements that depend on others."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Cut faces of a cyclic sector: nodes that are images of each other under rotation by one sector."""
 
-from __future__ import annotations
-
 import cmath
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Tetrahedra and wedges live on the triangle `xi, eta >= 0, xi + eta <= 1`, wedges
 the cube from -1 to 1. Shape functions are the polynomials of a given space that are 1 at one node and 0 at the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """From a finite-element model of a joint to its reduced model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ The static shapes of the relative displacements, and the lowest modes of the glu
 stiffness couples no mode with a shape. One factorisation of the glued stiffness at a nodal diameter gives both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 

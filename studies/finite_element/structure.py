@@ -4,8 +4,6 @@ Nodes of the right cut face follow those of the left one, the moving node of a c
 opposite point, plus the relative displacement of the pair; constraints do the same to other displacements.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any

@@ -4,8 +4,6 @@ Faces of quadratic elements are split at their mid-side nodes: the consistent ar
 zero at its corners, those of its facets are positive at all nodes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

@@ -11,8 +11,6 @@ second tangent (up the flank, outwards). Pairs are numbered intrados first (the 
 turns about +z), then extrados; from the leading to the trailing edge; from the inner to the outer end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan

@@ -9,8 +9,6 @@ has removed a segment of area `2 b^3 / (3 R)` of a cylinder, a cap of volume `pi
 is `b^2 / (2 R)`. By Archard's law the volume is at most `4 k_w N P s` after N cycles of stroke s under the force P.
 """
 
-from __future__ import annotations
-
 import math
 from abc import abstractmethod
 from collections.abc import Callable

@@ -6,8 +6,6 @@ A spring presses the mass, and wear relaxes the spring: with the wear depth W th
 stops, the motion is that of Den Hartog, Trans. ASME 53 (1931).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

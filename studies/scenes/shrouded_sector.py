@@ -10,8 +10,6 @@ coordinates of the glued sector. Each pair has normal (positive when the pair cl
 second tangent. A mesh of density m has 4 m axial x (m + 1) pairs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import cos, radians, sin
 from typing import ClassVar

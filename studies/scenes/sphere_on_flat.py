@@ -5,8 +5,6 @@ patch also stands for its mirror images (`half_space`). Areas, forces and volume
 stick zone is that of Cattaneo and Mindlin, without tractions across the force.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

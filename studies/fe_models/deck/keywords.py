@@ -4,8 +4,6 @@ A keyword, and each of its parameters, is read, or stands in a list of those tha
 refused: it may change the model.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field

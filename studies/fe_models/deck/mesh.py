@@ -1,7 +1,5 @@
 """The mesh of a deck: as it is read, and then with every number in its place and every set to be looked up."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Keywords of the mesh: nodes, elements, sets, surfaces, parts and instances, and what makes nodes of others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

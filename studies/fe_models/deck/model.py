@@ -1,7 +1,5 @@
 """What a deck says beside its mesh, while it is read and put together once all of it is read."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

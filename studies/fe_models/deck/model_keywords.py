@@ -1,7 +1,5 @@
 """Keywords of materials and sections, and of linear constraints."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -4,8 +4,6 @@ A deck is read twice: first the keywords of the mesh, whose sets and surfaces ma
 then, with the mesh at hand, all others in the order of the file.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Keywords of what touches or is glued, of steps and loads, *BOUNDARY, and those that say nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a user checks of a finite-element model before it is computed with: lines, and a picture of the pairs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

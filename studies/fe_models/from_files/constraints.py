@@ -6,8 +6,6 @@ distributing coupling elements). A force on the reference node, which depends on
 and its moment about the centre by `F_i = w_i T^-1 M x r_i`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 

@@ -3,8 +3,6 @@
 Each mistake in their export has a function that raises SceneError, with one sentence where the mistake was made.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

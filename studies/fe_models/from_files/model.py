@@ -1,7 +1,5 @@
 """From files and a study's parameters to a model and its reduction, in SI units."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from importlib import metadata

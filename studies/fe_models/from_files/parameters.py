@@ -1,7 +1,5 @@
 """What a study says of a finite-element model, in SI units whatever units its files have."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal
 

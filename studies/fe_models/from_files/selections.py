@@ -1,7 +1,5 @@
 """What the names of a mesh stand for; which surfaces touch, are glued, cut or clamped, and with what friction."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

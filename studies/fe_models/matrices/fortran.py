@@ -11,8 +11,6 @@ of strings, each with its own length and row: packed into one whole number, or a
 a negative number of rows). A column behind the last one ends the matrix.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping
 from io import BytesIO

@@ -4,8 +4,6 @@ A reader gives the entries of each matrix by labels, a number for each node and 
 follows here: one order of the rows, both triangles, and what cannot be.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -8,8 +8,6 @@ first word of 16, or commas. The component 0 is a scalar point, as the modal coo
 Components are along the axes of the basic system, unless a GRID names another one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path

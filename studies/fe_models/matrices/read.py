@@ -14,8 +14,6 @@ are the variable `rows` (n, 2) of a .mat file, or stand beside the files in job_
 dof 0 is a coordinate of no place, as of a mode, whose node may be 0 as well.
 """
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Callable, Mapping
