@@ -15,7 +15,7 @@ from scipy import sparse
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
+from studies.finite_element.pairing import ContactPairs, Contacts, build_contact_pairs
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.scene_error import SceneError
 
@@ -69,13 +69,13 @@ class JointDefinition:
     sector. ties: surfaces that are always glued. pairs: in place of those that `build_contact_pairs` makes.
     """
 
-    contacts: tuple[ContactSurfaces, ...]
+    contacts: Contacts
     held: BoolArray
     load: FloatArray
     responses: Mapping[str, FloatArray]
     cut: CutFaces | None = None
     retainer: Retainer | None = None
-    ties: tuple[ContactSurfaces, ...] = ()
+    ties: Contacts = ()
     constraints: Constraints | None = None
     pairs: ContactPairs | None = None
 

@@ -1,6 +1,7 @@
 """What a user checks of a finite-element model before it is computed with: lines, and a picture of the pairs."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ from scipy.linalg import eigh
 from solver import SolverSettings, march_wear
 from solver.model import BoolArray, FloatArray, IntArray, LinearModel, ReducedModel
 from studies.fe_models.from_files.model import LoadedModel, reduce_model
-from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduced_joint import FeScene
 from studies.scene import Progress, make_compliant, silent
@@ -30,11 +30,9 @@ _SHADES = ("tab:orange", "0.5")  # of the facets with the moving nodes, and of t
 _ASIDE = (1.0, 0.5, 0.4)  # from where a surface is looked at, in its mean frame: neither on edge nor normals on end
 
 
-def describe_model(
-    loaded: LoadedModel, scene: FeScene, parameters: Parameters, progress: Progress = silent
-) -> list[tuple[str, str]]:
+def describe_model(loaded: LoadedModel, scene: FeScene, progress: Progress = silent) -> list[tuple[str, str]]:
     """Label and text of each line. scene: the reduced model. Raises SceneError."""
-    deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.mesh.coordinates
+    parameters, joint, coordinates = loaded.parameters, loaded.joint, loaded.model.mesh.coordinates
     prepared = scene.prepared
     free: BoolArray = np.asarray(~prepared.structure.held.all(axis=1))
     if joint.cut is not None:
@@ -70,7 +68,7 @@ def describe_model(
         listed = ", ".join(map(str, first))
         rows.append(("glued", f"first at nodal diameters {listed}: {_frequencies(np.array([*first.values()]))} Hz"))
     progress("reduction with twice the modes")
-    rows.append(("reduction", _reduction_error(loaded, scene, parameters)))
+    rows.append(("reduction", _reduction_error(loaded, scene)))
     rows += _rigid(loaded, scene, turning[-1])
     total = total_force(loaded, prepared.static_load)
     rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
@@ -78,7 +76,7 @@ def describe_model(
     friction = parameters.friction_coefficient
     stiff = make_compliant(scene.model, parameters.contact_stiffness)
     rows.append(("static", describe_rest(stiff, friction if isinstance(friction, float) else None)))
-    rows += deck.remarks
+    rows += loaded.deck.remarks
     return rows
 
 
@@ -134,14 +132,15 @@ def _sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
 
 
-def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters) -> str:
+def _reduction_error(loaded: LoadedModel, scene: FeScene) -> str:
     """How far frequencies change with twice the modes, where the pairs slide freely and the joint moves most."""
-    k, model = parameters.nodal_diameter, scene.model
+    parameters, model = loaded.parameters, scene.model
+    k = parameters.nodal_diameter
     n_modes = len(model.linear[k].stiffness) - np.count_nonzero(model.contact.dofs >= 0)
     if n_modes < parameters.stuck_modes:
         return f"none: there are no more than {n_modes} modes with the pairs glued"
     more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
-    finer = reduce_model(loaded, more, 1, prepared=scene.prepared).model
+    finer = reduce_model(replace(loaded, parameters=more), 1, prepared=scene.prepared).model
     own, other = (_sliding_frequencies(each.linear[k], each)[:N_FREQUENCIES] for each in (model, finer))
     n = min(len(own), len(other))
     elastic = other[:n] > 1e-3 * other[:n].max()

@@ -11,7 +11,7 @@ from studies.fe_models.deck.contents import Deck, SurfacePair
 from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
-from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.pairing import Contacts, ContactSurfaces
 from studies.finite_element.solid_mesh import SolidMesh
 from studies.finite_element.surfaces import Surface, surface_of_faces, surface_of_nodes, surface_of_points
 from studies.scene_error import SceneError
@@ -115,9 +115,7 @@ def capital(name: str) -> str:
     return name.strip().upper()
 
 
-def find_surfaces(
-    selections: Selections, axis: CyclicAxis | None
-) -> tuple[tuple[ContactSurfaces, ...], tuple[ContactSurfaces, ...]]:
+def find_surfaces(selections: Selections, axis: CyclicAxis | None) -> tuple[Contacts, Contacts]:
     """Surfaces in contact, at least one pair, that the study names, else those of CONTACT PAIR, else those of TIE.
 
     Then those that are glued for good: other ties, and contact pairs that the deck glues and the study does not name.

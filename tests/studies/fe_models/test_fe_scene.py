@@ -279,8 +279,6 @@ def test_a_long_body_that_turns_freely_is_not_held():
 
 def test_what_cannot_be_is_said():
     model, joint = plates()
-    with pytest.raises(SceneError, match="nothing holds the glued structure"):
-        build_fe_scene(model, replace(joint, held=np.zeros_like(joint.held)), ReductionOptions(), 1)
     with pytest.raises(SceneError, match=r"nodal_diameter: 2; only a cyclic sector has one"):
         build_fe_scene(model, joint, ReductionOptions(nodal_diameter=2), 1)
     # free along x, in matrices of few digits, which hold it or push it
@@ -293,8 +291,6 @@ def test_what_cannot_be_is_said():
         with pytest.raises(SceneError, match="stiffness is singular, as far as the digits of the matrices tell"):
             prepare_model(free, loose).frequencies(0, 1)
     sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 2, 1))
-    with pytest.raises(SceneError, match="use at most n_sectors // 2 = 6"):
-        build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=7), 1)
     mass = assemble_mass(sector.mesh)
     softened = assemble_stiffness(sector.mesh) + spin_softening(mass, Rotation(1e9, np.zeros(3), Z))
     fast = FeModel(sector.mesh, forms={"stiffness": softened, "mass": mass})

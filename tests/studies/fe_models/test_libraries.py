@@ -104,14 +104,6 @@ def test_elements_of_a_cdb_in_another_form(tmp_path, form):
         read_mesh_file(path)
 
 
-def test_meshes_by_their_ending(tmp_path):
-    assert read_mesh_file(write(tmp_path, "*NODE\n1,0,0,0\n", "mesh.inp")).node_numbers.tolist() == [1]
-    with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):
-        read_mesh_file(tmp_path / "mesh.med")
-    with pytest.raises(SceneError, match=r"there is no file none.cdb"):
-        read_mesh_file(tmp_path / "none.cdb")
-
-
 @pytest.mark.parametrize("library", ["meshio", "ansys.mapdl.reader"])
 def test_missing_library(tmp_path, monkeypatch, library):
     monkeypatch.setitem(sys.modules, library, None)
