@@ -55,15 +55,13 @@ class PreparedModel:
 
     def solve_static(self, load: FloatArray) -> FloatArray:
         """Displacements (3 n_nodes,), m, of the glued structure at nodal diameter 0 under a load (3 n_nodes,), N."""
-        coordinates = self.structure.coordinates(0)
-        _, factor = self._factorise(coordinates, 0)
+        coordinates, _, factor = self._factorise(0)
         glued = coordinates.glued
         return np.asarray(glued @ factor.solve((glued.T @ load)[:, None])[:, 0])
 
     def frequencies(self, nodal_diameter: int, n_modes: int, stiffness: str = "stiffness") -> FloatArray:
         """Lowest natural frequencies (n_modes,) of the glued structure, Hz, ascending. stiffness: name of the form."""
-        coordinates = self.structure.coordinates(nodal_diameter)
-        form, factor = self._factorise(coordinates, nodal_diameter, stiffness)
+        coordinates, form, factor = self._factorise(nodal_diameter, stiffness)
         mass = _projected(coordinates.glued, self.forms["mass"])
         return _lowest_modes(form, mass, factor, n_modes)[0] / (2.0 * np.pi)
 
@@ -78,9 +76,8 @@ class PreparedModel:
         n_modes: stuck modes, at least 1; there are fewer where the structure has fewer. vectors (3 n_nodes, n_vectors):
         nodal forces.
         """
-        coordinates = self.structure.coordinates(nodal_diameter)
+        coordinates, stiffness, factor = self._factorise(nodal_diameter)
         glued, relative = coordinates.glued, coordinates.relative
-        stiffness, factor = self._factorise(coordinates, nodal_diameter)
         shapes = _static_shapes(coordinates, self.forms["stiffness"], factor)
         frequencies, modes = _lowest_modes(stiffness, _projected(glued, self.forms["mass"]), factor, n_modes)
         moved, forms = glued @ modes, {}
@@ -125,10 +122,9 @@ class PreparedModel:
             sums[names[node]] = sums.get(names[node], 0.0) + shares[3 * node : 3 * node + 3].sum()
         return float(np.sqrt(worst) / (2.0 * np.pi)), max(sums, key=lambda name: sums[name], default="")
 
-    def _factorise(
-        self, coordinates: Coordinates, nodal_diameter: int, name: str = "stiffness"
-    ) -> tuple[sparse.csr_matrix, Factor]:
-        """A stiffness with the pairs glued, and its factors."""
+    def _factorise(self, nodal_diameter: int, name: str = "stiffness") -> tuple[Coordinates, sparse.csr_matrix, Factor]:
+        """Coordinates at a nodal diameter, a stiffness with the pairs glued, and its factors."""
+        coordinates = self.structure.coordinates(nodal_diameter)
         stiffness = _projected(coordinates.glued, self.forms[name])
         if not self.dissections:
             # where phases cancel at one of these diameters they do not at the other
@@ -136,7 +132,7 @@ class PreparedModel:
             everything = _projected(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
             self.dissections.append(dissect(everything, coordinates.node, self.positions))
         try:
-            return stiffness, factorise(stiffness, self.dissections[0], self.rounding)
+            return coordinates, stiffness, factorise(stiffness, self.dissections[0], self.rounding)
         except NotPositiveDefiniteError as error:
             at = f"at nodal diameter {nodal_diameter}"
             if error.unstable:

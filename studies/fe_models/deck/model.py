@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.fe_models.deck.contents import NODES_OF_KIND, CyclicSymmetry, Deck, Material, SurfacePair
+from studies.fe_models.deck.contents import NODES_OF_KIND, CyclicSymmetry, Deck, Material, RigidMotion, SurfacePair
 from studies.fe_models.deck.keywords import Block
 from studies.fe_models.deck.mesh import Draft, Mesh, Records
 from studies.fe_models.deck.sets import NONE, Numbers
@@ -93,6 +93,13 @@ class Model:
         for name in list(self.fields):
             if step.writes or (name in ("forces", "pressures", "gravity") and not step.loads_count):
                 self.fields[name] = step.before.get(name, {})
+
+    def follow(self, place: Place, nodes: IntArray, dofs: tuple[int, ...], reference: int, rotation: int = 0) -> None:
+        """Nodes that follow a reference node; rotation: -1 where they do not turn with it, else as in `RigidMotion`."""
+        nodes = nodes[(nodes != reference) & (nodes != rotation)]
+        if not nodes.size:
+            raise place.wrong("no node follows the reference node", "give the nodes that are rigid")
+        self.add("rigid_motions", RigidMotion(str(place), nodes, dofs, reference, max(rotation, 0), rotation >= 0))
 
     def deck(self) -> Deck:
         """The deck. Raises SceneError where names are missing or do not fit."""
