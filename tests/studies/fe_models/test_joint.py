@@ -135,6 +135,8 @@ def test_wrong_surfaces_are_named():
     mesh, low, up = blocks_on_each_other("C3D8", "C3D8", (2, 2, 1), (3, 3, 1), lift=0.02)
     with pytest.raises(SceneError, match=r"16 of 16 nodes of UP are farther than 0\.01 m from LOW"):
         build_contact_pairs(mesh, [ContactSurfaces(low, up, tolerance=0.01)], Z)
+    with pytest.raises(SceneError, match="LOW and LOW share 9 nodes"):
+        build_contact_pairs(mesh, [ContactSurfaces(low, low)], Z)
     with pytest.raises(SceneError, match=r"face S5 of element 1 \(C3D4\)"):
         surfaces.surface_of_faces(block("C3D4", (1, 1, 1))[0], "S", np.array([1]), np.array([5]))
     with pytest.raises(SceneError, match="names element 99"):
