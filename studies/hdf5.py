@@ -3,8 +3,6 @@
 No link, external storage or virtual dataset is followed: what is missing behind these would be read as zeros.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ What is legal and may surprise: a massless displacement that has stiffness, a ri
 contact can hold, a negative gap (interference), a stiffness that is not positive definite (spin softening).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -106,7 +104,10 @@ def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
     for name, (values, _) in parts.items():
         _refuse(prefix + name, values, ~np.isfinite(values), "give finite numbers")
     for name in ("stiffness", "mass", "damping"):
-        _check_hermitian(prefix + name, parts[name][0])
+        if places := find_asymmetry(matrix := parts[name][0]):
+            word, (row, column) = "Hermitian" if np.iscomplexobj(matrix) else "symmetric", places
+            entries = f"{matrix[row, column]} at {row}, {column} but {matrix[column, row]} at {column}, {row}"
+            raise SceneError(prefix + name, f"not {word}: {entries}", f"give a {word} matrix")
     if np.iscomplexobj(linear.load_static):
         raise SceneError(f"{prefix}load/static", "complex", "give real forces")
 
@@ -145,14 +146,6 @@ def _refuse(key: str, values: NDArray[Any], wrong: NDArray[np.bool_], remedy: st
     if len(places):
         at = ", ".join(str(int(index)) for index in places[0])
         raise SceneError(key, f"{values[tuple(places[0])]} at index {at}", remedy)
-
-
-def _check_hermitian(key: str, matrix: Matrix) -> None:
-    if places := find_asymmetry(matrix):
-        row, column = places
-        word = "Hermitian" if np.iscomplexobj(matrix) else "symmetric"
-        entries = f"{matrix[row, column]} at {row}, {column} but {matrix[column, row]} at {column}, {row}"
-        raise SceneError(key, f"not {word}: {entries}", f"give a {word} matrix")
 
 
 def _is_singular(matrix: NDArray[Any]) -> bool:

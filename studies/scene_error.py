@@ -1,7 +1,5 @@
 """The error that a user can cause with a scene: wrong parameters or a wrong scene file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -10,8 +10,6 @@ For pictures a file may hold outer faces of the mesh, without influence on the m
 pairs of one surface are (`contact/position`) are drawn in contact, as are faces of other bodies that lie on these.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -98,7 +96,20 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
 def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
     """The mesh of a scene file, None where it has none. Raises what `read_scene` raises."""
     with _open_scene(Path(path), group) as (_, datasets, _):
-        return _read_mesh(datasets) if any(key.startswith("mesh/") for key in datasets) else None
+        if not any(key.startswith("mesh/") for key in datasets):
+            return None
+        axes = [read_dataset(datasets, f"mesh/{axis}", "real") for axis in "xyz"]
+        for axis, values in zip("xyz", axes, strict=True):
+            if values.shape != (axes[0].size,) or not np.isfinite(values).all():
+                raise SceneError(f"mesh/{axis}", f"shape {values.shape}", "give one finite number for each node")
+        quads = read_dataset(datasets, "mesh/quad", "whole")
+        if quads.ndim != 2 or quads.shape[1] != 4:
+            raise SceneError("mesh/quad", f"shape {quads.shape}", "give one row of 4 nodes for each face")
+        _check_indices("mesh/quad", quads, axes[0].size)
+        parts = read_dataset(datasets, "mesh/part", "text")
+        if len(parts) != len(quads):
+            raise SceneError("mesh/part", f"{len(parts)} labels", f"give one label for each of {len(quads)} faces")
+        return SurfaceMesh(np.stack(axes, axis=1), quads, parts)
 
 
 def read_origin(path: str | Path) -> dict[str, str]:
@@ -125,21 +136,6 @@ def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets, 
                 where = "" if prefixes == {0: ""} else ", the latter in nd/<nodal diameter>/"
                 raise SceneError(key, "unknown dataset", remedy + where)
         yield root, datasets, prefixes
-
-
-def _read_mesh(datasets: Datasets) -> SurfaceMesh:
-    axes = [read_dataset(datasets, f"mesh/{axis}", "real") for axis in "xyz"]
-    for axis, values in zip("xyz", axes, strict=True):
-        if values.shape != (axes[0].size,) or not np.isfinite(values).all():
-            raise SceneError(f"mesh/{axis}", f"shape {values.shape}", "give one finite number for each node")
-    quads = read_dataset(datasets, "mesh/quad", "whole")
-    if quads.ndim != 2 or quads.shape[1] != 4:
-        raise SceneError("mesh/quad", f"shape {quads.shape}", "give one row of 4 nodes for each face")
-    _check_indices("mesh/quad", quads, axes[0].size)
-    parts = read_dataset(datasets, "mesh/part", "text")
-    if len(parts) != len(quads):
-        raise SceneError("mesh/part", f"{len(parts)} labels", f"give one label for each of {len(quads)} faces")
-    return SurfaceMesh(np.stack(axes, axis=1), quads, parts)
 
 
 def _check_indices(key: str, indices: NDArray[np.int64], n: int) -> None:

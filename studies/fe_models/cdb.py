@@ -3,8 +3,6 @@
 Commands that may change the model and are not acted upon are refused.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator
@@ -70,8 +68,9 @@ _OPTIONS = {
     "3": ((185, 186, 190), "elements of layers (key option 3)", "use homogeneous solid elements"),
 }
 _ELEMENTS = f"use solid elements: {', '.join(map(str, sorted(_TYPES)))}; delete contact elements (169 to 178: EDELE)"
-_KEYS = "rotation_speed, axis, n_sectors, material, preload or matrices"
-_REMEDY = f"delete it, and give {_KEYS} in the study where it matters"
+_REMEDY = (
+    "delete it, and give rotation_speed, axis, n_sectors, material, preload or matrices in the study where it matters"
+)
 _FREE = "export without constraint equations: CEDELE,ALL and CPDELE,ALL"
 _IN_BLOCKS = "write nodes and elements in blocks: CDWRITE,DB,file,cdb"
 _AGAIN = "let ANSYS read the file and write it again, in the form EBLOCK,19,SOLID: CDWRITE,DB,file,cdb"
@@ -127,12 +126,11 @@ def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
         archive.node_components.items(),
         archive.element_components.items(),
     )
-    held = commands.held.items()
     return replace(
         deck,
         boundaries=tuple(
             NodalValue(f"{path.name}: D", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
-            for (label, value), nodes in held
+            for (label, value), nodes in commands.held.items()
         ),
         notes=tuple(f"Elements of type {kind} are passed over." for kind in sorted(passed)),
         unassembled=(several,) if len(materials) > 1 else (),
@@ -166,7 +164,14 @@ def _read_commands(path: Path) -> _Commands:
             number, option, value, *_ = [*fields[1:], "", "", ""]
             _check_option(found.kinds.get(int(number) if number.isdigit() else 0, (0, place))[0], option, value, place)
         elif command == "D":
-            _add_displacement(found, fields, place)
+            node, label, value, *more = [*fields[1:], *[""] * 8]
+            moved = to_float(value or "0")
+            if not node.isdigit() or label not in _DIRECTIONS or any(more[1:]) or math.isnan(moved):
+                what = f"D of {shown(node)}, {shown(label)} = {shown(value)}"
+                raise place.wrong(
+                    what, "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read"
+                )
+            found.held.setdefault((label, moved), []).append(int(node))
         elif command == "EBLO" and "SOLID" not in fields:
             raise place.wrong(f"{shown(','.join(fields))}: elements in this form are not read", _AGAIN)
         elif not _is_skipped(command, fields):
@@ -188,17 +193,6 @@ def _check_option(kind: int, option: str, value: str, place: Place) -> None:
     kinds, what, remedy = _OPTIONS.get(option, ((), "", ""))
     if value == "1" and kind in kinds:
         raise place.wrong(what, remedy)
-
-
-def _add_displacement(found: _Commands, fields: list[str], place: Place) -> None:
-    """A command D."""
-    fields = [*fields, *[""] * 8]
-    node, label, value = fields[1:4]
-    moved = to_float(value or "0")
-    if not node.isdigit() or label not in _DIRECTIONS or any(fields[5:]) or math.isnan(moved):
-        what = f"D of {shown(node)}, {shown(label)} = {shown(value)}"
-        raise place.wrong(what, "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read")
-    found.held.setdefault((label, moved), []).append(int(node))
 
 
 def _lines(path: Path) -> Iterator[tuple[list[str], Place]]:

@@ -1,7 +1,5 @@
 """Files of other programs: those of a model, its units, numbers in them, and what is wrong in them, in one sentence."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io

@@ -5,9 +5,7 @@ them; of nodes that touch area, normal_x, normal_y, normal_z out of the body, an
 interference. All are in the units of the model.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -55,32 +53,26 @@ def read_mesh_file(path: Path) -> Deck:
 def _read_gmsh(path: Path) -> Deck:
     """The mesh of a .msh file, whether all of it belongs to physical groups or not. Raises SceneError."""
     with library_errors(path, "meshio", "meshio", "model"):
-        return _gmsh_deck(path, _meshio_mesh(path))
+        import meshio
+        from meshio._mesh import topological_dimension
+        from meshio.gmsh import _gmsh41
+
+        # meshio 5.3.5 knows the order of their nodes, but cannot store them for want of their dimension
+        for missing in ("wedge15", "pyramid13"):
+            topological_dimension.setdefault(missing, _SOLID)
+        own = _gmsh41._read_elements
+
+        def read_elements(*given: Any) -> Any:
+            cells, tags, sets = own(*given)
+            return cells, {name: each for name, each in tags.items() if len(each) == len(cells)}, sets
+
+        # meshio 5.3.5 lists no tags of entities without a physical group, and then refuses the list as too short; the
+        # named groups are in the sets as well
+        with patch.object(_gmsh41, "_read_elements", read_elements):
+            return _gmsh_deck(path.name, meshio.read(path, file_format="gmsh"), topological_dimension)
 
 
-def _meshio_mesh(path: Path) -> Any:
-    import meshio
-    from meshio._mesh import topological_dimension
-    from meshio.gmsh import _gmsh41
-
-    # meshio 5.3.5 knows the order of their nodes, but cannot store them for want of their dimension
-    for missing in ("wedge15", "pyramid13"):
-        topological_dimension.setdefault(missing, _SOLID)
-    own = _gmsh41._read_elements
-
-    def read_elements(*given: Any) -> Any:
-        cells, tags, sets = own(*given)
-        return cells, {name: each for name, each in tags.items() if len(each) == len(cells)}, sets
-
-    # meshio 5.3.5 lists no tags of entities without a physical group, and then refuses the list as too short; the named
-    # groups are in the sets as well
-    with patch.object(_gmsh41, "_read_elements", read_elements):
-        return meshio.read(path, file_format="gmsh")
-
-
-def _gmsh_deck(path: Path, mesh: Any) -> Deck:
-    from meshio._mesh import topological_dimension
-
+def _gmsh_deck(name: str, mesh: Any, dimensions: Mapping[str, int]) -> Deck:
     points = np.asarray(mesh.points, dtype=np.float64)
     blocks: list[tuple[str, IntArray, IntArray]] = []
     node_sets: list[tuple[str, IntArray]] = []
@@ -89,20 +81,20 @@ def _gmsh_deck(path: Path, mesh: Any) -> Deck:
     for place, block in enumerate(mesh.cells):
         nodes = np.asarray(block.data, dtype=np.int64) + 1
         numbers = None
-        if topological_dimension[block.type] == _SOLID:
+        if dimensions[block.type] == _SOLID:
             if block.type not in _KINDS:
                 remedy = "mesh with tetrahedra, wedges and hexahedra, Mesh.SecondOrderIncomplete = 1"
-                raise SceneError("model", f"{path.name} has elements of type {block.type}", remedy)
+                raise SceneError("model", f"{name} has elements of type {block.type}", remedy)
             # format 2.2 writes an element once for each of its groups
             before = len(numbered)
             numbers = np.array([numbered.setdefault(row.tobytes(), len(numbered) + 1) for row in nodes], dtype=np.int64)
             new, first = np.unique(numbers, return_index=True)
             blocks.append((_KINDS[block.type], new[new > before], nodes[first[new > before]]))
-        for name, members in _groups(mesh, place, len(nodes)):
-            node_sets.append((name, np.unique(nodes[members])))
+        for group, members in _groups(mesh, place, len(nodes)):
+            node_sets.append((group, np.unique(nodes[members])))
             if numbers is not None:
-                element_sets.append((name, numbers[members]))
-    return deck_of_arrays(path.name, (np.arange(1, len(points) + 1), points), blocks, node_sets, element_sets)
+                element_sets.append((group, numbers[members]))
+    return deck_of_arrays(name, (np.arange(1, len(points) + 1), points), blocks, node_sets, element_sets)
 
 
 def _groups(mesh: Any, place: int, n_cells: int) -> Iterator[tuple[str, IntArray]]:

@@ -1,7 +1,5 @@
 """Linear constraints: displacements that depend on others."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -63,16 +61,12 @@ def resolve(steps: sparse.csr_matrix) -> sparse.csr_matrix | None:
 
 
 def eliminate(
-    entries: Sequence[Dependence],
-    held: BoolArray,
-    oblique: Mapping[int, FloatArray],
-    numbers: IntArray,
-    n_with_elements: int,
+    entries: Sequence[Dependence], held: BoolArray, oblique: Mapping[int, FloatArray], numbers: IntArray, n_in_mesh: int
 ) -> tuple[Constraints, BoolArray]:
     """Constraints, and which displacements (n_nodes, 3) are 0 or follow others.
 
     held (n_nodes, 3): displacements that are 0. oblique: as in `Constraints`. numbers (n_nodes,): of the nodes in the
-    file. n_with_elements: number of nodes with elements; motions of the others that move none of these are 0. Raises
+    file. n_in_mesh: number of nodes with elements; motions of the others that move none of these are 0. Raises
     SceneError where a displacement depends twice, on itself, or is held as well.
     """
     size, none = held.size, np.empty(0, dtype=np.int64)
@@ -98,7 +92,7 @@ def eliminate(
         idle[own] = sizes > 0.5
         turns.append((own, directions - np.eye(3)))
     axes = sparse.eye(size, format="csr") + _blocks(size, turns)
-    axes = axes @ _sorted_out(total @ axes, fixed, 3 * n_with_elements, idle)
+    axes = axes @ _sorted_out(total @ axes, fixed, 3 * n_in_mesh, idle)
     moved = total @ axes @ sparse.diags((~(fixed | idle)).astype(float), format="csr")
     moved.eliminate_zeros()
     moves = np.zeros(size, dtype=np.bool_)

@@ -1,7 +1,5 @@
 """Cut faces of a cyclic sector: nodes that are images of each other under rotation by one sector."""
 
-from __future__ import annotations
-
 import cmath
 from dataclasses import dataclass
 
@@ -67,20 +65,15 @@ class CutFaces:
     def across(self, sectors: IntArray, nodal_diameter: int) -> sparse.bsr_matrix:
         """Factors (3 n, 3 n) from displacements of points (n,) in this sector to those of their images.
 
-        sectors (n,): how far the images are from this sector.
+        sectors (n,): how far the images are from this sector. nodal_diameter: k in 0..n_sectors // 2; the phase
+        `exp(i 2 pi k / N)` is real at both ends.
         """
+        n = self.axis.n_sectors
+        phase = {0: 1.0, n / 2: -1.0}.get(nodal_diameter, cmath.exp(2j * np.pi * nodal_diameter / n))
         steps, which = np.unique(sectors, return_inverse=True)
-        blocks = np.array([self.phase(nodal_diameter) ** int(each) * self.axis.pitch(int(each)) for each in steps])
+        blocks = np.array([phase ** int(each) * self.axis.pitch(int(each)) for each in steps])
         each = np.arange(len(sectors) + 1)
         return sparse.bsr_matrix((blocks[which], each[:-1], each))
-
-    def phase(self, nodal_diameter: int) -> complex | float:
-        """`exp(i 2 pi k / N)` of a nodal diameter in 0..n_sectors // 2, real at both ends."""
-        if nodal_diameter == 0:
-            return 1.0
-        if 2 * nodal_diameter == self.axis.n_sectors:
-            return -1.0
-        return cmath.exp(2j * np.pi * nodal_diameter / self.axis.n_sectors)
 
 
 def match_cut_faces(mesh: SolidMesh, axis: CyclicAxis, first: IntArray, second: IntArray) -> CutFaces:

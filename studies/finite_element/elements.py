@@ -4,9 +4,7 @@ Tetrahedra and wedges live on the triangle `xi, eta >= 0, xi + eta <= 1`, wedges
 the cube from -1 to 1. Shape functions are the polynomials of a given space that are 1 at one node and 0 at the others.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -63,13 +61,10 @@ class ReferenceElement:
         return result
 
 
-def _exponents(allowed: Iterable[tuple[int, ...]]) -> IntArray:
-    return np.array(sorted(allowed, key=lambda powers: (sum(powers), powers)), dtype=np.int64)
-
-
-def _complete(degree: int) -> IntArray:
-    """All monomials up to a total degree."""
-    return _exponents(powers for powers in product(range(degree + 1), repeat=3) if sum(powers) <= degree)
+def _powers(allowed: Callable[..., bool]) -> IntArray:
+    """Exponents of the monomials that are allowed, each of a coordinate at most 2."""
+    chosen = [each for each in product(range(3), repeat=3) if allowed(*each)]
+    return np.array(sorted(chosen, key=lambda each: (sum(each), each)), dtype=np.int64)
 
 
 _TET_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
@@ -77,19 +72,16 @@ _WEDGE_CORNERS = np.array([[0, 0, -1], [1, 0, -1], [0, 1, -1], [0, 0, 1], [1, 0,
 _TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
 _WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
 _HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-# The wedge with 15 nodes: quadratic in the triangle times linear along zeta, and zeta squared times linear.
-_WEDGE_15 = [(a, b, c) for a, b, c in product(range(3), repeat=3) if a + b <= 2 and (c < 2 or a + b <= 1)]
-# The serendipity hexahedron: of what is more than linear in one direction, no more than the square.
-_HEX_20 = [powers for powers in product(range(3), repeat=3) if sum(power for power in powers if power > 1) <= 2]
 
-TET_4 = ReferenceElement(_TET_CORNERS, (), _complete(1))
-TET_10 = ReferenceElement(_TET_CORNERS, _TET_EDGES, _complete(2))
-WEDGE_6 = ReferenceElement(
-    _WEDGE_CORNERS, (), _exponents((a, b, c) for a, b, c in product(range(2), repeat=3) if a + b <= 1)
-)
-WEDGE_15 = ReferenceElement(_WEDGE_CORNERS, _WEDGE_EDGES, _exponents(_WEDGE_15))
-HEX_8 = ReferenceElement(CORNERS, (), _exponents(product(range(2), repeat=3)))
-HEX_20 = ReferenceElement(CORNERS, _HEX_EDGES, _exponents(_HEX_20))
+TET_4 = ReferenceElement(_TET_CORNERS, (), _powers(lambda *each: sum(each) <= 1))
+TET_10 = ReferenceElement(_TET_CORNERS, _TET_EDGES, _powers(lambda *each: sum(each) <= 2))
+WEDGE_6 = ReferenceElement(_WEDGE_CORNERS, (), _powers(lambda a, b, c: a + b <= 1 and c <= 1))
+# quadratic in the triangle times linear along zeta, and zeta squared times linear
+_WEDGE_15 = _powers(lambda a, b, c: a + b <= 2 and (c < 2 or a + b <= 1))
+WEDGE_15 = ReferenceElement(_WEDGE_CORNERS, _WEDGE_EDGES, _WEDGE_15)
+HEX_8 = ReferenceElement(CORNERS, (), _powers(lambda *each: max(each) <= 1))
+# serendipity: of what is more than linear in one direction, no more than the square
+HEX_20 = ReferenceElement(CORNERS, _HEX_EDGES, _powers(lambda *each: sum(n for n in each if n > 1) <= 2))
 
 
 @dataclass(frozen=True)

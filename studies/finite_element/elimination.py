@@ -10,8 +10,6 @@ that of mesh 4 46 CPU s and 2.1 GB; with this elimination 2.5 CPU s, and 10 CPU 
 fast, and knows no Hermitian matrices; CHOLMOD has no wheels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

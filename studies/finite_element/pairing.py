@@ -64,6 +64,10 @@ class ContactSurfaces:
         return replace(self, first=self.second, second=self.first, sector=-self.sector, label=self.name)
 
 
+Contacts = tuple[ContactSurfaces, ...]
+"""Several pairs of surfaces."""
+
+
 @dataclass(frozen=True)
 class ContactPairs:
     """Contact pairs; the relative displacement is that of the moving node minus that of the opposite point.
@@ -167,10 +171,7 @@ def build_contact_pairs(
 
 
 def match_nodes(
-    mesh: SolidMesh,
-    contacts: Sequence[ContactSurfaces],
-    given: tuple[FloatArray, FloatArray, FloatArray],
-    axis: CyclicAxis | None,
+    mesh: SolidMesh, contacts: Contacts, given: tuple[FloatArray, FloatArray, FloatArray], axis: CyclicAxis | None
 ) -> ContactPairs:
     """As `build_contact_pairs`, of nodes of the first surface that meet nodes of the second, as reduced matrices have.
 

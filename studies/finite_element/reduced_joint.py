@@ -1,7 +1,5 @@
 """From a finite-element model of a joint to its reduced model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
@@ -9,44 +7,25 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
+from studies.finite_element import solid_mesh
 from studies.finite_element.elimination import rounding_of
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduction import PreparedModel
-from studies.finite_element.solid_mesh import (
-    assemble_mass,
-    assemble_stiffness,
-    assemble_tangent_stiffness,
-    centrifugal_load,
-    check_elements,
-    spin_softening,
-)
-from studies.finite_element.structure import (
-    FeModel,
-    JointDefinition,
-    ReductionOptions,
-    Retainer,
-    Structure,
-    build_structure,
-)
+from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Structure, build_structure
 from studies.scene import Progress, silent
 from studies.scene_error import SceneError
 
 
 @dataclass(frozen=True)
 class FeScene:
-    """A reduced model, what it was reduced from, and frequencies of the glued structure.
+    """A reduced model, what it was reduced from, with the pairs in the order of the model, and frequencies.
 
-    glued_frequencies: Hz, ascending, by nodal diameter.
+    glued_frequencies: of the glued structure, Hz, ascending, by nodal diameter.
     """
 
     model: ReducedModel
     prepared: PreparedModel
     glued_frequencies: Mapping[int, FloatArray]
-
-    @property
-    def pairs(self) -> ContactPairs:
-        """Contact pairs in the order of the model."""
-        return self.prepared.structure.pairs
 
 
 def build_fe_scene(
@@ -89,7 +68,7 @@ def build_fe_scene(
             linear[k] = LinearModel(
                 mass=forms["mass"],
                 damping=forms.get("damping", damping * forms.get("elastic", forms["stiffness"])),
-                stiffness=_retained(forms["stiffness"], prepared.pairs, joint.retainer),
+                stiffness=_retained(forms["stiffness"], prepared.pairs, joint),
                 load_static=static.real * (k == 0),
                 load_harmonic=load.astype(complex) * (k == excited),
                 response=np.array(responses).conj(),
@@ -105,14 +84,14 @@ def prepare_model(model: FeModel, joint: JointDefinition, progress: Progress = s
     mesh, rotation, structure, forms = model.mesh, model.rotation, build_structure(model, joint), model.forms
     if forms is None:
         progress("assembly of stiffness and mass")
-        check_elements(mesh)
-        forms = {"stiffness": assemble_stiffness(mesh), "mass": assemble_mass(mesh)}
+        solid_mesh.check_elements(mesh)
+        forms = {"stiffness": solid_mesh.assemble_stiffness(mesh), "mass": solid_mesh.assemble_mass(mesh)}
     mass, placed = forms["mass"], ~np.isnan(mesh.coordinates)
     load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
     if model.gravity is not None:
         load = load + mass @ (placed * model.gravity).ravel()
     if rotation is not None:
-        spin = centrifugal_load(mass, mesh.coordinates, rotation)
+        spin = solid_mesh.centrifugal_load(mass, mesh.coordinates, rotation)
         load = load + spin
     along_x = placed * np.array([1.0, 0.0, 0.0])
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
@@ -124,8 +103,8 @@ def prepare_model(model: FeModel, joint: JointDefinition, progress: Progress = s
     progress("static state of the glued structure under the centrifugal load")
     displacements = prepared.solve_static(spin)
     progress("assembly of the prestressed stiffness")
-    stressed = assemble_tangent_stiffness(mesh, displacements)
-    stiffness = (stressed + spin_softening(mass, rotation)).tocsr()
+    stressed = solid_mesh.assemble_tangent_stiffness(mesh, displacements)
+    stiffness = (stressed + solid_mesh.spin_softening(mass, rotation)).tocsr()
     return replace(prepared, forms={"stiffness": stiffness, "mass": mass, "elastic": forms["stiffness"]})
 
 
@@ -165,9 +144,9 @@ def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
     )
 
 
-def _retained(stiffness: Matrix, pairs: ContactPairs, retainer: Retainer | None) -> Matrix:
+def _retained(stiffness: Matrix, pairs: ContactPairs, joint: JointDefinition) -> Matrix:
     """Reduced stiffness with the retainer."""
-    if retainer is None:
+    if (retainer := joint.retainer) is None:
         return stiffness
     direction = retainer.direction / np.linalg.norm(retainer.direction)
     row = np.zeros(len(stiffness))

@@ -4,8 +4,6 @@ The static shapes of the relative displacements, and the lowest modes of the glu
 stiffness couples no mode with a shape. One factorisation of the glued stiffness at a nodal diameter gives both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -57,15 +55,13 @@ class PreparedModel:
 
     def solve_static(self, load: FloatArray) -> FloatArray:
         """Displacements (3 n_nodes,), m, of the glued structure at nodal diameter 0 under a load (3 n_nodes,), N."""
-        coordinates = self.structure.coordinates(0)
-        _, factor = self._factorise(coordinates, 0)
+        coordinates, _, factor = self._factorise(0)
         glued = coordinates.glued
         return np.asarray(glued @ factor.solve((glued.T @ load)[:, None])[:, 0])
 
     def frequencies(self, nodal_diameter: int, n_modes: int, stiffness: str = "stiffness") -> FloatArray:
         """Lowest natural frequencies (n_modes,) of the glued structure, Hz, ascending. stiffness: name of the form."""
-        coordinates = self.structure.coordinates(nodal_diameter)
-        form, factor = self._factorise(coordinates, nodal_diameter, stiffness)
+        coordinates, form, factor = self._factorise(nodal_diameter, stiffness)
         mass = _projected(coordinates.glued, self.forms["mass"])
         return _lowest_modes(form, mass, factor, n_modes)[0] / (2.0 * np.pi)
 
@@ -80,9 +76,8 @@ class PreparedModel:
         n_modes: stuck modes, at least 1; there are fewer where the structure has fewer. vectors (3 n_nodes, n_vectors):
         nodal forces.
         """
-        coordinates = self.structure.coordinates(nodal_diameter)
+        coordinates, stiffness, factor = self._factorise(nodal_diameter)
         glued, relative = coordinates.glued, coordinates.relative
-        stiffness, factor = self._factorise(coordinates, nodal_diameter)
         shapes = _static_shapes(coordinates, self.forms["stiffness"], factor)
         frequencies, modes = _lowest_modes(stiffness, _projected(glued, self.forms["mass"]), factor, n_modes)
         moved, forms = glued @ modes, {}
@@ -98,10 +93,38 @@ class PreparedModel:
             forms[name] = np.asarray(0.5 * (whole + whole.conj().T))
         return frequencies, forms, np.concatenate([shapes.conj().T @ vectors, moved.conj().T @ vectors])
 
-    def _factorise(
-        self, coordinates: Coordinates, nodal_diameter: int, name: str = "stiffness"
-    ) -> tuple[sparse.csr_matrix, Factor]:
-        """A stiffness with the pairs glued, and its factors."""
+    def find_resistance(self, motions: FloatArray) -> tuple[float, str]:
+        """How much constraints resist a motion as one body, Hz, and which of them resists most; 0 where none does.
+
+        motions (3 n_nodes, 6): three translations and three turns, of a cyclic sector about a point on its axis. Where
+        some displacements of a motion r depend on others, all that follow these are e away from it: the frequency is
+        that of the strain energy, `omega^2 = e^H K e / (r^H M r)`. What is held does not count. Of a cyclic sector the
+        motions across the axis are waves of nodal diameter 1.
+        """
+        structure, ways = self.structure, {0: np.eye(3)}
+        if structure.cut is not None:
+            axis = structure.cut.axis.axis
+            across = np.linalg.svd(axis[None])[2][1]
+            ways = {0: axis[:, None], 1: (across + 1j * np.cross(axis, across))[:, None]}
+        worst, shares = 0.0, np.zeros(len(motions))
+        for nodal_diameter, way in ways.items():
+            for motion in np.hstack([motions[:, :3] @ way, motions[:, 3:] @ way]).T:
+                apart, total = structure.deviation(motion, nodal_diameter)
+                forces = self.forms.get("elastic", self.forms["stiffness"]) @ (total @ apart)
+                own = ((total.conj().T @ forces).conj() * apart).real
+                inertia = np.vdot(motion, self.forms["mass"] @ motion).real
+                if inertia > 0.0 and own.sum() > worst * inertia:
+                    worst, shares = own.sum() / inertia, own
+        names = {**structure.constraints.origin}
+        names.update(zip(structure.followers.tolist(), structure.labels, strict=True))
+        sums: dict[str, float] = {}
+        for node in np.flatnonzero(shares.reshape(-1, 3).any(axis=1)).tolist():
+            sums[names[node]] = sums.get(names[node], 0.0) + shares[3 * node : 3 * node + 3].sum()
+        return float(np.sqrt(worst) / (2.0 * np.pi)), max(sums, key=lambda name: sums[name], default="")
+
+    def _factorise(self, nodal_diameter: int, name: str = "stiffness") -> tuple[Coordinates, sparse.csr_matrix, Factor]:
+        """Coordinates at a nodal diameter, a stiffness with the pairs glued, and its factors."""
+        coordinates = self.structure.coordinates(nodal_diameter)
         stiffness = _projected(coordinates.glued, self.forms[name])
         if not self.dissections:
             # where phases cancel at one of these diameters they do not at the other
@@ -109,7 +132,7 @@ class PreparedModel:
             everything = _projected(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
             self.dissections.append(dissect(everything, coordinates.node, self.positions))
         try:
-            return stiffness, factorise(stiffness, self.dissections[0], self.rounding)
+            return coordinates, stiffness, factorise(stiffness, self.dissections[0], self.rounding)
         except NotPositiveDefiniteError as error:
             at = f"at nodal diameter {nodal_diameter}"
             if error.unstable:

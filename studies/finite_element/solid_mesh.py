@@ -89,6 +89,12 @@ class Rotation:
         return np.asarray(np.eye(3) - np.outer(self.axis, self.axis))
 
 
+def rigid_motions(points: FloatArray) -> FloatArray:
+    """Motions (n, 3, 6) of points (n, 3), m, as one body: three translations, m, and turns about the axes, rad."""
+    turns = np.swapaxes(np.cross(np.eye(3), points[:, None]), 1, 2)
+    return np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=2)
+
+
 def check_elements(mesh: SolidMesh) -> None:
     """Raises SceneError where an element has no matrices here, or is turned inside out."""
     for group in mesh.groups:

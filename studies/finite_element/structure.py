@@ -4,8 +4,6 @@ Nodes of the right cut face follow those of the left one, the moving node of a c
 opposite point, plus the relative displacement of the pair; constraints do the same to other displacements.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,7 +15,7 @@ from scipy import sparse
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
+from studies.finite_element.pairing import ContactPairs, Contacts, build_contact_pairs
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.scene_error import SceneError
 
@@ -71,13 +69,13 @@ class JointDefinition:
     sector. ties: surfaces that are always glued. pairs: in place of those that `build_contact_pairs` makes.
     """
 
-    contacts: tuple[ContactSurfaces, ...]
+    contacts: Contacts
     held: BoolArray
     load: FloatArray
     responses: Mapping[str, FloatArray]
     cut: CutFaces | None = None
     retainer: Retainer | None = None
-    ties: tuple[ContactSurfaces, ...] = ()
+    ties: Contacts = ()
     constraints: Constraints | None = None
     pairs: ContactPairs | None = None
 

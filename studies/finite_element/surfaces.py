@@ -4,8 +4,6 @@ Faces of quadratic elements are split at their mid-side nodes: the consistent ar
 zero at its corners, those of its facets are positive at all nodes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -35,11 +33,6 @@ class FaceShape:
     nodes: tuple[int, ...]
     height: float
     facets: tuple[tuple[int, ...], ...]
-
-    @property
-    def places(self) -> FloatArray:
-        """Reference coordinates (n_nodes, 2) of its nodes."""
-        return self.element.nodes[list(self.nodes), :2]
 
     def values(self, places: FloatArray) -> FloatArray:
         """Shape functions (n, n_nodes) at places (n, 2) of the face."""
@@ -231,7 +224,7 @@ def _surface(mesh: SolidMesh, name: str, chosen: list[Face]) -> Surface:
         shape = FACE_SHAPES[len(loop)]
         facets.append(loop[np.array(shape.facets)])
         faces += [np.append(loop, np.full(8 - len(loop), -1))] * len(shape.facets)
-        places.append(shape.places[np.array(shape.facets)])
+        places.append(shape.element.nodes[list(shape.nodes), :2][np.array(shape.facets)])
     return Surface(name, np.concatenate(facets), np.array(faces), np.concatenate(places), depth[np.isfinite(depth)])
 
 

@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 
 from solver.model import FloatArray, ReducedModel
 from studies.scene_error import SceneError
-from studies.scenes.half_space import PressedBody, press_body, strip_compliance, worn_edge
+from studies.scenes.half_space import PressedBody, strip_compliance, worn_edge
 
 _WIDER = 1.0 / 6.0
 """Of its width: by this much strips of uniform traction are wider, at each end, than the flat punch that they bear as.
@@ -44,6 +44,7 @@ class Parameters(PressedBody):
     The half-width is 0.0913 mm, the largest pressure 836 MPa, and half of the contact area sticks.
     """
 
+    NAME: ClassVar = "cylinder"
     SCAR: ClassVar = (3, 1.5)
     worn_depth: ClassVar = staticmethod(line_worn_depth)
 
@@ -124,4 +125,4 @@ class Parameters(PressedBody):
         compliance = strip_compliance(edges, self.modulus, self.length, self._reference_depth)
         position = np.stack([middle, np.zeros_like(middle), np.zeros_like(middle)], axis=1)
         area, last = 2.0 * np.diff(edges) * self.length, middle == middle[-1]
-        return press_body(self, (compliance, compliance), position, area, last, "cylinder")
+        return self.press(compliance, compliance, position, area, last)

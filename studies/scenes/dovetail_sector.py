@@ -11,8 +11,6 @@ second tangent (up the flank, outwards). Pairs are numbered intrados first (the 
 turns about +z), then extrados; from the leading to the trailing edge; from the inner to the outer end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan
@@ -173,11 +171,6 @@ def _arranged(pairs: ContactPairs, flanks: IntArray, n_nodes: int) -> ContactPai
     return replace(ordered, frames=frames)
 
 
-def _across(density: int) -> int:
-    """Number of elements across the root and the slot; even, so that there are nodes in the middle plane."""
-    return 2 * (density // 2 + 1)
-
-
 def _axial_stations(p: Parameters) -> FloatArray:
     """Axial stations, -1/2 to 1/2 of the width."""
     return np.linspace(-0.5, 0.5, 4 * p.mesh)
@@ -211,7 +204,8 @@ def _disk_blocks(p: Parameters) -> list[FloatArray]:
         [p.bore_radius, p.hub_radius, p.web_inner_radius, p.web_outer_radius, p.rim_inner_radius, p.slot_bottom_radius],
         [max(1, m // 2), 2 * m, 2 * m, 2 * m, max(1, m // 2)],
     )
-    slot_angles = np.linspace(-slot_angle, slot_angle, _across(m) + 1)
+    # as across the root: elements even in number, so that there are nodes in the middle plane
+    slot_angles = np.linspace(-slot_angle, slot_angle, 2 * (m // 2) + 3)
     angles = np.concatenate([-post_angles[0, :0:-1], slot_angles, post_angles[0, 1:]])
     return [
         block_of(each[:, None], around, _disk_width(p, each)[:, None] * _axial_stations(p))
@@ -228,7 +222,7 @@ def _blade_blocks(p: Parameters) -> list[FloatArray]:
     root_bottom = p.slot_bottom_radius + p.root_clearance
     x = graded([root_bottom, bottom_x, p.flank_top_radius, p.platform_radius, platform_top], spans)
     half_width = graded([bottom_y - p.root_clearance, bottom_y, neck, neck, neck], spans)
-    across = np.linspace(-1.0, 1.0, _across(m) + 1)
+    across = np.linspace(-1.0, 1.0, 2 * (m // 2) + 3)
     root = _flat_grid(p, x, half_width[:, None] * across)
     heights = graded([0.0, p.fillet_height, p.blade_length], [max(2, m), 12 * m])[1:]
     airfoil = np.stack([_airfoil_section(p, height, across) for height in heights])

@@ -9,8 +9,6 @@ has removed a segment of area `2 b^3 / (3 R)` of a cylinder, a cap of volume `pi
 is `b^2 / (2 R)`. By Archard's law the volume is at most `4 k_w N P s` after N cycles of stroke s under the force P.
 """
 
-from __future__ import annotations
-
 import math
 from abc import abstractmethod
 from collections.abc import Callable
@@ -98,10 +96,11 @@ class PressedBody(Scene):
     """A body of radius R that a force P presses on a flat, and a force Q or a stroke moves.
 
     SCAR: n and c of `b^n = a^n + c R V`, half-width of a scar of the worn volume V, per length of a cylinder.
-    worn_depth: depth that partial slip wears, as `worn_edge` takes it.
+    worn_depth: depth that partial slip wears, as `worn_edge` takes it. NAME: of the body.
     """
 
     FRICTION_IN_MODEL: ClassVar = True  # the default load and the width of what wears
+    NAME: ClassVar[str]
     SCAR: ClassVar[tuple[int, float]]
     worn_depth: ClassVar[Callable[..., FloatArray]]
 
@@ -193,51 +192,45 @@ class PressedBody(Scene):
             return self
         return self.model_copy(update={"half_width": round_up(needed)})
 
+    def press(
+        self, normal: FloatArray, tangential: FloatArray, position: FloatArray, area: FloatArray, edge: BoolArray
+    ) -> ReducedModel:
+        """Reduced model; displacements are u_N of all pairs, u_T of all pairs, d, and where a force moves the body, s.
 
-def press_body(
-    body: PressedBody,
-    compliance: tuple[FloatArray, FloatArray],
-    position: FloatArray,
-    area: FloatArray,
-    edge: BoolArray,
-    name: str,
-) -> ReducedModel:
-    """Reduced model; displacements are u_N of all pairs, u_T of all pairs, d, and where a force moves the body, s.
+        With the contact forces lambda (N, compression positive), the approach d of the body and its tangential motion
+        s, `u_N = d - C_N lambda_N` and `u_T = s - C_T lambda_T`: the stiffnesses are the inverse compliances, between
+        the pairs and the one displacement that moves them all. Under a stroke s is no unknown, and `C_T^-1 s` a load on
+        u_T; where the sliding is prescribed, the bodies do not shear. The response is then "slip", u_T of the pair
+        nearest to the middle, else s.
 
-    With the contact forces lambda (N, compression positive), the approach d of the body and its tangential motion s,
-    `u_N = d - C_N lambda_N` and `u_T = s - C_T lambda_T`: the stiffnesses are the inverse compliances, between the
-    pairs and the one displacement that moves them all. Under a stroke s is no unknown, and `C_T^-1 s` a load on u_T;
-    where the sliding is prescribed, the bodies do not shear. The response is then "slip", u_T of the pair nearest to
-    the middle, else s.
-
-    compliance: normal and tangential one, (n_contact, n_contact), m/N. position (n_contact, 3): m, from the middle.
-    area (n_contact,): m2. edge (n_contact,): pairs beside which the half-spaces go on without pairs. name: of the body.
-    """
-    n, prescribed = len(area), body.prescribed
-    normal, tangential = (np.asarray(np.linalg.inv(each), np.float64) for each in compliance)
-    moved = prescribed is None
-    stiffness = np.zeros((2 * n + 1 + moved, 2 * n + 1 + moved))
-    _join(stiffness, np.arange(n), 2 * n, normal)
-    load_static, load_harmonic = np.zeros((2, len(stiffness)))
-    load_static[2 * n] = body.P * body.thickness
-    response = np.zeros((1, len(stiffness)))
-    if prescribed is None:
-        _join(stiffness, np.arange(n, 2 * n), 2 * n + 1, tangential)
-        load_harmonic[2 * n + 1] = body.tangential_force * body.thickness
-        response[0, 2 * n + 1] = 1.0
-    else:
-        if body.sliding is not None:
-            shear = body.friction_coefficient * body.P * body.thickness * float(compliance[1].mean())
-            tangential *= max(shear / (_SHEAR * body.sliding), 1.0)
-        stiffness[n : 2 * n, n : 2 * n] = 0.5 * (tangential + tangential.T)
-        load_harmonic[n : 2 * n] = prescribed * tangential.sum(axis=1)
-        response[0, n + int(np.argmin(np.linalg.norm(position, axis=1)))] = 1.0
-    nothing = np.zeros_like(stiffness)
-    linear = LinearModel(nothing, nothing, stiffness, load_static, load_harmonic.astype(np.complex128), response)
-    dofs = np.stack([np.arange(n), np.arange(n, 2 * n), np.full(n, -1)], axis=1)
-    gap = (position**2).sum(axis=1) / (2.0 * body.R)
-    contact = ContactInterface(dofs, area, gap, np.zeros(n), position, (f"flat/{name}",) * n, edge=edge)
-    return ReducedModel({0: linear}, contact, (name if moved else "slip",))
+        normal, tangential: compliances C_N, C_T (n_contact, n_contact), m/N. position (n_contact, 3): m, from the
+        middle. area (n_contact,): m2. edge (n_contact,): pairs beside which the half-spaces go on without pairs.
+        """
+        n, prescribed = len(area), self.prescribed
+        pressing, shearing = (np.asarray(np.linalg.inv(each), np.float64) for each in (normal, tangential))
+        moved = prescribed is None
+        stiffness = np.zeros((2 * n + 1 + moved, 2 * n + 1 + moved))
+        _join(stiffness, np.arange(n), 2 * n, pressing)
+        load_static, load_harmonic = np.zeros((2, len(stiffness)))
+        load_static[2 * n] = self.P * self.thickness
+        response = np.zeros((1, len(stiffness)))
+        if prescribed is None:
+            _join(stiffness, np.arange(n, 2 * n), 2 * n + 1, shearing)
+            load_harmonic[2 * n + 1] = self.tangential_force * self.thickness
+            response[0, 2 * n + 1] = 1.0
+        else:
+            if self.sliding is not None:
+                shear = self.friction_coefficient * self.P * self.thickness * float(tangential.mean())
+                shearing *= max(shear / (_SHEAR * self.sliding), 1.0)
+            stiffness[n : 2 * n, n : 2 * n] = 0.5 * (shearing + shearing.T)
+            load_harmonic[n : 2 * n] = prescribed * shearing.sum(axis=1)
+            response[0, n + int(np.argmin(np.linalg.norm(position, axis=1)))] = 1.0
+        nothing = np.zeros_like(stiffness)
+        linear = LinearModel(nothing, nothing, stiffness, load_static, load_harmonic.astype(np.complex128), response)
+        dofs = np.stack([np.arange(n), np.arange(n, 2 * n), np.full(n, -1)], axis=1)
+        gap = (position**2).sum(axis=1) / (2.0 * self.R)
+        contact = ContactInterface(dofs, area, gap, np.zeros(n), position, (f"flat/{self.NAME}",) * n, edge=edge)
+        return ReducedModel({0: linear}, contact, (self.NAME if moved else "slip",))
 
 
 def _join(stiffness: FloatArray, pairs: np.ndarray, body: int, joint: FloatArray) -> None:

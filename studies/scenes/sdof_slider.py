@@ -6,8 +6,6 @@ A spring presses the mass, and wear relaxes the spring: with the wear depth W th
 stops, the motion is that of Den Hartog, Trans. ASME 53 (1931).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -103,41 +101,35 @@ class DenHartogSlider:
         v, g = self._factors
         return np.hypot(self.amplitude(friction_force), friction_force / self.stiffness * (g + 4.0 / np.pi * v))
 
+    def wear(
+        self, mu: float, load: float, normal_stiffness: float, area: float, work: WearingWork, sliding: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Depth worn since the start, m, and normal force, N, of the only pair, each (n,).
 
-def wear_of_slider(
-    slider: DenHartogSlider,
-    mu: float,
-    load: float,
-    normal_stiffness: float,
-    area: float,
-    work: WearingWork,
-    sliding: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Depth worn since the start, m, and normal force, N, of the only pair, each (n,).
+        sliding: s (n,), 1/Pa, wear coefficient times cycle count, ascending from 0 or above. The depth W follows
+        `dW/ds = X(S, N / area, W) / area` with the normal force `N = load - k_N W`, the slip work of a cycle
+        `S = 4 N X_0(mu N)`, X_0 the amplitude of the motion, and the wearing work X of the law, see
+        `solver.contact.wear_law`. With a spring the unknown is z = ln(N / load), `dz/ds = -(k_N / area) X / N`, which
+        stays calm.
 
-    sliding: s (n,), 1/Pa, wear coefficient times cycle count, ascending from 0 or above. The depth W follows
-    `dW/ds = X(S, N / area, W) / area` with the normal force `N = load - k_N W`, the slip work of a cycle
-    `S = 4 N X_0(mu N)`, X_0 the amplitude of the motion, and the wearing work X of the law (`solver.contact.wear_law`).
-    With a spring the unknown is z = ln(N / load), `dz/ds = -(k_N / area) X / N`, which stays calm.
+        mu: friction coefficient. load: at the start, N. normal_stiffness: k_N, N/m; 0 for a constant force. area: m2.
+        """
 
-    mu: friction coefficient. load: at the start, N. normal_stiffness: k_N, N/m; 0 for a constant force. area: m2.
-    """
+        def rate(force: float, depth: float) -> float:
+            """`dW/ds` over the normal force, 1/N m: of the force, N, and the depth, m."""
+            slip_work = 4.0 * force * float(self.amplitude(np.array(mu * force)))
+            worn = work.work(np.array([slip_work]), np.array([force]), np.array([depth]))
+            return float(worn[0]) / force / area
 
-    def rate(force: float, depth: float) -> float:
-        """`dW/ds` over the normal force, 1/N m: of the force, N, and the depth, m."""
-        slip_work = 4.0 * force * float(slider.amplitude(np.array(mu * force)))
-        worn = work.work(np.array([slip_work]), np.array([force]), np.array([depth]))
-        return float(worn[0]) / force / area
-
-    if load <= 0.0:
-        return np.zeros_like(sliding), np.zeros_like(sliding)
-    if normal_stiffness <= 0.0:
-        return _integrated(lambda depth: rate(load, depth) * load, sliding), np.full_like(sliding, load)
-    soft = load / normal_stiffness
-    z = _integrated(
-        lambda z: -normal_stiffness * rate(load * max(np.exp(z), _LEAST_FORCE), -np.expm1(z) * soft), sliding
-    )
-    return np.abs(np.expm1(z)) * soft, load * np.exp(z)
+        if load <= 0.0:
+            return np.zeros_like(sliding), np.zeros_like(sliding)
+        if normal_stiffness <= 0.0:
+            return _integrated(lambda depth: rate(load, depth) * load, sliding), np.full_like(sliding, load)
+        soft = load / normal_stiffness
+        z = _integrated(
+            lambda z: -normal_stiffness * rate(load * max(np.exp(z), _LEAST_FORCE), -np.expm1(z) * soft), sliding
+        )
+        return np.abs(np.expm1(z)) * soft, load * np.exp(z)
 
 
 def _integrated(rate: Callable[[float], float], sliding: FloatArray) -> FloatArray:
@@ -225,6 +217,6 @@ class Parameters(Scene):
         begun, contact = law.begun_at(np.array([worn_depth])), self.build(1).contact
         different, places = np.unique(sliding, return_inverse=True)
         work = wearing_work(begun, contact, np.array([mu]))
-        depth, force = wear_of_slider(slider, mu, load, self.normal_stiffness, self.area, work, different)
+        depth, force = slider.wear(mu, load, self.normal_stiffness, self.area, work, different)
         response, places = slider.first_harmonic(mu * force), places.reshape(sliding.shape)
         return self.area * depth[places], response[places][..., np.newaxis]

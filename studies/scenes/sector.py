@@ -1,7 +1,5 @@
 """What the scenes of bladed disks have in common: parameters of a sector, its bodies in blocks, its reduction."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import pi

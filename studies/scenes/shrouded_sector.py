@@ -10,8 +10,6 @@ coordinates of the glued sector. Each pair has normal (positive when the pair cl
 second tangent. A mesh of density m has 4 m axial x (m + 1) pairs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import cos, radians, sin
 from typing import ClassVar
@@ -74,10 +72,8 @@ class Parameters(SectorParameters):
         tip_radius = self.rim_radius + self.blade_length
         foot = self._blade_half_angle(self.rim_radius, self.root_angle)
         tip = self._blade_half_angle(tip_radius, self.shroud_angle)
-        disk, blade = (
-            graded([self.bore_radius, self.rim_radius], [4 * m]),
-            graded([self.rim_radius, tip_radius], [8 * m]),
-        )
+        disk = graded([self.bore_radius, self.rim_radius], [4 * m])
+        blade = graded([self.rim_radius, tip_radius], [8 * m])
         shroud = graded([tip_radius, tip_radius + self.shroud_thickness], [m])
         share = (blade - self.rim_radius) / self.blade_length
         thickness, turned = foot + share * (tip - foot), self.root_angle + share * (self.shroud_angle - self.root_angle)

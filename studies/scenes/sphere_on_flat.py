@@ -5,15 +5,13 @@ patch also stands for its mirror images (`half_space`). Areas, forces and volume
 stick zone is that of Cattaneo and Mindlin, without tractions across the force.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from solver.model import FloatArray, ReducedModel
-from studies.scenes.half_space import PressedBody, patch_compliance, press_body, worn_edge
+from studies.scenes.half_space import PressedBody, patch_compliance, worn_edge
 
 _WIDER = 0.11
 """Of the width of a patch: by so much the circle of equal area is wider than the punch that stuck patches bear as.
@@ -45,6 +43,7 @@ class Parameters(PressedBody):
     The radius of the contact is 0.190 mm, the largest pressure 1.32 GPa, and the stick zone has 0.79 of the radius.
     """
 
+    NAME: ClassVar = "sphere"
     SCAR: ClassVar = (4, 4.0 / np.pi)
     worn_depth: ClassVar = staticmethod(point_worn_depth)
 
@@ -108,4 +107,4 @@ class Parameters(PressedBody):
         # within half a patch, as the middle of a last strip; all around there are some
         edge = np.linalg.norm(middle, axis=1) >= self.patched - 0.5 * width
         position, area = np.column_stack([middle, np.zeros(len(middle))]), np.full(len(middle), 4.0 * width**2)
-        return press_body(self, patch_compliance(middle, width, self.E, self.nu), position, area, edge, "sphere")
+        return self.press(*patch_compliance(middle, width, self.E, self.nu), position, area, edge)

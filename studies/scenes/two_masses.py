@@ -4,8 +4,6 @@ The chain is `ground - spring 1 - mass 1 - spring 2 - mass 2`, with a damper bes
 mass 1. Mass 2 may stick while mass 1 moves.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from pydantic import Field
 

@@ -11,8 +11,6 @@ the sector with its wedge glued to both. Each pair has normal (positive when the
 second tangent (up or down the roof). A mesh of density m has 4 m axial x (m + 1) pairs on each side of the roof.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import cos, radians, sin, tan
 from typing import ClassVar

@@ -5,8 +5,6 @@ The wall is a spring to ground, whose massless tip stands `gap` away from the re
 the tip rests (`u_N = x`); closed, `u_N = gap`, and the force is `wall_stiffness (x - gap)`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from pydantic import Field
 

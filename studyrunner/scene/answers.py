@@ -207,8 +207,8 @@ def check_study_model(study: Study, picture: Path, progress: Progress) -> str:
     parameters = checked(study.scene.parameters)
     with scene_errors(study.source, None), np.errstate(all="ignore"):
         loaded = load_model(files, parameters, progress)
-        scene = reduce_model(loaded, parameters, harmonics_to_build(study), progress)
-        rows = describe_model(loaded, scene, parameters, progress)
+        scene = reduce_model(loaded, harmonics_to_build(study), progress)
+        rows = describe_model(loaded, scene, progress)
         rows.insert(0, ("files", describe_origin(files, parameters)["model_files"]))
     try:
         draw_pairs(loaded, scene, picture)

@@ -15,7 +15,7 @@ from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from solver.wear import problem
 from studies import build_scene
-from studies.scenes.sdof_slider import DenHartogSlider, wear_of_slider
+from studies.scenes.sdof_slider import DenHartogSlider
 from tests.solver.models import assert_same, march_wear
 from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
 from tests.studies.half_space_twin import limit_depth
@@ -53,7 +53,7 @@ def test_the_error_of_a_life_is_not_known_where_the_reference_solution_has_no_st
 def exact_count(frequency, depth):
     """Cycles until the slider is worn so deep."""
     pair = DenHartogSlider(0.1, 1.6e5, 10.0, 2 * np.pi * frequency), 0.5, 10.0, 1e5, AREA, ARCHARDS_WORK
-    return brentq(lambda n: wear_of_slider(*pair, WEAR * np.array([0.0, n]))[0][1] - depth, 1.0, 1e6)
+    return brentq(lambda n: pair[0].wear(*pair[1:], WEAR * np.array([0.0, n]))[0][1] - depth, 1.0, 1e6)
 
 
 def exact_shift(frequency, depth):

@@ -9,7 +9,7 @@ import numpy as np
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.scene_file import write_scene
 
-Change = Callable[[h5py.File], None]
+Change = Callable[[h5py.File], object]
 
 
 def linear_model(n: int, *, hermitian: bool, seed: int) -> LinearModel:
@@ -67,38 +67,18 @@ def written(folder: Path, model: ReducedModel, *changes: Change) -> Path:
 
 def put(key: str, values: object, **options: object) -> Change:
     """Replace a dataset."""
-
-    def change(file: h5py.File) -> None:
-        if key in file:
-            del file[key]
-        file.create_dataset(key, data=values, **options)
-
-    return change
+    return lambda file: (file.pop(key, None), file.create_dataset(key, data=values, **options))
 
 
 def poke(key: str, index: object, value: object) -> Change:
     """Replace entries of a dataset."""
-
-    def change(file: h5py.File) -> None:
-        file[key][index] = value
-
-    return change
+    return lambda file: file[key].__setitem__(index, value)
 
 
 def drop(*keys: str) -> Change:
-    def change(file: h5py.File) -> None:
-        for key in keys:
-            del file[key]
-
-    return change
+    return lambda file: [file.pop(key) for key in keys]
 
 
 def attribute(name: str, value: object) -> Change:
     """Replace an attribute of the file, or remove it (None)."""
-
-    def change(file: h5py.File) -> None:
-        file.attrs.pop(name, None)
-        if value is not None:
-            file.attrs[name] = value
-
-    return change
+    return lambda file: file.attrs.pop(name, None) if value is None else file.attrs.__setitem__(name, value)

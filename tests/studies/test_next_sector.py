@@ -98,13 +98,6 @@ def test_a_wedge_is_pressed_by_its_centrifugal_force(friction):
     assert 0.99 * least < sides[0] < 1.01 * most
 
 
-def test_faces_that_do_not_meet_after_a_turn_are_said():
-    model, joint = SECTORS[0]
-    axis = replace(joint.cut.axis, n_sectors=N + 1)
-    with pytest.raises(SceneError, match="turn by one sector"):
-        prepare_model(model, replace(joint, cut=replace(joint.cut, axis=axis)))
-
-
 @pytest.mark.slow
 def test_a_wave_of_the_sector_is_one_of_the_ring():
     """A slipping state: turned from sector to sector, with the phase of the wave, it balances the ring as well.

@@ -4,8 +4,6 @@ Node and element numbers are those of the file, not indices of an array. Names a
 case. A `place` is where something stands, for messages, as "deck.inp, line 7: *KEYWORD".
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

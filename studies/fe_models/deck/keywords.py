@@ -4,8 +4,6 @@ A keyword, and each of its parameters, is read, or stands in a list of those tha
 refused: it may change the model.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -117,6 +115,49 @@ class Block:
             raise self.place.wrong("the data line is missing", "give the numbers below it")
         return self.row(line).reals(0, least, f"{least}")
 
+    def numbered_points(self) -> tuple[IntArray, FloatArray]:
+        """Numbers (n,) and coordinates (n, 3) of data lines "number, x, y, z"; coordinates that are missing are 0."""
+        numbers = np.zeros(len(self.lines), dtype=np.int64)
+        coordinates = np.full((len(self.lines), 3), np.nan)
+        for line, text in enumerate(self.lines):
+            try:
+                number, x, y, z = text.split(",")
+                numbers[line], coordinates[line] = int(number), (float(x), float(y), float(z))
+            except (ValueError, OverflowError):
+                pass
+        plain = np.isfinite(coordinates).all(axis=1) & (numbers > 0) & (numbers <= LARGEST_NUMBER)
+        for line in np.flatnonzero(~plain).tolist():
+            row = self.row(line)  # Abaqus: direction of a normal behind the position
+            numbers[line], coordinates[line] = row.whole(0, "a node number"), [row.real(n) for n in (1, 2, 3)]
+        return numbers, coordinates
+
+    def records(self, length: int, what: str) -> IntArray:
+        """Records (n, length) of whole numbers, each from the beginning of a line over one or more lines.
+
+        what: of the record, for the message. Raises SceneError.
+        """
+        values = array("q")
+        started = 0  # numbers of records before the present one
+        for line, text in enumerate(self.lines):
+            try:
+                values.extend(list(map(int, text.rstrip(", \t").split(","))))
+            except (ValueError, OverflowError):
+                self._check_whole(line)
+            have = len(values) - started
+            if have > length or (line == len(self.lines) - 1 and have < length):
+                raise self.row(line).place.wrong(f"{have} numbers for {what}", f"give {length}")
+            if have == length:
+                started = len(values)
+        records = np.array(values, dtype=np.int64).reshape(-1, length)
+        if records.size and not 0 < records.min() <= records.max() <= LARGEST_NUMBER:
+            for line in range(len(self.lines)):
+                self._check_whole(line)
+        return records
+
+    def _check_whole(self, line: int) -> None:
+        for part in self.row(line).fields:
+            read_integer(part, self.row(line).place, "a node or element number")
+
     def points(self, line: int = 0) -> FloatArray:
         """Two points or vectors (2, 3) in a data line. Raises SceneError."""
         return np.array(self.reals(line, 6)[:6]).reshape(2, 3)
@@ -148,52 +189,6 @@ class Block:
         if value not in known:
             raise self.place.wrong(f"{parameter}={shown(value)} is not read", f"write {' or '.join(known)}")
         return value
-
-
-def read_points(block: Block) -> tuple[IntArray, FloatArray]:
-    """Numbers (n,) and coordinates (n, 3) of data lines "number, x, y, z"; coordinates that are missing are 0."""
-    numbers = np.zeros(len(block.lines), dtype=np.int64)
-    coordinates = np.full((len(block.lines), 3), np.nan)
-    for line, text in enumerate(block.lines):
-        try:
-            number, x, y, z = text.split(",")
-            numbers[line], coordinates[line] = int(number), (float(x), float(y), float(z))
-        except (ValueError, OverflowError):
-            pass
-    plain = np.isfinite(coordinates).all(axis=1) & (numbers > 0) & (numbers <= LARGEST_NUMBER)
-    for line in np.flatnonzero(~plain).tolist():
-        row = block.row(line)  # Abaqus: direction of a normal behind the position
-        numbers[line], coordinates[line] = row.whole(0, "a node number"), [row.real(n) for n in (1, 2, 3)]
-    return numbers, coordinates
-
-
-def read_records(block: Block, length: int, what: str) -> IntArray:
-    """Records (n, length) of whole numbers, each from the beginning of a line over one or more lines.
-
-    what: of the record, for the message. Raises SceneError.
-    """
-    values = array("q")
-    started = 0  # numbers of records before the present one
-    for line, text in enumerate(block.lines):
-        try:
-            values.extend(list(map(int, text.rstrip(", \t").split(","))))
-        except (ValueError, OverflowError):
-            _check_whole(block, line)
-        have = len(values) - started
-        if have > length or (line == len(block.lines) - 1 and have < length):
-            raise block.row(line).place.wrong(f"{have} numbers for {what}", f"give {length}")
-        if have == length:
-            started = len(values)
-    records = np.array(values, dtype=np.int64).reshape(-1, length)
-    if records.size and not 0 < records.min() <= records.max() <= LARGEST_NUMBER:
-        for line in range(len(block.lines)):
-            _check_whole(block, line)
-    return records
-
-
-def _check_whole(block: Block, line: int) -> None:
-    for part in block.row(line).fields:
-        read_integer(part, block.row(line).place, "a node or element number")
 
 
 def unit(vector: FloatArray, place: Place, remedy: str) -> FloatArray:

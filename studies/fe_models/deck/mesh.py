@@ -1,7 +1,5 @@
 """The mesh of a deck: as it is read, and then with every number in its place and every set to be looked up."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 
@@ -50,6 +48,11 @@ class Draft:
     scope: str = ""
     others: list[Block] = field(default_factory=list)
     included: list[str] = field(default_factory=list)
+
+    def at(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
+        """Points or vectors (n, 3) of an instance where the instance stands."""
+        shift, turn = self.placed.get(scope, (np.zeros(3), np.eye(3)))
+        return points @ turn.T + (0.0 if vectors else shift)
 
 
 class Mesh:
@@ -130,16 +133,6 @@ class Mesh:
         found = [block.nodes[np.isin(block.numbers, elements)].ravel() for block in self.blocks]
         return np.unique(np.concatenate([NONE, *found]))
 
-    def other_kinds(self, elements: IntArray) -> list[str]:
-        """Kinds of those elements (m,) that are not read."""
-        others = [block for block in self.blocks if block.kind not in NODES_OF_KIND]
-        return sorted(block.kind for block in others if np.isin(elements, block.numbers).any())
-
-    def placed(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
-        """Points or vectors (n, 3) of an instance where the instance stands."""
-        shift, turn = self.draft.placed.get(scope, (np.zeros(3), np.eye(3)))
-        return points @ turn.T + (0.0 if vectors else shift)
-
     def _names(self, key: Key, everything: Container[Key]) -> list[str]:
         """Names of a set or surface: where others have the same, the one of an instance has that before it."""
         scope, name = key
@@ -188,11 +181,7 @@ def _build_nodes(draft: Draft, offsets: Mapping[str, int]) -> tuple[IntArray, Fl
         what = "nodes: no *PART has an *INSTANCE" if draft.parts and not draft.placed else "nodes"
         raise SceneError("model", f"{draft.name} has no {what}", "give the deck with its mesh")
     numbers = np.concatenate([each.numbers + offsets[each.scope] for each in draft.nodes])
-    coordinates = np.concatenate([each.values.astype(np.float64) for each in draft.nodes])
-    scopes = np.repeat([each.scope for each in draft.nodes], [each.numbers.size for each in draft.nodes])
-    for scope, (shift, turn) in draft.placed.items():
-        own = scopes == scope
-        coordinates[own] = coordinates[own] @ turn.T + shift
+    coordinates = np.concatenate([draft.at(each.scope, each.values.astype(np.float64)) for each in draft.nodes])
     order = np.argsort(numbers, kind="stable")
     numbers, coordinates = numbers[order], coordinates[order]
     again = np.flatnonzero(numbers[1:] == numbers[:-1])

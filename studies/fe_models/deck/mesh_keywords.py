@@ -1,24 +1,12 @@
 """Keywords of the mesh: nodes, elements, sets, surfaces, parts and instances, and what makes nodes of others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
 from studies.fe_models.deck.contents import NODES_OF_KIND
-from studies.fe_models.deck.keywords import (
-    KEYWORDS,
-    Block,
-    Reference,
-    Row,
-    find_keyword,
-    keyword,
-    read_points,
-    read_records,
-    unit,
-)
+from studies.fe_models.deck.keywords import KEYWORDS, Block, Reference, Row, find_keyword, keyword, unit
 from studies.fe_models.deck.mesh import Draft, Records
 from studies.fe_models.deck.sets import NONE, Numbers, Resolver
 from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, is_integer, read_integer, shown
@@ -82,7 +70,7 @@ def _node(draft: Draft, block: Block) -> None:
     """Number, x, y, z, in the coordinates of *SYSTEM."""
     if block.value("SYSTEM") not in ("", "R"):
         raise block.place.wrong("nodes in cylindrical or spherical coordinates", "give them in Cartesian ones")
-    numbers, coordinates = read_points(block)
+    numbers, coordinates = block.numbered_points()
     if draft.system is not None:
         origin, axes = draft.system
         coordinates = coordinates @ axes + origin
@@ -114,7 +102,7 @@ def _element(draft: Draft, block: Block) -> None:
     if length is None:
         remedy = f"mesh with {', '.join(NODES_OF_KIND)}, and remove elements that carry nothing"
         raise block.place.wrong(f"elements of type {shown(kind)}", remedy)
-    records = read_records(block, length + 1, f"a {kind} of {length} nodes with its number")
+    records = block.records(length + 1, f"a {kind} of {length} nodes with its number")
     _add(draft, block, records[:, 0], records[:, 1:], kind=kind)
 
 

@@ -1,22 +1,12 @@
 """What a deck says beside its mesh, while it is read and put together once all of it is read."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from studies.fe_models.deck.contents import (
-    NODES_OF_KIND,
-    CyclicSymmetry,
-    Deck,
-    ElementBlock,
-    Material,
-    Surface,
-    SurfacePair,
-)
+from studies.fe_models.deck.contents import NODES_OF_KIND, CyclicSymmetry, Deck, Material, RigidMotion, SurfacePair
 from studies.fe_models.deck.keywords import Block
 from studies.fe_models.deck.mesh import Draft, Mesh, Records
 from studies.fe_models.deck.sets import NONE, Numbers
@@ -104,9 +94,12 @@ class Model:
             if step.writes or (name in ("forces", "pressures", "gravity") and not step.loads_count):
                 self.fields[name] = step.before.get(name, {})
 
-    def skip(self, block: Block) -> None:
-        """Notes a keyword that cannot change the model."""
-        self.skipped.append(str(block.place))
+    def follow(self, place: Place, nodes: IntArray, dofs: tuple[int, ...], reference: int, rotation: int = 0) -> None:
+        """Nodes that follow a reference node; rotation: -1 where they do not turn with it, else as in `RigidMotion`."""
+        nodes = nodes[(nodes != reference) & (nodes != rotation)]
+        if not nodes.size:
+            raise place.wrong("no node follows the reference node", "give the nodes that are rigid")
+        self.add("rigid_motions", RigidMotion(str(place), nodes, dofs, reference, max(rotation, 0), rotation >= 0))
 
     def deck(self) -> Deck:
         """The deck. Raises SceneError where names are missing or do not fit."""
@@ -131,12 +124,13 @@ class Model:
             node_numbers=mesh.numbers,
             coordinates=mesh.coordinates,
             blocks=tuple(
-                ElementBlock(block.kind, block.numbers[own], block.nodes[own]) for block, own in solid if own.any()
+                replace(block, numbers=block.numbers[own], nodes=block.nodes[own]) for block, own in solid if own.any()
             ),
             node_sets=mesh.node_sets,
             element_sets={name: np.intersect1d(members, kept) for name, members in mesh.element_sets.items()},
             surfaces={
-                name: Surface(each.elements[own], each.faces[own], each.nodes) for name, (each, own) in faces.items()
+                name: replace(each, elements=each.elements[own], faces=each.faces[own])
+                for name, (each, own) in faces.items()
             },
             ties=tuple(pair for _, cyclic, pair in ties if not cyclic),
             contact_pairs=tuple(self._contact_pairs()),

@@ -1,15 +1,13 @@
 """Keywords of materials and sections, and of linear constraints."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.contents import Equation, MeanMotion, RigidMotion, Section, Transform
+from studies.fe_models.deck.contents import NODES_OF_KIND, Equation, MeanMotion, Section, Transform
 from studies.fe_models.deck.keywords import Block, Row, keyword, unit
 from studies.fe_models.deck.model import MaterialRows, Model
-from studies.fe_models.files import IntArray, Place, is_integer, shown
+from studies.fe_models.files import Place, is_integer, shown
 
 _ALL = (1, 2, 3)
 
@@ -69,7 +67,8 @@ def _section(model: Model, block: Block) -> None:
 def _other_section(model: Model, block: Block) -> None:
     """Elements that are not read carry something."""
     elements = model.mesh.elements(block.reference("ELSET"))
-    kinds = model.mesh.other_kinds(elements)
+    others = [each for each in model.mesh.blocks if each.kind not in NODES_OF_KIND]
+    kinds = sorted(each.kind for each in others if np.isin(elements, each.numbers).any())
     if kinds:
         text = f"{block.place} of elements of type {' and '.join(kinds)}, which are not read"
         model.add("unassembled", (text, elements))
@@ -80,7 +79,7 @@ def _initial_conditions(model: Model, block: Block) -> None:
     """Temperatures; velocities do not matter."""
     kind = block.value("TYPE")
     if kind == "VELOCITY":
-        model.skip(block)
+        model.skipped.append(str(block.place))
         return
     if kind != "TEMPERATURE":
         raise block.place.wrong(f"TYPE={shown(kind)} is not read", "remove it: the prestress is that of the rotation")
@@ -93,7 +92,7 @@ def _initial_conditions(model: Model, block: Block) -> None:
 def _thermal(model: Model, block: Block) -> None:
     """They change nothing but where there are both, or values at several temperatures."""
     model.thermal[block.keyword] = block.place
-    model.skip(block)
+    model.skipped.append(str(block.place))
 
 
 @keyword("TRANSFORM", "NSET TYPE")
@@ -103,7 +102,7 @@ def _transform(model: Model, block: Block) -> None:
     points = block.points()
     spans = points[1] - points[0] if kind == "C" else np.cross(points[0], points[1])
     unit(spans, block.place, "points that are apart")
-    placed = model.mesh.placed(block.scope, points, vectors=kind == "R")
+    placed = model.mesh.draft.at(block.scope, points, vectors=kind == "R")
     nodes = model.mesh.nodes(block.reference("NSET"))
     model.add("transforms", Transform(str(block.place), nodes, kind == "C", placed))
 
@@ -142,16 +141,6 @@ def _equations(model: Model, terms: list[Row], place: Place) -> Iterator[Equatio
         yield Equation(str(place), own, dofs, values)
 
 
-def _follow(
-    model: Model, place: Place, nodes: IntArray, dofs: tuple[int, ...], reference: int, rotation: int = 0
-) -> None:
-    """Nodes that follow a reference node; rotation: -1 where they do not turn with it, else as in `RigidMotion`."""
-    nodes = nodes[(nodes != reference) & (nodes != rotation)]
-    if not nodes.size:
-        raise place.wrong("no node follows the reference node", "give the nodes that are rigid")
-    model.add("rigid_motions", RigidMotion(str(place), nodes, dofs, reference, max(rotation, 0), rotation >= 0))
-
-
 @keyword("MPC")
 def _mpc(model: Model, block: Block) -> None:
     """TIE and PIN join two nodes, BEAM makes a node follow the motion of another one."""
@@ -168,7 +157,7 @@ def _mpc(model: Model, block: Block) -> None:
         # a node or set that follows a node, or the nodes of a set in their order
         parts = [first] if len(second) == 1 else np.split(first, len(first))
         for nodes, reference in zip(parts, second, strict=True):
-            _follow(model, row.place, nodes, _ALL, int(reference), 0 if kind == "BEAM" else -1)
+            model.follow(row.place, nodes, _ALL, int(reference), 0 if kind == "BEAM" else -1)
 
 
 @keyword("RIGIDBODY", "NSET ELSET PINNSET TIENSET REFNODE ROTNODE", "ISOTHERMAL")
@@ -179,7 +168,7 @@ def _rigid_body(model: Model, block: Block) -> None:
     if "ELSET" in given or not nodes:
         nodes.append(mesh.nodes_of(block.reference("ELSET")))
     rotation = mesh.node(block.reference("ROTNODE")) if "ROTNODE" in given else 0
-    _follow(model, block.place, np.unique(np.concatenate(nodes)), _ALL, mesh.node(block.reference("REFNODE")), rotation)
+    model.follow(block.place, np.unique(np.concatenate(nodes)), _ALL, mesh.node(block.reference("REFNODE")), rotation)
 
 
 @keyword("COUPLING", "REFNODE SURFACE", "CONSTRAINTNAME")
@@ -197,7 +186,7 @@ def _kinematic(model: Model, block: Block) -> None:
     following = tuple(dof for dof in _ALL if not lines or any(dof in dofs for dofs in lines))
     nodes = model.mesh.surface_nodes(model.mesh.surface(head.reference("SURFACE")))
     if following:
-        _follow(model, block.place, nodes, following, model.mesh.node(head.reference("REFNODE")))
+        model.follow(block.place, nodes, following, model.mesh.node(head.reference("REFNODE")))
 
 
 @keyword("DISTRIBUTING", "COUPLING WEIGHTINGMETHOD")
@@ -221,7 +210,7 @@ def _kinematic_coupling(model: Model, block: Block) -> None:
     for row in block.rows(1, "node or set, first and last dof"):
         nodes, dofs = model.mesh.nodes(row.reference(0)), _dofs(row.fields[1:], row.place)
         if dofs:
-            _follow(model, row.place, nodes, dofs, reference)
+            model.follow(row.place, nodes, dofs, reference)
 
 
 def _dofs(fields: list[str], place: Place, known: tuple[int, ...] = _ALL) -> tuple[int, ...]:

@@ -4,8 +4,6 @@ A deck is read twice: first the keywords of the mesh, whose sets and surfaces ma
 then, with the mesh at hand, all others in the order of the file.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -49,7 +47,7 @@ def read_deck(path: Path) -> Deck:
     for block in draft.others:
         unused = model.step is not None and not model.step.loads_count
         if block.keyword in HARMLESS or (unused and block.keyword in _LOADS):
-            model.skip(block)
+            model.skipped.append(str(block.place))
         else:
             find_keyword(block, any_parameters=unused and block.keyword == "DLOAD").reader(model, block)
     model.end_step()

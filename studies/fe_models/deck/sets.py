@@ -1,7 +1,5 @@
 """Sets of nodes or elements: numbers, ranges and other sets, made to numbers once all of them are known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 

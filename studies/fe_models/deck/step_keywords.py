@@ -1,7 +1,5 @@
 """Keywords of what touches or is glued, of steps and loads, *BOUNDARY, and those that say nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -59,7 +57,7 @@ def _cyclic_symmetry(model: Model, block: Block) -> None:
     axis = block.points()
     unit(axis[1] - axis[0], block.place, "two points on the axis that are apart")
     name = read_name(block.parameters.get("TIE", ""))
-    model.add("cyclic", (int(number), name, model.mesh.placed(block.scope, axis), block.place))
+    model.add("cyclic", (int(number), name, model.mesh.draft.at(block.scope, axis), block.place))
 
 
 @keyword("CONTACTPAIR", "INTERACTION TIED ADJUST", _SKIPPED)

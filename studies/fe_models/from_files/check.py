@@ -1,8 +1,7 @@
 """What a user checks of a finite-element model before it is computed with: lines, and a picture of the pairs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +12,8 @@ from scipy.linalg import eigh
 from solver import SolverSettings, march_wear
 from solver.model import BoolArray, FloatArray, IntArray, LinearModel, ReducedModel
 from studies.fe_models.from_files.model import LoadedModel, reduce_model
-from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduced_joint import FeScene
-from studies.finite_element.rigid_motions import find_resistance
 from studies.scene import Progress, make_compliant, silent
 
 N_FREQUENCIES = 8
@@ -33,11 +30,9 @@ _SHADES = ("tab:orange", "0.5")  # of the facets with the moving nodes, and of t
 _ASIDE = (1.0, 0.5, 0.4)  # from where a surface is looked at, in its mean frame: neither on edge nor normals on end
 
 
-def describe_model(
-    loaded: LoadedModel, scene: FeScene, parameters: Parameters, progress: Progress = silent
-) -> list[tuple[str, str]]:
+def describe_model(loaded: LoadedModel, scene: FeScene, progress: Progress = silent) -> list[tuple[str, str]]:
     """Label and text of each line. scene: the reduced model. Raises SceneError."""
-    deck, joint, coordinates = loaded.deck, loaded.joint, loaded.model.mesh.coordinates
+    parameters, joint, coordinates = loaded.parameters, loaded.joint, loaded.model.mesh.coordinates
     prepared = scene.prepared
     free: BoolArray = np.asarray(~prepared.structure.held.all(axis=1))
     if joint.cut is not None:
@@ -73,7 +68,7 @@ def describe_model(
         listed = ", ".join(map(str, first))
         rows.append(("glued", f"first at nodal diameters {listed}: {_frequencies(np.array([*first.values()]))} Hz"))
     progress("reduction with twice the modes")
-    rows.append(("reduction", _reduction_error(loaded, scene, parameters)))
+    rows.append(("reduction", _reduction_error(loaded, scene)))
     rows += _rigid(loaded, scene, turning[-1])
     total = total_force(loaded, prepared.static_load)
     rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
@@ -81,13 +76,13 @@ def describe_model(
     friction = parameters.friction_coefficient
     stiff = make_compliant(scene.model, parameters.contact_stiffness)
     rows.append(("static", describe_rest(stiff, friction if isinstance(friction, float) else None)))
-    rows += deck.remarks
+    rows += loaded.deck.remarks
     return rows
 
 
 def _rigid(loaded: LoadedModel, scene: FeScene, highest: float) -> Iterator[tuple[str, str]]:
     """Motions as one body, and of bodies. highest: of the frequencies that are shown, Hz."""
-    resistance, name = find_resistance(scene.prepared, loaded.motions)
+    resistance, name = scene.prepared.find_resistance(loaded.motions)
     resists = name if resistance > _STIFF * highest else "no constraint"
     free = f"{_count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"
     yield "rigid", f"{free}; {resists} resists a motion of all as one body"
@@ -137,14 +132,15 @@ def _sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
 
 
-def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters) -> str:
+def _reduction_error(loaded: LoadedModel, scene: FeScene) -> str:
     """How far frequencies change with twice the modes, where the pairs slide freely and the joint moves most."""
-    k, model = parameters.nodal_diameter, scene.model
+    parameters, model = loaded.parameters, scene.model
+    k = parameters.nodal_diameter
     n_modes = len(model.linear[k].stiffness) - np.count_nonzero(model.contact.dofs >= 0)
     if n_modes < parameters.stuck_modes:
         return f"none: there are no more than {n_modes} modes with the pairs glued"
     more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
-    finer = reduce_model(loaded, more, 1, prepared=scene.prepared).model
+    finer = reduce_model(replace(loaded, parameters=more), 1, prepared=scene.prepared).model
     own, other = (_sliding_frequencies(each.linear[k], each)[:N_FREQUENCIES] for each in (model, finer))
     n = min(len(own), len(other))
     elastic = other[:n] > 1e-3 * other[:n].max()
@@ -157,7 +153,7 @@ def _reduction_error(loaded: LoadedModel, scene: FeScene, parameters: Parameters
 
 
 def _contacts(scene: FeScene) -> Iterator[str]:
-    pairs = scene.pairs
+    pairs = scene.prepared.pairs
     for place, (moving, opposite) in enumerate(zip(pairs.moving_name, pairs.opposite_name, strict=True)):
         own = pairs.surface == place
         neighbour = _NEIGHBOURS[int(pairs.sector[own][0])] if own.any() else ""
@@ -218,11 +214,11 @@ def _frequencies(values: FloatArray) -> str:
 
 def draw_pairs(loaded: LoadedModel, scene: FeScene, path: Path) -> None:
     """Writes a PNG with one part for each pair of surfaces. Raises OSError."""
-    n = len(scene.pairs.moving_name)
+    n = len(scene.prepared.pairs.moving_name)
     rows, columns = -(-n // 3), min(n, 3)
     figure = Figure(figsize=(7.0 * columns, 6.5 * rows), layout="constrained")
     for place in range(n):
-        _draw_surface(figure, (rows, columns, place + 1), loaded, scene.pairs, place)
+        _draw_surface(figure, (rows, columns, place + 1), loaded, scene.prepared.pairs, place)
     figure.suptitle("contact pairs: normal (red), first tangent (green), second tangent (blue)")
     figure.savefig(path, format="png")
 

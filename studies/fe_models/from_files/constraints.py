@@ -1,17 +1,23 @@
-"""Held displacements and linear constraints of a deck, SI: boundary conditions, equations and rigid motions."""
+"""Held displacements and linear constraints of a deck, SI: boundary conditions, equations, rigid and mean motions.
 
-from __future__ import annotations
+A reference node may follow the mean motion of a surface (*DISTRIBUTING). The surface has a mass by its area: its mean
+motion is that of a rigid body with the same linear and angular momentum about the centre (Abaqus Theory Guide,
+distributing coupling elements). A force on the reference node, which depends on the surface, is then shared by area,
+and its moment about the centre by `F_i = w_i T^-1 M x r_i`.
+"""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.fe_models.deck.contents import Deck, Equation, RigidMotion
+from studies.fe_models.deck.contents import Deck, Equation, MeanMotion, RigidMotion
 from studies.fe_models.files import Units
+from studies.fe_models.from_files.selections import Selections
 from studies.finite_element.constraints import Constraints, Dependence, eliminate
-from studies.finite_element.rigid_motions import rigid_motions
+from studies.finite_element.solid_mesh import rigid_motions
+from studies.finite_element.surfaces import faces_of_elements, integrate_shapes
 from studies.scene_error import SceneError
 
 _ROUND_OFF = 1e-9  # of a direction
@@ -35,15 +41,17 @@ class Supported:
     motions: FloatArray
 
 
-def find_constraints(deck: Deck, numbers: IntArray, clamped: IntArray | None, units: Units, cut: IntArray) -> Supported:
+def find_constraints(selections: Selections, numbers: IntArray, clamped: IntArray | None, cut: IntArray) -> Supported:
     """Held displacements, constraints and nodal forces of a deck.
 
     numbers (n_nodes,): nodes of the model, in any order. clamped: rows of nodes that the study holds in place of the
     deck's boundary conditions; None of none. cut: rows of nodes on cut faces. Raises SceneError where a displacement
     depends on others and is held, depends twice, or nodes are missing.
     """
-    rows = {("", number): row for row, number in enumerate(numbers.tolist())}
-    return _Builder(deck, numbers, units, set(cut.tolist()), rows).build(clamped)
+    deck, rows = selections.deck, {("", number): row for row, number in enumerate(numbers.tolist())}
+    means = (each for motion in deck.mean_motions for each in _mean_motion(selections, motion))
+    deck = replace(deck, equations=(*deck.equations, *means))
+    return _Builder(deck, numbers, selections.units, set(cut.tolist()), rows).build(clamped)
 
 
 @dataclass
@@ -73,9 +81,7 @@ class _Builder:
         held = self._held_by_deck() if clamped is None else {3 * row + k for row in clamped.tolist() for k in range(3)}
         for equation in deck.equations:
             self._equation(equation)
-        forces = np.zeros(3 * (len(self.numbers) + len(self.extra)))
-        for dof, value in self._forces():
-            forces[dof] += value
+        forces = self._forces()
         own: BoolArray = np.isin(np.arange(len(forces)), list(held)).reshape(-1, 3)
         extra = np.array(self.extra, dtype=np.int64)
         references = {node: row for (kind, node), row in self.rows.items() if not kind and row >= len(self.numbers)}
@@ -221,8 +227,9 @@ class _Builder:
         rows = np.zeros(len(others), dtype=np.int64)
         self.entries.append(Dependence(np.array([dependent]), rows, columns, values, equation.place))
 
-    def _forces(self) -> Iterator[tuple[int, float]]:
-        """Displacement and force, N, of each component."""
+    def _forces(self) -> FloatArray:
+        """Forces (3 n,), N."""
+        forces = np.zeros((len(self.numbers) + len(self.extra), 3))
         for force in self.deck.forces:
             for node in force.nodes:
                 if ("", int(node)) not in self.rows or force.first_dof > 3:
@@ -230,6 +237,51 @@ class _Builder:
                         continue
                     found = f"{force.place}: node {node} has no dof {force.first_dof}"
                     raise SceneError("model", found, "give forces on nodes of elements, or of reference nodes")
-                for k, share in enumerate(self._frame(int(node))[force.first_dof - 1]):
-                    if share:
-                        yield 3 * self.rows["", int(node)] + k, self.units.force * force.value * float(share)
+                direction = self._frame(int(node))[force.first_dof - 1]
+                forces[self.rows["", int(node)]] += self.units.force * force.value * direction
+        return forces.ravel()
+
+
+def _mean_motion(selections: Selections, motion: MeanMotion) -> Iterator[Equation]:
+    """An equation, in the units of the file, for each dof of a reference node; of its rotations where one is joined."""
+    deck, mesh, surface = selections.deck, selections.mesh, selections.deck.surfaces[motion.surface]
+    faces = faces_of_elements(mesh, motion.surface, surface.elements, surface.faces)
+    weights = integrate_shapes(mesh.coordinates, faces)[0]
+    nodes = np.unique([node for face in faces for node in face.nodes]).astype(np.int64)
+    numbers = mesh.numbers[nodes]
+    joined = _check(deck, motion, numbers)
+    weights = weights[nodes] / weights.sum()
+    places = deck.coordinates[deck.rows_of_nodes(np.append(numbers, motion.reference))]
+    centre = weights @ places[:-1]
+    arms, arm = places[:-1] - centre, places[-1] - centre
+    cross = np.cross(arms[:, None], np.eye(3)).swapaxes(1, 2)  # arm x u = cross @ u
+    inertia = np.einsum("i,iab,icb->ac", weights, cross, cross)
+    # rows (3, n, 3) of the mean rotation and of the displacement of the reference node
+    turn = np.einsum("ab,i,ibc->aic", np.linalg.inv(inertia), weights, cross)
+    moved = weights[:, None] * np.eye(3)[:, None] + np.einsum("ba,bic->aic", np.cross(np.eye(3), arm), turn)
+    of_dofs = np.tile([1, 2, 3], len(numbers))
+    for dof, row in enumerate((*moved, *turn), 1):
+        if dof <= 3 or (joined and dof in motion.turns):
+            terms = np.append(motion.reference, np.repeat(numbers, 3)), np.append(dof, of_dofs)
+            yield Equation(motion.place, *terms, np.append(1.0, -row.ravel()))
+
+
+def _check(deck: Deck, motion: MeanMotion, numbers: IntArray) -> bool:
+    """Whether something is joined to the rotations of the reference node. numbers: of the nodes of the surface.
+
+    Raises SceneError where dofs of the nodes are along other axes, or the rotations are held or those of another node.
+    """
+    reference = motion.reference
+    turned = np.intersect1d(np.append(numbers, reference), [node for each in deck.transforms for node in each.nodes])
+    joined = [each for each in deck.rigid_motions if each.reference == reference and each.turns]
+    held = any(reference in each.nodes and each.last_dof > 3 for each in deck.boundaries)
+    for wrong, found, remedy in (
+        (not numbers.size, f"{motion.surface} has no face", "give faces that no step takes away"),
+        (reference in numbers, f"the reference node {reference} is on the surface", "give a node of its own"),
+        (turned.size, f"node {min(turned, default=0)} has *TRANSFORM", "leave *TRANSFORM out there"),
+        (held, f"the rotations of node {reference} are held", "hold nodes of the surface, or leave it out"),
+        (any(each.rotation for each in joined), f"node {reference} has a ROT NODE", "leave ROT NODE out"),
+    ):
+        if wrong:
+            raise SceneError("model", f"{motion.place}: {found}", remedy)
+    return bool(joined)

@@ -3,8 +3,6 @@
 Each mistake in their export has a function that raises SceneError, with one sentence where the mistake was made.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -16,13 +14,13 @@ from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.fe_models.deck.contents import Deck
-from studies.fe_models.files import ModelFiles, Units, library_errors
+from studies.fe_models.files import Units, library_errors
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.from_files.solid import SPEED_AGREES, check_units
 from studies.fe_models.matrices.matrices import Matrices, number_modes
 from studies.fe_models.matrices.read import read_matrices
 from studies.finite_element.elements import ELEMENT_KINDS
-from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.pairing import Contacts
 from studies.finite_element.solid_mesh import Rotation, SolidMesh, volumes_of_points
 from studies.scene_error import SceneError
 
@@ -85,15 +83,12 @@ def order_by_nodes(matrices: Matrices, units: Units, mesh: SolidMesh, held: floa
 
 
 def import_matrices(
-    files: ModelFiles,
-    selections: Selections,
-    surfaces: tuple[tuple[ContactSurfaces, ...], tuple[ContactSurfaces, ...]],
-    rotation: Rotation | None,
-    on_cut: IntArray,
+    path: Path, selections: Selections, surfaces: tuple[Contacts, Contacts], rotation: Rotation | None, on_cut: IntArray
 ) -> NodalMatrices:
     """Reads matrices; those of a mesh are whole, and nothing joins surfaces in contact. Raises SceneError.
 
-    surfaces: those in contact, and those that are glued. on_cut: numbers of the nodes on both cut faces.
+    path: of one of their files. surfaces: those in contact, and those that are glued. on_cut: numbers of the nodes on
+    both cut faces.
     """
     deck, mesh, units, parameters = selections.deck, selections.mesh, selections.units, selections.parameters
     if not parameters.stress_stiffening:
@@ -101,7 +96,7 @@ def import_matrices(
     if deck.n_instances > 1:
         found = f"{deck.path} has {deck.n_instances} instances, whose nodes have other numbers in matrices"
         raise SceneError("matrices", found, "write a flat deck, or leave `matrices` out")
-    matrices, held_speed = read_matrices(files.matrices[0]), None
+    matrices, held_speed = read_matrices(path), None
     if not np.isin(matrices.node, deck.node_numbers).any():
         found = f"{matrices.files[0]} and {deck.path} have no node in common"
         raise SceneError("matrices", found, "give the mesh that the matrices were made of")

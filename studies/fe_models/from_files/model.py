@@ -1,7 +1,5 @@
 """From files and a study's parameters to a model and its reduction, in SI units."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 from importlib import metadata
@@ -15,24 +13,16 @@ from studies.fe_models.deck.contents import Deck
 from studies.fe_models.files import UNITS, ModelFiles, Units, check_there, file_digest
 from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.imported import check_nodes_have_dofs, import_matrices, read_recovery
-from studies.fe_models.from_files.mean_motions import equations_of_mean_motions
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
-from studies.fe_models.from_files.selections import (
-    Selections,
-    find_clamped,
-    find_cut,
-    find_surfaces,
-    note_free_surfaces,
-)
+from studies.fe_models.from_files.selections import Selections, find_surfaces, note_free_surfaces
 from studies.fe_models.from_files.solid import build_solid_mesh, check_units, find_axes
 from studies.fe_models.matrices.read import find_matrix_files
 from studies.fe_models.meshes import read_mesh_file
 from studies.finite_element.cut_faces import CyclicAxis
-from studies.finite_element.pairing import ContactPairs, ContactSurfaces, match_nodes
+from studies.finite_element.pairing import ContactPairs, Contacts, match_nodes
 from studies.finite_element.reduced_joint import FeScene, build_fe_scene
 from studies.finite_element.reduction import PreparedModel
-from studies.finite_element.rigid_motions import rigid_motions
-from studies.finite_element.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.solid_mesh import Rotation, SolidMesh, rigid_motions
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh, faces_of_elements, integrate_shapes
 from studies.scene import Progress, SurfaceMesh, build_compliant, silent
@@ -41,13 +31,14 @@ from studies.scene_error import SceneError
 
 @dataclass(frozen=True)
 class LoadedModel:
-    """A model as its files and the study describe it. deck: in units of the files. model, joint: SI.
+    """A model as its files and the study describe it. deck: in units of the files. parameters, model, joint: SI.
 
-    motions (3 n_nodes, 6): of all nodes as one body, see `find_resistance`. omega_squared_held: square of the speed at
+    motions (3 n_nodes, 6): of all nodes as one body, see `PreparedModel`. omega_squared_held: square of the speed at
     which the matrices were made, rad2/s2; None where they do not tell.
     """
 
     deck: Deck
+    parameters: Parameters
     model: FeModel
     joint: JointDefinition
     motions: FloatArray
@@ -83,19 +74,16 @@ def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: 
         files.mesh.name,
         json.dumps(what),
         own.contact_stiffness,
-        lambda: reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model,
+        lambda: reduce_model(load_model(files, own, progress), n_harmonics, progress).model,
     )
 
 
 def reduce_model(
-    loaded: LoadedModel,
-    parameters: Parameters,
-    n_harmonics: int,
-    progress: Progress = silent,
-    prepared: PreparedModel | None = None,
+    loaded: LoadedModel, n_harmonics: int, progress: Progress = silent, prepared: PreparedModel | None = None
 ) -> FeScene:
     """Reduced model of a loaded one, which may be prepared already. Raises SceneError."""
-    options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
+    own = loaded.parameters
+    options = ReductionOptions(own.nodal_diameter, own.stuck_modes, own.loss_factor)
     return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress, prepared)
 
 
@@ -127,20 +115,20 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         _check_assembled(deck, units)
     rotation, axis = find_axes(deck, parameters, units)
     contacts, ties = find_surfaces(selections, axis)
-    cut, clamped = find_cut(selections, axis, contacts), find_clamped(selections)
+    cut, clamped = selections.cut(axis, contacts), selections.clamped()
     on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
     imported = None
     if files.matrices:
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
-        imported = import_matrices(files, selections, (contacts, ties), rotation, mesh.numbers[on_cut])
+        imported = import_matrices(files.matrices[0], selections, (contacts, ties), rotation, mesh.numbers[on_cut])
     nodes = mesh if imported is None else imported.mesh
-    deck = replace(deck, equations=(*deck.equations, *equations_of_mean_motions(selections)))
-    supported = find_constraints(deck, nodes.numbers, clamped, units, on_cut)
+    supported = find_constraints(selections, nodes.numbers, clamped, on_cut)
     selections = replace(selections, references=supported.references)
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
     n_nodes, forms = len(supported.held), None
     responses = {
-        name: _motion(selections, each, f"response.{name}.set", n_nodes) for name, each in parameters.responses.items()
+        name: _motion(selections, each, f"response.{name}.set", n_nodes)
+        for name, each in (parameters.response or {"load": parameters.load}).items()
     }
     if imported is not None:
         if imported.matrices.load is not None:
@@ -172,7 +160,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     centre = np.nanmean(nodes.coordinates, axis=0) if cut is None else cut.axis.point
     motions[:, 3:] -= motions[:, :3] @ rigid_motions(centre[None])[0, :, 3:]
     held_speed = None if imported is None else imported.omega_squared_held
-    return LoadedModel(deck, model, joint, motions, held_speed)
+    return LoadedModel(deck, parameters, model, joint, motions, held_speed)
 
 
 def _check_assembled(deck: Deck, units: Units) -> None:
@@ -185,7 +173,7 @@ def _check_assembled(deck: Deck, units: Units) -> None:
 
 
 def _pairs_of_table(
-    selections: Selections, mesh: SolidMesh, contacts: tuple[ContactSurfaces, ...], axis: CyclicAxis | None
+    selections: Selections, mesh: SolidMesh, contacts: Contacts, axis: CyclicAxis | None
 ) -> ContactPairs | None:
     """Pairs of a table of nodes; None of a mesh, whose facets make them."""
     table, length = selections.deck.contact_nodes, selections.units.length

@@ -1,9 +1,6 @@
 """What a study says of a finite-element model, in SI units whatever units its files have."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
@@ -123,8 +120,3 @@ class Parameters(Table):
     cut_faces: Pair | None = Field(
         None, description="two sets of nodes or surfaces, [name, name]; default: the deck's, or found"
     )
-
-    @property
-    def responses(self) -> Mapping[str, SetDirection]:
-        """Responses by name, that of the load if none is given."""
-        return self.response or {"load": self.load}

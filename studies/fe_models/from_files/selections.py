@@ -1,9 +1,7 @@
 """What the names of a mesh stand for; which surfaces touch, are glued, cut or clamped, and with what friction."""
 
-from __future__ import annotations
-
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +11,7 @@ from studies.fe_models.deck.contents import Deck, SurfacePair
 from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
-from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.pairing import Contacts, ContactSurfaces
 from studies.finite_element.solid_mesh import SolidMesh
 from studies.finite_element.surfaces import Surface, surface_of_faces, surface_of_nodes, surface_of_points
 from studies.scene_error import SceneError
@@ -60,7 +58,11 @@ class Selections:
             used = [block.nodes[np.isin(block.numbers, members)].ravel() for block in deck.blocks]
             found = self.rows(np.concatenate([_NONE, *used]))
         else:
-            raise self._unknown(name, key, (*deck.node_sets, *deck.surfaces, *deck.element_sets))
+            names = sorted({*deck.node_sets, *deck.surfaces, *deck.element_sets})
+            what = "physical group" if deck.path.lower().endswith(".msh") else "set or surface"
+            near = difflib.get_close_matches(known, names, n=3, cutoff=0.5) or names[:_MOST_NAMED]
+            remedy = f"give {' or '.join(near)}" if near else f"name it in {deck.path}: there is none"
+            raise SceneError(key, f'there is no {what} "{name}" in {deck.path}', remedy)
         if len(found) == 0:
             remedy = "give nodes of the mesh that no *MODEL CHANGE takes away"
             raise SceneError(key, f"{name} in {deck.path} has no node of an element", remedy)
@@ -80,6 +82,26 @@ class Selections:
             return surface_of_points(known, nodes)
         return surface_of_nodes(self.mesh, known, nodes)
 
+    def cut(self, axis: CyclicAxis | None, contacts: Sequence[ContactSurfaces]) -> CutFaces | None:
+        """Cut faces that the study names, else those of the deck, else all nodes that are images; None of no sector.
+
+        contacts: nodes of those with the next sector are on no cut face that is found. Raises SceneError.
+        """
+        if axis is None:
+            return None
+        given = self.parameters.cut_faces
+        names = self.deck.cut_faces if given is None else (given,)
+        if not names:
+            across = [surface.nodes for each in contacts if each.sector for surface in (each.first, each.second)]
+            return find_cut_faces(self.mesh, axis, np.concatenate([_NONE, *across]))
+        sides = ([self.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
+        return match_cut_faces(self.mesh, axis, *(np.unique(np.concatenate(each)) for each in sides))
+
+    def clamped(self) -> IntArray | None:
+        """Rows of the nodes that the study clamps; None where the deck says what is held. Raises SceneError."""
+        names = self.parameters.clamp
+        return None if names is None else np.concatenate([_NONE, *(self.nodes(name, "clamp") for name in names)])
+
     def _of_faces(self, name: str) -> Surface | None:
         """A surface that is given by faces of elements, by its name in capitals."""
         surface = self.deck.surfaces.get(name)
@@ -87,23 +109,13 @@ class Selections:
             return None
         return surface_of_faces(self.mesh, name, surface.elements, surface.faces)
 
-    def _unknown(self, name: str, key: str, known: Iterable[str]) -> SceneError:
-        """The error about a name that the deck does not have; it lists those that look like it."""
-        names = sorted(set(known))
-        what = "physical group" if self.deck.path.lower().endswith(".msh") else "set or surface"
-        near = difflib.get_close_matches(capital(name), names, n=3, cutoff=0.5) or names[:_MOST_NAMED]
-        remedy = f"give {' or '.join(near)}" if near else f"name it in {self.deck.path}: there is none"
-        return SceneError(key, f'there is no {what} "{name}" in {self.deck.path}', remedy)
-
 
 def capital(name: str) -> str:
     """A name as a deck has it."""
     return name.strip().upper()
 
 
-def find_surfaces(
-    selections: Selections, axis: CyclicAxis | None
-) -> tuple[tuple[ContactSurfaces, ...], tuple[ContactSurfaces, ...]]:
+def find_surfaces(selections: Selections, axis: CyclicAxis | None) -> tuple[Contacts, Contacts]:
     """Surfaces in contact, at least one pair, that the study names, else those of CONTACT PAIR, else those of TIE.
 
     Then those that are glued for good: other ties, and contact pairs that the deck glues and the study does not name.
@@ -113,7 +125,9 @@ def find_surfaces(
     touching = [pair for pair in deck.contact_pairs if not pair.glued]
     glued = [pair for pair in deck.contact_pairs if pair.glued]
     if given is not None:
-        chosen = [_known(SurfacePair(capital(one), capital(other)), deck) for one, other in given]
+        # what the deck says of two surfaces, nothing but their names where it says nothing
+        known = (*deck.contact_pairs, *deck.ties)
+        chosen = [next((each for each in known if _same(each, pair)), pair) for pair in _pairs(given)]
     else:
         chosen = touching or list(deck.ties)
     if not chosen:
@@ -137,7 +151,7 @@ def find_surfaces(
 
 def note_free_surfaces(deck: Deck, given: Sequence[tuple[str, str]] | None) -> Deck:
     """The deck with a note on each contact pair that is none of the study. given: contacts of the study."""
-    chosen = [SurfacePair(capital(one), capital(other)) for one, other in given or ()]
+    chosen = _pairs(given or ())
     free = [pair for pair in deck.contact_pairs if chosen and not any(_same(pair, each) for each in chosen)]
     why = "is not in `contact` of the study: nothing joins these surfaces, unless they are there by other names."
     notes = (f"*CONTACT PAIR {pair.labels[-1]} {why}" for pair in free if not pair.glued)
@@ -174,9 +188,8 @@ def _same(one: SurfacePair, other: SurfacePair) -> bool:
     return {one.dependent, one.independent} == {other.dependent, other.independent}
 
 
-def _known(pair: SurfacePair, deck: Deck) -> SurfacePair:
-    """What the deck says of two surfaces, nothing but their names where it says nothing."""
-    return next((each for each in (*deck.contact_pairs, *deck.ties) if _same(each, pair)), pair)
+def _pairs(given: Sequence[tuple[str, str]]) -> list[SurfacePair]:
+    return [SurfacePair(capital(one), capital(other)) for one, other in given]
 
 
 def _surfaces(selections: Selections, pair: SurfacePair, key: str) -> ContactSurfaces:
@@ -236,26 +249,3 @@ def _friction(chosen: list[SurfacePair], parameters: Parameters, deck: Deck) -> 
             what = pair.problem or f"missing for {pair.labels[-1]} in {deck.path}"
             raise SceneError("friction_coefficient", what, "give one coefficient, in the study or there with *FRICTION")
     return found
-
-
-def find_cut(selections: Selections, axis: CyclicAxis | None, contacts: Sequence[ContactSurfaces]) -> CutFaces | None:
-    """Cut faces that the study names, else those of the deck, else all nodes that are images; None of no sector.
-
-    contacts: nodes of those with the next sector are on no cut face that is found. Raises SceneError.
-    """
-    if axis is None:
-        return None
-    mesh, given = selections.mesh, selections.parameters.cut_faces
-    names = selections.deck.cut_faces if given is None else (given,)
-    if not names:
-        across = [surface.nodes for each in contacts if each.sector for surface in (each.first, each.second)]
-        return find_cut_faces(mesh, axis, np.concatenate([_NONE, *across]))
-    sides = ([selections.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
-    first, second = (np.unique(np.concatenate(each)) for each in sides)
-    return match_cut_faces(mesh, axis, first, second)
-
-
-def find_clamped(selections: Selections) -> IntArray | None:
-    """Rows of the nodes that the study clamps; None where the deck says what is held. Raises SceneError."""
-    names = selections.parameters.clamp
-    return None if names is None else np.concatenate([_NONE, *(selections.nodes(name, "clamp") for name in names)])

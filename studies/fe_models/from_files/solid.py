@@ -1,7 +1,5 @@
 """The mesh of a deck in SI units, each element with its material; its rotation and its axis; what units it can have."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

@@ -4,8 +4,6 @@ A reader gives the entries of each matrix by labels, a number for each node and 
 follows here: one order of the rows, both triangles, and what cannot be.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,24 +77,26 @@ def number_modes(node: IntArray, dof: IntArray) -> IntArray:
 
 
 def entries_of_tables(
-    found: Mapping[str, Any], files: Mapping[str, Path], labels: IntArray | None = None
+    found: Mapping[str, Any], files: Mapping[str, Path], rows: IntArray | None = None
 ) -> dict[str, Entries]:
-    """Entries of matrices, dense or sparse, and forces by name, whose rows have labels (n_dof,).
+    """Entries of matrices, dense or sparse, and forces by name.
 
-    labels: None where a table of the rows is among the files. Raises SceneError.
+    rows (2, n_dof): node and dof of each of their rows; None where a table of them is among the files. Raises
+    SceneError.
     """
-    first = next(iter(files.values())).name
-    if labels is None and "rows" not in files:
+    first = source = next(iter(files.values())).name
+    if rows is None and "rows" not in files:
         wrong(first, "no table of its rows", "give job_rows.csv with node and dof of each row")
-    if labels is None:
+    if rows is None:
         path = files["rows"]
         with library_errors(path, "pandas", "pandas", "matrices"):
             table = pd.read_csv(path, skipinitialspace=True)
         if not {"node", "dof"} <= set(table) or any(table[name].dtype.kind != "i" for name in ("node", "dof")):
             remedy = "give a line for each row of the matrices, 0 and 0 for a mode"
             wrong(path.name, "no columns node and dof of whole numbers", remedy)
-        node, dof = table["node"].to_numpy(), table["dof"].to_numpy()
-        labels = label(number_modes(node, dof), dof, path.name)
+        source, rows = path.name, table[["node", "dof"]].to_numpy(dtype=np.int64).T
+    node, dof = rows
+    labels = label(number_modes(node, dof), dof, source)
     if np.unique(labels).size < labels.size:
         wrong(first, "a dof has two rows", "give node and dof of each row once")
     names = {name: files[name if name in files else "matrices"].name for name in found}

@@ -1,4 +1,4 @@
-"""Matrices of other programs: what reads which files, by the name that a user gives. Those of Nastran: `nastran.py`.
+"""Matrices of other programs: what reads which files, by the name that a user gives.
 
 CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes job.sti and job.mas, the upper triangle in lines "row column value"
 from 1, and job.dof with a line "node.direction" for every row, no number: 10.1 is not 10.10.
@@ -14,8 +14,6 @@ are the variable `rows` (n, 2) of a .mat file, or stand beside the files in job_
 dof 0 is a coordinate of no place, as of a mode, whose node may be 0 as well.
 """
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Callable, Mapping
@@ -29,18 +27,9 @@ import numpy as np
 from scipy import io, sparse
 
 from studies.fe_models.files import check_file, library_errors, shown
-from studies.fe_models.matrices.harwell_boeing import read_harwell_boeing
-from studies.fe_models.matrices.matrices import (
-    NAMES,
-    Entries,
-    Matrices,
-    assemble,
-    entries_of_tables,
-    label,
-    number_modes,
-    wrong,
-)
-from studies.fe_models.matrices.nastran import read_op4, read_punch
+from studies.fe_models.matrices.fortran import read_harwell_boeing, read_op4
+from studies.fe_models.matrices.matrices import NAMES, Entries, Matrices, assemble, entries_of_tables, label, wrong
+from studies.fe_models.matrices.nastran import read_punch
 from studies.scene_error import SceneError
 
 Files = Mapping[str, Path]
@@ -169,16 +158,15 @@ def _read_tables(files: Files) -> dict[str, Entries]:
     found = {}
     for name in [name for name in NAMES if name in files]:
         path = files[name]
-        found[name] = _read_market(path) if path.suffix.lower() == ".mtx" else read_harwell_boeing(path)
+        if path.suffix.lower() != ".mtx":
+            found[name] = read_harwell_boeing(path)
+            continue
+        with library_errors(path, "scipy.io", "scipy", "matrices"):
+            *_, field, symmetry = io.mminfo(path)
+            if field == "pattern" or symmetry == "skew-symmetric":
+                wrong(path.name, f"its header says {field} {symmetry}", "write the numbers of a symmetric matrix")
+            found[name] = io.mmread(path)
     return entries_of_tables(found, files)
-
-
-def _read_market(path: Path) -> Any:
-    with library_errors(path, "scipy.io", "scipy", "matrices"):
-        *_, field, symmetry = io.mminfo(path)
-        if field == "pattern" or symmetry == "skew-symmetric":
-            wrong(path.name, f"its header says {field} {symmetry}", "write the numbers of a symmetric matrix")
-        return io.mmread(path)
 
 
 def _read_matlab(files: Files) -> dict[str, Entries]:
@@ -188,14 +176,13 @@ def _read_matlab(files: Files) -> dict[str, Entries]:
         with path.open("rb") as file:
             newest = file.read(10) == b"MATLAB 7.3" or h5py.is_hdf5(path)
         found = _read_v73(path) if newest else io.loadmat(path, variable_names=[*NAMES, "rows"])
-    labels = None
+    rows = None
     if "rows" in found:
         table = np.asarray(found["rows"])
         if table.ndim != 2 or table.shape[1] != 2 or table.dtype.kind not in "iuf":
             wrong(path.name, f"rows have the shape {table.shape}", "give node and dof of each row of the matrices")
-        node, dof = table.astype(np.int64).T
-        labels = label(number_modes(node, dof), dof, path.name)
-    return entries_of_tables({name: found[name] for name in NAMES if name in found}, files, labels)
+        rows = table.astype(np.int64).T
+    return entries_of_tables({name: found[name] for name in NAMES if name in found}, files, rows)
 
 
 def _read_v73(path: Path) -> dict[str, Any]:
@@ -228,16 +215,15 @@ def _read_ansys(files: Files) -> dict[str, Entries]:
         reference, stiffness, mass = file.load_km() if hasattr(file, "load_km") else (None, None, None)
         if stiffness is None or mass is None:
             wrong(path.name, "no stiffness and mass", "write that of a modal analysis, with HBMAT or WRFULL before it")
-        held = np.array([[node, direction] for node, direction in file.const], dtype=np.int64).reshape(-1, 2)
-    reference = np.asarray(reference, dtype=np.int64)
-    labels = label(reference[:, 0], reference[:, 1] + 1, path.name)
+        tables = reference, [[node, direction] for node, direction in file.const]
+        (node, direction), (held, fixed) = (np.array(each, dtype=np.int64).reshape(-1, 2).T for each in tables)
     # held rows are in the file, empty
-    free = np.flatnonzero(~np.isin(labels, label(held[:, 0], held[:, 1] + 1, path.name)))
+    free = np.flatnonzero(~np.isin(label(node, direction + 1, path.name), label(held, fixed + 1, path.name)))
     if not free.size:
         wrong(path.name, "no dof that is free", "write the file of the unconstrained bodies")
     found = {"stiffness": stiffness, "mass": mass}
     own = {name: matrix.tocsr()[free][:, free] for name, matrix in found.items()}
-    return entries_of_tables(own, files, labels[free])
+    return entries_of_tables(own, files, np.stack([node, direction + 1])[:, free])
 
 
 @dataclass(frozen=True)

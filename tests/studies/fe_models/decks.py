@@ -153,7 +153,7 @@ def write(folder: Path, text: str, name: str = "deck.inp") -> Path:
     return path
 
 
-def _hexes(first, shape, place):
+def hexes(first, shape, place):
     """Lines of nodes, numbered with the first direction fastest, and of hexahedra of a grid; place: of its points."""
     n = np.array(shape) + 1
     grid = [(a, b, c) for c in range(n[2]) for b in range(n[1]) for a in range(n[0])]
@@ -169,7 +169,7 @@ def _hexes(first, shape, place):
 
 
 _LOWER, _UPPER = (
-    _hexes(first, (4, 2, 1), lambda x, y, z, height=height: (10 * x, 5 * y, height + 5 * z))
+    hexes(first, (4, 2, 1), lambda x, y, z, height=height: (10 * x, 5 * y, height + 5 * z))
     for first, height in ((1, 0), (101, 5))
 )
 
@@ -195,7 +195,7 @@ def _ring(first, inner, outer):
         radius, angle = (outer if r else inner), np.radians(10 * j - 15)
         return radius * np.cos(angle), radius * np.sin(angle), 5 * k
 
-    return _hexes(first, (1, 3, 2), place)
+    return hexes(first, (1, 3, 2), place)
 
 
 _DISK, _RIM = _ring(1, 20, 25), _ring(101, 25, 30)

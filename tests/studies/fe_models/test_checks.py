@@ -8,14 +8,7 @@ import scipy.sparse as sp
 
 from studies.fe_models.deck.read import read_deck
 from studies.fe_models.files import UNITS
-from studies.fe_models.from_files.imported import (
-    check_contact_removed,
-    check_mass,
-    check_nodes_have_dofs,
-    check_speed,
-    mass_of,
-    omega_squared_of,
-)
+from studies.fe_models.from_files import imported
 from studies.fe_models.from_files.solid import check_units, rotation_of_deck
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
@@ -42,34 +35,34 @@ def exported(folder, text):
 def test_whole_export(tmp_path):
     deck, matrices = exported(tmp_path, SECTOR.read_text())
     blades, disks = deck.node_sets["BLADEC"], deck.node_sets["DISKC"]
-    check_nodes_have_dofs(matrices, blades, "BLADES")
-    check_contact_removed(deck, matrices, (blades, disks), ("BLADES", "DISKS"), SI)
-    mass = mass_of(deck, matrices)
+    imported.check_nodes_have_dofs(matrices, blades, "BLADES")
+    imported.check_contact_removed(deck, matrices, (blades, disks), ("BLADES", "DISKS"), SI)
+    mass = imported.mass_of(deck, matrices)
     check_units(deck, mass, SI)
-    check_mass(deck, matrices, SI)
+    imported.check_mass(deck, matrices, SI)
     # as where the deck is in SI and the matrices are not
     for factor in (1e-3, 0.97, 1.03):
         words = rf"sector.sti and sector.inp: {factor * mass:.3g} kg in the matrices, {mass:.3g} kg by density and"
         other = replace(matrices, mass=factor * matrices.mass)
         with pytest.raises(SceneError, match=words):
-            check_mass(deck, other, SI)
-        check_mass(replace(deck, sections=()), other, SI)
+            imported.check_mass(deck, other, SI)
+        imported.check_mass(replace(deck, sections=()), other, SI)
     rotation = rotation_of_deck(deck, SI)
     assert (rotation.omega_squared, rotation.axis.tolist()) == (250000.0, [0, 0, 1])
-    assert check_speed(deck, matrices, rotation) == pytest.approx(250000, rel=1e-6)
-    assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
+    assert imported.check_speed(deck, matrices, rotation) == pytest.approx(250000, rel=1e-6)
+    assert imported.omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
     # along the axis there is no spin softening
-    assert omega_squared_of(deck, matrices, np.array([1.0, 0.0, 0.0])) == pytest.approx(125000, rel=1e-6)
+    assert imported.omega_squared_of(deck, matrices, np.array([1.0, 0.0, 0.0])) == pytest.approx(125000, rel=1e-6)
 
 
 @needs_ccx
 def test_dofs_eliminated(tmp_path):
     deck, matrices = exported(tmp_path, changed("*EQUATION,REMOVE ALL\n", ""))
     with pytest.raises(SceneError, match=r"BLADES: 9 of 9 nodes have no dof in sector.dof .*\*EQUATION,REMOVE ALL"):
-        check_nodes_have_dofs(matrices, deck.node_sets["BLADEC"], "BLADES")
-    check_nodes_have_dofs(matrices, deck.node_sets["DISKC"], "DISKS")
+        imported.check_nodes_have_dofs(matrices, deck.node_sets["BLADEC"], "BLADES")
+    imported.check_nodes_have_dofs(matrices, deck.node_sets["DISKC"], "DISKS")
     # ties are no hindrance for a rigid translation
-    assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
+    assert imported.omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
 
 
 CONTACT = """\
@@ -92,11 +85,11 @@ def test_contact_still_in_the_stiffness(tmp_path):
     for units, size in ((SI, r"1.6e\+09"), (MM, r"1.6e\+12")):
         words = rf"the stiffness couples BLADES and DISKS \({size} N/m\); add \*MODEL CHANGE,TYPE=CONTACT PAIR"
         with pytest.raises(SceneError, match=words):
-            check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), units)
+            imported.check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), units)
     removed = "*MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE\nBLADES,DISKS\n*EQUATION,REMOVE ALL"
     deck, matrices = exported(tmp_path, changed("*EQUATION,REMOVE ALL", removed, text))
     assert len(deck.contact_pairs) == 1  # what a step removes that writes matrices belongs to the model
-    check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), SI)
+    imported.check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), SI)
 
 
 def springs(deck, pairs):
@@ -117,23 +110,23 @@ def test_coupling_through_an_element_is_none_of_contact(tmp_path):
     # 1 and 7 belong to the lower cube, 11 and 17 to the upper one
     matrices = springs(deck, [(1, 7, 1e9), (11, 17, 1e9), (2, 12, 1e-3)])
     lower, upper = np.array([1, 2, 7]), np.array([11, 12, 17])
-    check_contact_removed(deck, matrices, (np.array([1, 2]), np.array([7])), ("A", "B"), SI)
-    check_contact_removed(deck, matrices, (lower, upper), ("A", "B"), SI)
+    imported.check_contact_removed(deck, matrices, (np.array([1, 2]), np.array([7])), ("A", "B"), SI)
+    imported.check_contact_removed(deck, matrices, (lower, upper), ("A", "B"), SI)
     # the same nodes in both surfaces
-    check_contact_removed(deck, matrices, (lower, lower), ("A", "B"), SI)
+    imported.check_contact_removed(deck, matrices, (lower, lower), ("A", "B"), SI)
     matrices = springs(deck, [(1, 7, 1e9), (11, 17, 1e9), (7, 11, 5e8)])
     with pytest.raises(SceneError, match=r"couples A and B \(5.0e\+08 N/m\)"):
-        check_contact_removed(deck, matrices, (lower, upper), ("A", "B"), SI)
+        imported.check_contact_removed(deck, matrices, (lower, upper), ("A", "B"), SI)
 
 
 def test_speed_of_other_codes_and_none(tmp_path):
     deck = read_deck(write(tmp_path, CUBES))
     matrices = springs(deck, [(1, 7, 1e9), (11, 17, 1e9)])
     with pytest.raises(SceneError, match=r"spins at 100 rad/s, the stiffness holds 0; write \*STEP,NLGEOM"):
-        check_speed(deck, matrices, rotation_of_deck(deck, SI))
+        imported.check_speed(deck, matrices, rotation_of_deck(deck, SI))
     turning = replace(matrices, stiffness=sp.csr_array(matrices.stiffness - 1e4 * matrices.mass))
-    assert omega_squared_of(deck, turning, AXIS) == pytest.approx(1e4, rel=1e-6)
-    assert check_speed(deck, turning, rotation_of_deck(deck, SI)) == pytest.approx(1e4, rel=1e-6)
+    assert imported.omega_squared_of(deck, turning, AXIS) == pytest.approx(1e4, rel=1e-6)
+    assert imported.check_speed(deck, turning, rotation_of_deck(deck, SI)) == pytest.approx(1e4, rel=1e-6)
     assert rotation_of_deck(replace(deck, centrifugal=()), SI) is None
 
 

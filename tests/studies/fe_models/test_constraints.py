@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from studies.fe_models.from_files.check import total_force
-from studies.finite_element.rigid_motions import find_resistance
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 from tests.studies.fe_models.solid_meshes import needs_ccx
@@ -91,7 +90,7 @@ def test_no_constraint_but_some_of_the_user_resists_motions_as_one_body(tmp_path
     for number, (name, text) in enumerate(texts.items()):
         (folder := tmp_path / f"{number}").mkdir()
         prepared, loaded = prepared_deck(folder, BLOCKS + text)
-        frequency, found = find_resistance(prepared, loaded.motions)
+        frequency, found = prepared.find_resistance(loaded.motions)
         assert (frequency > 1e-3) == bool(resists[name]), name
         assert resists[name] in found, name
 
@@ -115,7 +114,7 @@ def test_ties_across_a_gap_let_bodies_turn(tmp_path):
     for name, each in (("touching", text), ("apart", apart)):
         (tmp_path / name).mkdir()
         prepared, loaded = prepared_deck(tmp_path / name, each, friction_coefficient=0.3)
-        assert find_resistance(prepared, loaded.motions)[0] < 1e-6
+        assert prepared.find_resistance(loaded.motions)[0] < 1e-6
         found.append(prepared.frequencies(0, 8))
     np.testing.assert_allclose(found[1], found[0], rtol=1e-2)
     if shutil.which("ccx") is not None:

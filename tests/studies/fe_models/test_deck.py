@@ -8,7 +8,7 @@ import pytest
 from studies.fe_models.deck.contents import Material, SurfacePair
 from studies.fe_models.deck.read import read_deck
 from studies.scene_error import SceneError
-from tests.studies.fe_models.decks import BLOCKS, CUBES, PART, prepared_deck, write
+from tests.studies.fe_models.decks import BLOCKS, CUBES, PART, hexes, prepared_deck, write
 
 
 def line_of(text):
@@ -134,16 +134,9 @@ def test_case_line_ends_and_blanks_do_not_matter(tmp_path, cubes, name):
     assert len(deck.centrifugal) == len(deck.skipped) == 1
 
 
-GRID = "*NODE, NSET=N\n" + "".join(
-    f"{1 + i + 3 * j + 9 * k}, {i}, {2 * j}, {0.5 * k}\n" for k in range(3) for j in range(3) for i in range(3)
-)
-CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
-CELLS = "*ELEMENT, TYPE=C3D8, ELSET=E\n" + "".join(
-    f"{1 + i + 2 * j + 4 * k}, " + ", ".join(str(1 + i + a + 3 * (j + b) + 9 * (k + c)) for a, b, c in CORNERS) + "\n"
-    for k in range(2)
-    for j in range(2)
-    for i in range(2)
-)
+HEADS = "*NODE, NSET=N", "*ELEMENT, TYPE=C3D8, ELSET=E"
+PARTS = zip(HEADS, hexes(1, (2, 2, 2), lambda x, y, z: (x, 2 * y, 0.5 * z)), strict=True)
+GRID, CELLS = ("\n".join([head, *lines, ""]) for head, lines in PARTS)
 MADE_NODES = """\
 *NODE
 1, 0, 0, 0

@@ -5,19 +5,9 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from studies.fe_models.matrices.read import read_matrices
-from studies.finite_element.elements import ASSEMBLED_KINDS
-from studies.finite_element.solid_mesh import (
-    ElementGroup,
-    Material,
-    Rotation,
-    SolidMesh,
-    assemble_mass,
-    assemble_stiffness,
-    assemble_tangent_stiffness,
-    centrifugal_load,
-    check_elements,
-    spin_softening,
-)
+from studies.finite_element import solid_mesh
+from studies.finite_element.elements import ASSEMBLED_KINDS as KINDS
+from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.scene_error import SceneError
 from tests.studies.fe_models.solid_meshes import (
     EXPORT,
@@ -29,8 +19,6 @@ from tests.studies.fe_models.solid_meshes import (
     node_set,
     run_ccx,
 )
-
-KINDS = ASSEMBLED_KINDS
 
 
 def skewed(points):
@@ -63,9 +51,9 @@ def test_agrees_with_calculix(kind, tmp_path):
     exported = read_matrices(tmp_path / "job")
     stiffness, mass = exported.stiffness, exported.mass
     n = 3 * mesh.n_nodes
-    own = assemble_mass(mesh)
+    own = solid_mesh.assemble_mass(mesh)
     assert np.abs(own - mass[:n, :n]).max() < 1e-12 * np.abs(own).max()
-    own = assemble_stiffness(mesh)
+    own = solid_mesh.assemble_stiffness(mesh)
     if kind == "C3D8I":
         # CalculiX keeps the incompatible modes as nodes of their own, and has another variant of them
         inner = stiffness[n:, n:].toarray()
@@ -78,7 +66,7 @@ def test_agrees_with_calculix(kind, tmp_path):
 @pytest.mark.parametrize("kind", KINDS)
 def test_patch_test(kind):
     mesh, reference = block(kind, (2, 2, 2), warped(3), straight=True)
-    stiffness = assemble_stiffness(mesh)
+    stiffness = solid_mesh.assemble_stiffness(mesh)
     gradient = 1e-3 * np.array([[1.0, 0.3, -0.2], [0.5, -0.7, 0.4], [0.1, -0.6, 0.9]])
     exact = (mesh.coordinates @ gradient.T).ravel()
     inner = np.repeat(((reference > 0.0) & (reference < 1.0)).all(axis=1), 3)
@@ -92,7 +80,7 @@ def test_stress_stiffening_of_a_stretched_bar(kind):
     mesh, _ = block(kind, (2, 1, 1), lambda points: points * size)
     x, y, z = mesh.coordinates.T
     stretched = strain * np.stack([x, -STEEL.poisson_ratio * y, -STEEL.poisson_ratio * z], axis=1)
-    tangent = assemble_tangent_stiffness(mesh, stretched.ravel())
+    tangent = solid_mesh.assemble_tangent_stiffness(mesh, stretched.ravel())
     # A rotation of angle 1 stores force times length, a translation nothing.
     turn = np.stack([-y, x, 0.0 * x], axis=1).ravel()
     work = STEEL.young_modulus * strain * size.prod()
@@ -114,13 +102,13 @@ def test_prestress_agrees_with_calculix(kind, tmp_path):
     run_ccx(tmp_path, [*deck_lines(mesh), *node_set("F", mesh.numbers[held]), *static, *export])
     expected = read_matrices(tmp_path / "job").stiffness
 
-    stiffness, mass = assemble_stiffness(mesh), assemble_mass(mesh)
+    stiffness, mass = solid_mesh.assemble_stiffness(mesh), solid_mesh.assemble_mass(mesh)
     rotation = Rotation(5e5, np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    load = centrifugal_load(mass, mesh.coordinates, rotation)
+    load = solid_mesh.centrifugal_load(mass, mesh.coordinates, rotation)
     free = np.repeat(reference[:, 0] > 0.0, 3)
     displacements = np.zeros_like(load)
     displacements[free] = spsolve(stiffness[free][:, free].tocsc(), load[free])
-    own = assemble_tangent_stiffness(mesh, displacements) + spin_softening(mass, rotation)
+    own = solid_mesh.assemble_tangent_stiffness(mesh, displacements) + solid_mesh.spin_softening(mass, rotation)
     assert np.abs(own - expected).max() < 1e-12 * np.abs(own).max()
     assert np.abs(stiffness - expected).max() > 1e-5 * np.abs(own).max()
 
@@ -136,7 +124,7 @@ def test_bending_does_not_lock():
         free = np.repeat(reference[:, 0] > 0.0, 3)
         load = np.zeros((mesh.n_nodes, 3))
         load[reference[:, 0] == 1.0, 1] = 0.25
-        solved = spsolve(assemble_stiffness(mesh)[free][:, free].tocsc(), load.ravel()[free])
+        solved = spsolve(solid_mesh.assemble_stiffness(mesh)[free][:, free].tocsc(), load.ravel()[free])
         deflections.append(solved @ load.ravel()[free])
     assert deflections[0] == pytest.approx(beam, rel=0.005)
     assert deflections[1] < 0.6 * beam
@@ -148,6 +136,6 @@ def test_inverted_element_is_named():
     nodes = group.nodes.copy()
     nodes[3] = nodes[3, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
     wrong = SolidMesh(mesh.coordinates, mesh.numbers, (ElementGroup("C3D10", nodes, group.numbers, STEEL),))
-    check_elements(mesh)
+    solid_mesh.check_elements(mesh)
     with pytest.raises(SceneError, match=r"element 4 is turned inside out"):
-        check_elements(wrong)
+        solid_mesh.check_elements(wrong)

@@ -105,7 +105,7 @@ def test_pairs_on_cut_faces_and_planes_of_symmetry():
     sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 4, 2), blade_shape=wedge_shape)
     joint = sector.joint(held=plane_of_symmetry(sector))
     scene = build_fe_scene(sector.model(prestress=False), joint, ReductionOptions(n_modes=4), 1)
-    contact, pairs = scene.model.contact, scene.pairs
+    contact, pairs = scene.model.contact, scene.prepared.pairs
     face = 0.04 * 2.0 * 0.2 * np.tan(np.pi / N_SECTORS)
     assert contact.area.sum() == pytest.approx(face, rel=1e-10)
     assert contact.n_contact == 4 * 3
@@ -148,7 +148,7 @@ def test_plain_assembly_without_cyclic_symmetry():
     assert np.array_equal(scene.model.contact.friction_coefficient, np.full(scene.model.contact.n_contact, 0.3))
     assert prepare_model(model, joint).weight.sum() == pytest.approx(7800.0 * 0.03 * 0.004 * 0.15, rel=1e-10)
     # the upper plate as a whole: a rigid relative motion that nothing resists, and that moves its mass
-    pairs, linear = scene.pairs, scene.model.linear[0]
+    pairs, linear = scene.prepared.pairs, scene.model.linear[0]
     shift = np.zeros(len(linear.mass))
     motion = np.array([0.3, -0.2, 0.5])
     shift[: 3 * pairs.n_contact] = (pairs.frames @ motion).ravel()
@@ -207,7 +207,7 @@ def test_more_modes_than_a_singular_mass_has(kind, monkeypatch):
     assert np.isfinite(frequencies).all()
     mass = scene.model.linear[2].mass
     n = len(mass) - len(frequencies)
-    assert n == 3 * scene.pairs.n_contact
+    assert n == 3 * scene.prepared.pairs.n_contact
     assert np.linalg.eigvalsh(mass)[0] > -1e-9
     # by Lanczos' method, as those of a large model
     monkeypatch.setattr(reduction, "_SMALL", 0)
@@ -257,7 +257,8 @@ def test_retainer_acts_on_the_mean_relative_displacement():
     with_it, without = (build_fe_scene(model, each, ReductionOptions(n_modes=3), 1) for each in (retained, joint))
     added = with_it.model.linear[0].stiffness - without.model.linear[0].stiffness
     shift = np.zeros(len(added))
-    shift[: 3 * without.pairs.n_contact] = (without.pairs.frames @ np.array([0.25, 0.1, -3.0])).ravel()
+    relative = without.prepared.pairs.frames @ np.array([0.25, 0.1, -3.0])
+    shift[: relative.size] = relative.ravel()
     assert shift @ added @ shift == pytest.approx(5e6 * 0.25**2, rel=1e-10)
     assert np.linalg.matrix_rank(added, tol=1.0) == 1
 
@@ -277,8 +278,6 @@ def test_a_long_body_that_turns_freely_is_not_held():
 
 def test_what_cannot_be_is_said():
     model, joint = plates()
-    with pytest.raises(SceneError, match="nothing holds the glued structure"):
-        build_fe_scene(model, replace(joint, held=np.zeros_like(joint.held)), ReductionOptions(), 1)
     with pytest.raises(SceneError, match=r"nodal_diameter: 2; only a cyclic sector has one"):
         build_fe_scene(model, joint, ReductionOptions(nodal_diameter=2), 1)
     # free along x, in matrices of few digits, which hold it or push it
@@ -291,8 +290,6 @@ def test_what_cannot_be_is_said():
         with pytest.raises(SceneError, match="stiffness is singular, as far as the digits of the matrices tell"):
             prepare_model(free, loose).frequencies(0, 1)
     sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 2, 1))
-    with pytest.raises(SceneError, match="use at most n_sectors // 2 = 6"):
-        build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=7), 1)
     mass = assemble_mass(sector.mesh)
     softened = assemble_stiffness(sector.mesh) + spin_softening(mass, Rotation(1e9, np.zeros(3), Z))
     fast = FeModel(sector.mesh, forms={"stiffness": softened, "mass": mass})

@@ -6,22 +6,14 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from studies.finite_element import surfaces
 from studies.finite_element.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
-from studies.finite_element.rigid_motions import rigid_motions
-from studies.finite_element.surfaces import (
-    closest_points,
-    faces_of_elements,
-    integrate_shapes,
-    surface_of_faces,
-    surface_of_nodes,
-)
+from studies.finite_element.solid_mesh import rigid_motions
 from studies.scene_error import SceneError
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, surface_where
 from tests.studies.fe_models.solid_meshes import block, joined
-
-KINDS = tuple(ELEMENT_KINDS)
 
 NONE = np.empty(0, dtype=np.int64)
 
@@ -32,12 +24,12 @@ def tube(points):
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.5 * points[:, 2]], axis=1)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ELEMENT_KINDS)
 def test_forces_of_a_pressure(kind):
     """5 Pa on a face of 2 by 3 m: its resultant and moments, of quadratic faces the second moment as well."""
     mesh, _ = block(kind, (2, 2, 2), lambda points: points * [2.0, 3.0, 1.0])
     faces = faces_where(mesh, np.abs(mesh.coordinates[:, 2] - 1.0) < 1e-9)
-    areas, vectors = integrate_shapes(mesh.coordinates, faces_of_elements(mesh, "TOP", *faces))
+    areas, vectors = surfaces.integrate_shapes(mesh.coordinates, surfaces.faces_of_elements(mesh, "TOP", *faces))
     forces = -5.0 * vectors
     np.testing.assert_allclose(areas, vectors[:, 2], atol=1e-12)
     np.testing.assert_allclose(forces.sum(axis=0), [0.0, 0.0, -30.0], atol=1e-12)
@@ -46,7 +38,7 @@ def test_forces_of_a_pressure(kind):
         assert forces[:, 2] @ mesh.coordinates[:, 0] ** 2 == pytest.approx(-40.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ELEMENT_KINDS)
 def test_areas_and_normals_of_a_cylinder(kind):
     mesh, reference = block(kind, (1, 12, 2), tube)
     surface = surface_where(mesh, "INSIDE", reference[:, 0] == 0.0)
@@ -59,7 +51,7 @@ def test_areas_and_normals_of_a_cylinder(kind):
     assert np.abs(normal - inwards)[inner].max() < (0.03 if kind in ("C3D4", "C3D10", "C3D10M") else 4e-3)
     assert np.abs(normal - inwards).max() < 0.08
     nodes = np.flatnonzero(reference[:, 0] == 0.0)
-    again = surface_of_nodes(mesh, "INSIDE", nodes)
+    again = surfaces.surface_of_nodes(mesh, "INSIDE", nodes)
     assert np.array_equal(again.nodes, nodes)
     assert np.allclose(again.areas_and_normals(mesh.coordinates)[0], area, rtol=1e-12)
 
@@ -70,7 +62,7 @@ def test_closest_points_against_a_search(kind):
     surface = surface_where(mesh, "OUTSIDE", reference[:, 0] == 1.0)
     rng = np.random.default_rng(1)
     points = tube(np.column_stack([1.1 + 0.0 * rng.random(12), rng.uniform(-0.1, 1.1, 12), rng.uniform(-0.1, 1.1, 12)]))
-    weights, distances = closest_points(points, surface, mesh.coordinates)
+    weights, distances = surfaces.closest_points(points, surface, mesh.coordinates)
 
     def on_quad(place, corners):
         (a, b, c, d), (x, y) = corners, place
@@ -123,8 +115,8 @@ def test_a_coarse_surface_inside_a_finer_one_moves():
     first, a = block("C3D8", (8, 8, 1))
     second, b = block("C3D8", (2, 2, 1), lambda points: 0.5 * points + [0.3, 0.2, 1.0])
     mesh = joined(first, second)
-    low = surface_of_nodes(mesh, "LOW", np.flatnonzero(a[:, 2] == 1.0))
-    up = surface_of_nodes(mesh, "UP", first.n_nodes + np.flatnonzero(b[:, 2] == 0.0))
+    low = surfaces.surface_of_nodes(mesh, "LOW", np.flatnonzero(a[:, 2] == 1.0))
+    up = surfaces.surface_of_nodes(mesh, "UP", first.n_nodes + np.flatnonzero(b[:, 2] == 0.0))
     pairs = build_contact_pairs(mesh, [ContactSurfaces(low, up)], Z)
     assert pairs.moving_name == ("UP",)
     assert pairs.area.sum() == pytest.approx(0.25)
@@ -146,11 +138,11 @@ def test_wrong_surfaces_are_named():
     with pytest.raises(SceneError, match="LOW and LOW share 9 nodes"):
         build_contact_pairs(mesh, [ContactSurfaces(low, low)], Z)
     with pytest.raises(SceneError, match=r"face S5 of element 1 \(C3D4\)"):
-        surface_of_faces(block("C3D4", (1, 1, 1))[0], "S", np.array([1]), np.array([5]))
+        surfaces.surface_of_faces(block("C3D4", (1, 1, 1))[0], "S", np.array([1]), np.array([5]))
     with pytest.raises(SceneError, match="names element 99"):
-        surface_of_faces(mesh, "S", np.array([99]), np.array([1]))
+        surfaces.surface_of_faces(mesh, "S", np.array([99]), np.array([1]))
     with pytest.raises(SceneError, match="2 of 10 nodes of S belong to no face"):
-        surface_of_nodes(mesh, "S", np.append(up.nodes[: 10 - 1], mesh.n_nodes - 1))
+        surfaces.surface_of_nodes(mesh, "S", np.append(up.nodes[: 10 - 1], mesh.n_nodes - 1))
 
 
 def test_cut_faces_are_matched_and_found():
@@ -177,11 +169,8 @@ def test_cut_faces_are_matched_and_found():
 def test_wrong_cut_faces_are_named():
     sector = Sector("C3D8", "C3D8")
     mesh = sector.mesh
-    axis = CyclicAxis(47, np.zeros(3), Z)
-    with pytest.raises(SceneError, match=r"cut faces are 30 degrees apart, 47 sectors need 7\.66"):
-        match_cut_faces(mesh, axis, sector.left, sector.right)
     with pytest.raises(SceneError, match=r"no node has an image under rotation by 7\.66 degrees"):
-        find_cut_faces(mesh, axis, NONE)
+        find_cut_faces(mesh, CyclicAxis(47, np.zeros(3), Z), NONE)
     axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
     coordinates = mesh.coordinates.copy()
     coordinates[sector.left[2]] += [1e-3, 0.0, 0.0]

@@ -14,7 +14,6 @@ from studies.fe_models.matrices.read import read_matrices
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.finite_element.solid_mesh import Rotation
 from studies.finite_element.structure import FeModel, ReductionOptions
-from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import listed_frequencies
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
 from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, needs_ccx, node_set, run_ccx
@@ -89,12 +88,6 @@ def test_matrices_of_calculix(kind, tmp_path):
     expected = calculix_frequencies(tmp_path, lines, (0, 3, 6), "*STEP, PERTURBATION")
     own = np.array([scene.glued_frequencies[k] for k in (0, 3, 6)])
     assert np.abs(own / expected - 1.0).max() < 2e-5
-    # the mesh says the same
-    other = build_fe_scene(sector.model(), sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
-    for k in (0, 3, 6):
-        for name in ("stiffness", "mass", "load_static", "response"):
-            ours, theirs = (getattr(each.model.linear[k], name) for each in (other, scene))
-            assert np.abs(ours - theirs).max() <= 1e-7 * np.abs(theirs).max()
 
 
 def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
@@ -117,13 +110,8 @@ def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
         prepared = prepare_model(loaded.model, loaded.joint)
         found = [prepared.frequencies(k, N_MODES) for k in (0, 3, 6)]
         np.testing.assert_allclose(found, expected, rtol=1e-7)
-    rows = dict(describe_model(loaded, reduce_model(loaded, parameters, 1), parameters))
+    rows = dict(describe_model(loaded, reduce_model(loaded, 1)))
     assert "8 nodes of TRAIL on LEAD of the sector before" in rows["contact"]
-    for change, key in (({"next_sector": ["TIP"]}, "next_sector"), ({"n_sectors": None}, "n_sectors")):
-        parameters = Parameters(**given | {"contact": [["LEAD", "TRAIL"]], "next_sector": True} | change)
-        with pytest.raises(SceneError) as caught:
-            load_model(find_files(tmp_path, "s.inp", parameters), parameters)
-        assert caught.value.key == key
 
 
 def test_stuck_shrouds_are_those_of_calculix(tmp_path):

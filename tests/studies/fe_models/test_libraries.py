@@ -9,13 +9,9 @@ import pytest
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.meshes import read_mesh_file
 from studies.scene_error import SceneError
+from tests.studies.fe_models.decks import write
 
 needs_ansys = pytest.mark.skipif(importlib.util.find_spec("ansys") is None, reason="ansys-mapdl-reader is not there")
-
-
-def write(folder, text, name="mesh.msh"):
-    (folder / name).write_text(text)
-    return folder / name
 
 
 GMSH_41 = """\
@@ -57,17 +53,18 @@ $EndElements
 """
 
 
-def test_gmsh_41(tmp_path):
-    deck = read_mesh_file(write(tmp_path, GMSH_41))
+def test_gmsh_41_and_what_is_no_mesh(tmp_path):
+    deck = read_mesh_file(write(tmp_path, GMSH_41, "mesh.msh"))
     assert [(block.kind, block.nodes.tolist()) for block in deck.blocks] == [("C3D4", [[1, 2, 3, 4], [2, 3, 4, 5]])]
     sets = {name: nodes.tolist() for name, nodes in deck.node_sets.items()}
     assert sets == {"UNDER": [1, 2, 3], "BLOCK": [1, 2, 3, 4, 5]}
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
-    # words of Python say nothing of the file
-    with pytest.raises(
-        SceneError, match=r"mesh.msh is damaged, or of a kind that meshio does not know; write it again"
-    ):
-        read_mesh_file(write(tmp_path, GMSH_41.replace("1 5 1 5", "1 5 x 5")))
+    with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):
+        read_mesh_file(tmp_path / "mesh.med")
+    with pytest.raises(SceneError, match=r"there is no file none.cdb"):
+        read_mesh_file(tmp_path / "none.cdb")
+    with pytest.raises(SceneError, match=r"mesh.msh is damaged, or of a kind that meshio does not know; write it"):
+        read_mesh_file(write(tmp_path, GMSH_41.replace("1 5 1 5", "1 5 x 5"), "mesh.msh"))
 
 
 def write_cdb(folder, commands, types):
@@ -110,20 +107,12 @@ def test_elements_of_a_cdb_in_another_form(tmp_path, form):
         read_mesh_file(path)
 
 
-def test_meshes_by_their_ending(tmp_path):
-    assert read_mesh_file(write(tmp_path, "*NODE\n1,0,0,0\n", "mesh.inp")).node_numbers.tolist() == [1]
-    with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):
-        read_mesh_file(tmp_path / "mesh.med")
-    with pytest.raises(SceneError, match=r"there is no file none.cdb"):
-        read_mesh_file(tmp_path / "none.cdb")
-
-
 @pytest.mark.parametrize("library", ["meshio", "ansys.mapdl.reader"])
 def test_missing_library(tmp_path, monkeypatch, library):
     monkeypatch.setitem(sys.modules, library, None)
     if library == "meshio":
         with pytest.raises(SceneError, match=r"msh needs the library meshio, .*: pip install meshio"):
-            read_mesh_file(write(tmp_path, GMSH_41))
+            read_mesh_file(write(tmp_path, GMSH_41, "mesh.msh"))
         return
     monkeypatch.setitem(sys.modules, "ansys.mapdl", None)
     (tmp_path / "job.full").write_bytes(b"1")
@@ -161,7 +150,8 @@ def test_order_of_mid_side_nodes(tmp_path, kind):
     nodes = "\n".join(f"{n} {x} {y} {z}" for n, (x, y, z) in enumerate(points, 1))
     element = " ".join(map(str, range(1, len(points) + 1)))
     head = f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(points)}\n{nodes}\n$EndNodes\n"
-    deck = read_mesh_file(write(tmp_path, f"{head}$Elements\n1\n1 {number} 2 1 1 {element}\n$EndElements\n"))
+    text = f"{head}$Elements\n1\n1 {number} 2 1 1 {element}\n$EndElements\n"
+    deck = read_mesh_file(write(tmp_path, text, "mesh.msh"))
     (block,) = deck.blocks
     found = deck.coordinates[deck.rows_of_nodes(block.nodes[0])]
     assert block.kind == kind
