@@ -75,7 +75,7 @@ def compute_study(
     with display:
         for line in _notes(ranks, study, scenes, store, facts):
             display.say(line)
-        run = StudyRun(completion, scenes.models, display)
+        run = StudyRun(completion, scenes.models, display, ranks.size)
         if run.n_points:
             display.say(f"from an earlier run: {run.n_points} of {count(plan.n_points, 'point')}")
         try:

@@ -93,8 +93,7 @@ class SceneTask:
     number: int
     study: Study
     known: Packed | None = None
-    cost: float = 1.0
-    n_results: int = 1
+    costs: tuple[float, ...] = (1.0,)
     gives_starts: bool = False
     cost_keys: CostKeys = (("scene",),)
 

@@ -84,6 +84,7 @@ def build_tasks(
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
     amplitudes = study.axes.modal_amplitude or ()
     ascending = sorted(range(len(amplitudes)), key=lambda place: amplitudes[place])
+    first, whole = (iterations_of_mode(number) for number in (1, len(amplitudes)))
     modes: dict[Mode, list[dict[str, int]]] = {}
     for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         joint = joint_of(part.study, scene, contact)
@@ -94,7 +95,8 @@ def build_tasks(
                 number=0,
                 scenes=(scene,),
                 settings=settings,
-                cost=seconds_of(n_unknowns, iterations_of_mode(len(amplitudes))),
+                cost=seconds_of(n_unknowns, whole),
+                first_share=first / whole,
                 n_unknowns=n_unknowns,
                 joint=joint,
                 mode=study.axes.mode[at["mode"]],

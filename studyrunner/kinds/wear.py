@@ -210,7 +210,7 @@ class History(_FromRest):
         kind = "history" if self.moves else "history at rest"
         near, here = (kind, self.sweep, "near", self.position // _NEIGHBOURS), (kind, self.sweep, self.position)
         wear = (kind, self.wear_coefficient, tuple((each.step, each.scheme) for each in self.integrated))
-        return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
+        return (("task", kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
 
     def from_start(self, result: StartResult) -> History:
         """The history from a start state. Its time grows with the unknowns: a history seldom factorises anew."""

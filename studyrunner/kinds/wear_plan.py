@@ -141,8 +141,9 @@ def build_tasks(
         case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
         of_case = case | outputs
         for frequencies in [[one] for one in ascending] if direction == "ramp" else [ascending]:
-            cost = seconds_of(n_unknowns, iterations_of_sweep(direction, len(frequencies)))
-            sweep = Sweep(number=len(sweeps), frequencies=tuple(frequencies), cost=cost, **case)
+            first, whole = (iterations_of_sweep(direction, number) for number in (1, len(frequencies)))
+            cost, number = seconds_of(n_unknowns, whole), len(sweeps)
+            sweep = Sweep(number=number, frequencies=tuple(frequencies), cost=cost, first_share=first / whole, **case)
             sweeps.append(sweep)
             for position, frequency in enumerate(frequencies):
                 for law, of_law in starts.items():

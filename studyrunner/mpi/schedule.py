@@ -12,10 +12,12 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from studyrunner.mpi.dispatch import CostModel, Dispatcher, Job
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks
+from studyrunner.system.compiling import telling, working_seconds
 from studyrunner.system.machine import UnseenFileError
 from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 
@@ -108,7 +110,8 @@ def follow_rank_0(ranks: Ranks, run: Run, check: Callable[[], None] = raise_endi
 
 def _work(assignment: _Assignment, ranks: Ranks, run: Run, check: Callable[[], None]) -> None:
     """Sends the results of a job, each as soon as it is there."""
-    job, n_given, began = assignment.job, 0, time.perf_counter()
+    job, n_given, began = assignment.job, 0, working_seconds()
+    n_results = len(job.costs)
     pause = SECONDS_TO_PROGRESS * max(1.0, ranks.size / _MANY_RANKS)
     sent, first = dict[type, float](), began  # data and words have times of their own
 
@@ -116,25 +119,26 @@ def _work(assignment: _Assignment, ranks: Ranks, run: Run, check: Callable[[], N
         ranks.send(_Reply(assignment.number, content, seconds), 0)
         ranks.flush()
 
-    def keep(progress: object) -> None:
+    def keep(progress: object, *, at_once: bool = False) -> None:
         check()
         # a job that has given all its results has no progress
-        if n_given < job.n_results and time.perf_counter() > sent.get(type(progress), first) + pause:
+        if n_given < n_results and (at_once or working_seconds() > sent.get(type(progress), first) + pause):
             send(progress)
-            sent[type(progress)] = time.perf_counter()
+            sent[type(progress)] = working_seconds()
 
     try:
-        for result in run(job, keep):
-            n_given += 1
-            if n_given > job.n_results:
-                break
-            send(result, time.perf_counter() - began)
-            began = time.perf_counter()
+        with telling(partial(keep, at_once=True)):
+            for result in run(job, keep):
+                n_given += 1
+                if n_given > n_results:
+                    break
+                send(result, working_seconds() - began)
+                began = working_seconds()
     except UnseenFileError as error:
         send(error)
         return
-    if n_given != job.n_results:
-        raise ValueError(f"not {job.n_results} results from {job}")
+    if n_given != n_results:
+        raise ValueError(f"not {n_results} results from {job}")
 
 
 class _OwnThread(Ranks):
