@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -71,45 +71,21 @@ class _Together(NamedTuple):
     iterations: float
 
 
-class _FromStart(NamedTuple):
-    """The histories from one start state. first: number of the first task. case: what they share with others."""
-
-    first: int
-    case: Mapping[str, Any]
-    law: WearLaw
-    sweep: int
-    position: int
-    frequency: float
-    tasks: Sequence[_Together]
-    at: Sequence[Index]
-
-    def history(self, number: int) -> History:
-        """A task, by its number among those from this state."""
-        integrated, points, iterations = self.tasks[number]
-        return History(
-            number=self.first + number,
-            law=self.law,
-            sweep=self.sweep,
-            position=self.position,
-            frequency=self.frequency,
-            integrated=integrated,
-            indices=tuple(tuple(self.at[point] for point in same) for same in points),
-            cost=seconds_of(self.case["n_unknowns"], iterations),
-            **self.case,
-        )
+_Sharing = Callable[[tuple[_Values, ...]], tuple[tuple[_Together, ...], Counter[str]]]
+"""`_share_histories` of a study: most start states have points with the same values."""
 
 
 class _Histories(Sequence[History]):
     """The histories of a study, each made when it is asked for: `--plan` of 10^6 points takes a fifth of the memory."""
 
-    def __init__(self, starts: Sequence[_FromStart]) -> None:
-        self._starts = starts
+    def __init__(self, make: Callable[[], Iterator[History]], length: int) -> None:
+        self._make, self._length = make, length
 
     def __len__(self) -> int:
-        return self._starts[-1].first + len(self._starts[-1].tasks)
+        return self._length
 
     def __iter__(self) -> Iterator[History]:
-        return (start.history(number) for start in self._starts for number in range(len(start.tasks)))
+        return self._make()
 
     def __getitem__(self, place: Any) -> Any:
         return tuple(self)[place]
@@ -123,7 +99,6 @@ def build_tasks(
     Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
     their own never do. The order and the numbers of the tasks depend on the study alone.
     """
-    sweeps, histories, causes = list[Sweep](), list[_FromStart](), Counter[str]()
     outputs: dict[str, Any] = {
         "cycles": study.output_counts,
         "variables": tuple(study.recorded),
@@ -131,33 +106,51 @@ def build_tasks(
         "until": study.until,
         "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
     }
-    # most start states have points with the same values
     sharing = cache(partial(_share_histories, study))
-    n_histories = 0
+    sweeps, of_sweeps, causes, n_histories = list[Sweep](), list[_Starts](), Counter[str](), 0
     for (joint, excitation, settings), starts in _cases(study, contacts, scenes).items():
         ascending, direction = sorted(set[float]().union(*starts.values())), excitation.direction
         n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
         case: dict[str, Any] = {"joint": joint, "excitation": excitation, "settings": settings}
         case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
-        of_case = case | outputs
         for frequencies in [[one] for one in ascending] if direction == "ramp" else [ascending]:
             first, whole = (iterations_of_sweep(direction, number) for number in (1, len(frequencies)))
-            cost, number = seconds_of(n_unknowns, whole), len(sweeps)
-            sweep = Sweep(number=number, frequencies=tuple(frequencies), cost=cost, first_share=first / whole, **case)
-            sweeps.append(sweep)
-            for position, frequency in enumerate(frequencies):
-                for law, of_law in starts.items():
-                    if frequency not in of_law:
-                        continue
-                    values, at = of_law.pop(frequency)
-                    tasks, of_start = sharing(tuple(values))
-                    where = law, sweep.number, position, frequency
-                    histories.append(_FromStart(n_histories, of_case, *where, tasks, at))
-                    n_histories += len(tasks)
-                    if of_start:
-                        causes.update(of_start)
+            case |= {"cost": seconds_of(n_unknowns, whole), "first_share": first / whole}
+            sweeps.append(Sweep(number=len(sweeps), frequencies=tuple(frequencies), **case))
+            of_sweeps.append(starts)
+        for points in itertools.chain.from_iterable(of_law.values() for of_law in starts.values()):
+            tasks, shared = sharing(tuple(points.values))
+            n_histories += len(tasks)
+            causes.update(shared)
+
+    make = partial(_make_histories, tuple(zip(sweeps, of_sweeps, strict=True)), sharing, outputs)
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
-    return TaskPlan(_Histories(histories), left_out, study.n_points, tuple(sweeps))
+    return TaskPlan(_Histories(make, n_histories), left_out, study.n_points, tuple(sweeps))
+
+
+def _make_histories(
+    sweeps: Sequence[tuple[Sweep, _Starts]], sharing: _Sharing, outputs: Mapping[str, Any]
+) -> Iterator[History]:
+    """The histories from the start states of all sweeps, in the order of the study."""
+    number = itertools.count()
+    for sweep, starts in sweeps:
+        case = {name: getattr(sweep, name) for name in ("joint", "excitation", "settings", "scenes", "n_unknowns")}
+        for position, frequency in enumerate(sweep.frequencies):
+            for law, of_law in starts.items():
+                values, at = of_law.get(frequency, ((), ()))
+                for together in sharing(tuple(values))[0]:
+                    yield History(
+                        number=next(number),
+                        law=law,
+                        sweep=sweep.number,
+                        position=position,
+                        frequency=frequency,
+                        integrated=together.integrated,
+                        indices=tuple(tuple(at[point] for point in same) for same in together.points),
+                        cost=seconds_of(sweep.n_unknowns, together.iterations),
+                        **case,
+                        **outputs,
+                    )
 
 
 def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet) -> dict[_Case, _Starts]:
