@@ -20,14 +20,12 @@ from studyrunner.kinds.results import build_result
 from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, digest, up_or_down
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.study.study import Study
+from studyrunner.variables import OWN_STEPS
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.results.history import StartState
     from solver.wear.wearing_joint import WearRequest
-
-OWN_STEPS = ("adaptive", "final")
-"""Schemes that choose their steps: for another wear coefficient the same ones at other counts."""
 
 _COST_AT_REST = 0.01  # estimated time of a history in which nothing wears, over that of a history with steps
 _NEIGHBOURS = 4  # frequencies whose histories take about as long

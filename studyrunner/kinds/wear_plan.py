@@ -19,9 +19,10 @@ from solver.contact.wear_law import WearLaw
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, Index, TaskJoint, TaskPlan, grid, joint_of, n_unknowns_of
-from studyrunner.kinds.wear import OWN_STEPS, Excitation, History, Integrated, Sweep
+from studyrunner.kinds.wear import Excitation, History, Integrated, Sweep
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
+from studyrunner.variables import OWN_STEPS
 
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as

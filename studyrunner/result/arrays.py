@@ -12,12 +12,11 @@ from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.scene.answers import SmallArray
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import (
-    PairArrays,
     SceneSet,
     along_axes,
+    axes_of_difference,
     drawn_pairs,
     merge_facts,
-    pair_arrays,
     scatters_pairs,
     worn_depth,
 )
@@ -54,7 +53,7 @@ def small_arrays(
     hertz = [] if ratios is None else [(("frequency_ratio", *names), np.multiply.outer(ratios, stuck))]
     return [
         *(SmallArray("frequency", *each, COORDINATES["frequency"]) for each in hertz),
-        *coordinates(study, merge_facts(facts), pair_arrays(study, facts, scenes)),
+        *coordinates(study, facts, scenes),
         SmallArray("stuck_frequency", names, stuck, STUCK_FREQUENCY),
         *_worn_coordinate(study, facts),
         *sample_coordinates(study, facts, scenes),
@@ -62,8 +61,9 @@ def small_arrays(
     ]
 
 
-def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[SmallArray]:
-    """Coordinates of the file but those of samples and worn joints."""
+def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
+    """Coordinates of the file but those of samples and worn joints. of_scenes: facts of each."""
+    facts = merge_facts(of_scenes)
     along: dict[str, Sequence[object] | NDArray[np.generic]] = dict(study.dimensions)
     counted = np.array(study.output_counts, dtype=int if study.mission else float)
     along.setdefault(study.kind.counted or "cycle", counted)
@@ -73,16 +73,26 @@ def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[
         along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
     for name, values in along.items():
         yield SmallArray(name, (name,), _labels(values), _coordinate_entry(study, name))
-    of_pairs: dict[str, NDArray[np.generic]] = {
-        f"contact_{axis}": pairs.position[..., column] for column, axis in enumerate("xyz")
-    }
-    of_pairs |= {"contact_area": pairs.area, "contact_surface": pairs.surface}
-    if pairs.exists is not None:
-        of_pairs["contact_exists"] = pairs.exists.astype(np.int8)
-    for name, values in of_pairs.items():
-        yield SmallArray(name, pairs.dimensions, np.array(values), COORDINATES[name])
+    yield from _of_pairs(study, of_scenes, scenes)
     if facts.edge is not None:
         yield SmallArray("contact_edge", ("contact",), facts.edge.astype(np.int8), COORDINATES["contact_edge"])
+
+
+def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
+    """Where the pairs are, along the axes along which scenes differ in them; NaN and "" of a pair that one lacks."""
+    names, numbers = axes_of_difference(study, scenes, [each.pairs for each in facts])
+    contacts = [each.contact for each in facts]
+    shape = (len(facts), max(each.n_contact for each in contacts))
+    position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
+    surface = np.full(shape, "", np.array([label for each in contacts for label in each.surface]).dtype)
+    for number, each in enumerate(contacts):
+        own = slice(each.n_contact)
+        position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
+    found: dict[str, NDArray[np.generic]] = {f"contact_{axis}": position[..., k] for k, axis in enumerate("xyz")}
+    found |= {"contact_area": area, "contact_surface": surface}
+    found |= {"contact_exists": np.isfinite(area).astype(np.int8)} if names else {}
+    for name, values in found.items():
+        yield SmallArray(name, (*names, "contact"), np.array(values[numbers]), COORDINATES[name])
 
 
 def _coordinate_entry(study: Study, name: str) -> Variable:

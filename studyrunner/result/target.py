@@ -10,11 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.hdf5 import open_hdf5, read_attribute
-from studies.scene_error import SceneError
 from studyrunner.checkpoint.store import read_study
-from studyrunner.result.provenance import POINTS_LEFT
-from studyrunner.study.text import read_toml
+from studyrunner.study.text import read_archived, read_toml
 from studyrunner.system.machine import new_partial, sync
 from studyrunner.user_error import UserError
 
@@ -22,7 +19,6 @@ if TYPE_CHECKING:
     from studyrunner.study.study import Study
 
 _TRIAL = bytes(4096)  # a full disk has room for a name
-_UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError, UserError)
 
 
 @dataclass(frozen=True)
@@ -111,16 +107,12 @@ def check_scene_file(option: str, path: Path, study: Study) -> Path:
 
 def _read_result(option: str, path: Path) -> tuple[str | None, bool]:
     """Identity of the study of an existing result, None without one, and whether the result is finished."""
-    with contextlib.suppress(*_UNREADABLE):
+    with contextlib.suppress(OSError, KeyError, TypeError, UserError):
         # damaged, or unreadable: it may be anything
         if not path.exists() or path.stat().st_size == 0:
             return None, False
-        with open_hdf5(path) as file:
-            text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
-            stored: Any = b"" if text is None else text.item()
-            table: Any = read_toml(stored if isinstance(stored, bytes) else stored.encode(), "")
-            # version 0.4.0 does not say how many points are left
-            finished = left is None or left.item() == 0
-            return identity_of(str(table["study"]["name"]), str(table["scene"]["model"])), finished
+        archived = read_archived(path, "")
+        table: Any = read_toml(archived.study.encode(), "")
+        return identity_of(str(table["study"]["name"]), str(table["scene"]["model"])), archived.is_finished
     remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"
     raise UserError("command line", option, str(path), remedy)

@@ -11,7 +11,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
@@ -267,7 +266,7 @@ def _worn_states(study: Study) -> dict[str, object] | None:
 def _override(table: Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
     """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
     if isinstance(overrides, Mapping):
-        source, option, given = "overrides", "", [(key, _plain(value)) for key, value in overrides.items()]
+        source, option, given = "overrides", "", [(key, _as_toml(value)) for key, value in overrides.items()]
     else:
         texts = [overrides] if isinstance(overrides, str) else overrides
         source, option, given = "command line", "--set ", [_key_and_value(text) for text in texts]
@@ -319,12 +318,7 @@ def _key_and_value(text: str) -> tuple[str, object]:
     return key, parsed["value"]
 
 
-def _plain(value: object) -> object:
+def _as_toml(value: object) -> object:
     """A value as TOML has it: numpy's numbers and arrays, tuples and paths are none of its types."""
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
-    return str(value) if isinstance(value, Path) else value
+    plain = json.dumps(value, default=lambda each: each.tolist() if hasattr(each, "tolist") else str(each))
+    return json.loads(plain)

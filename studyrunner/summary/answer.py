@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.result.opening import as_history, describe_outcome
 from studyrunner.result.pairs import contact_pairs
-from studyrunner.result.view import OWN_STEPS, Result
+from studyrunner.result.view import Result
 from studyrunner.summary.findings import (
     LEAST_ERROR,
     Finding,
@@ -29,6 +29,7 @@ from studyrunner.summary.findings import (
 )
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_percent, show_rtol
+from studyrunner.variables import OWN_STEPS
 
 MOST_LINES = 9
 

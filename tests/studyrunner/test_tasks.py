@@ -15,7 +15,7 @@ from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.cli import main
 from studyrunner.kinds.results import build_result
-from studyrunner.plan import describe_tasks, doubts_of_study
+from studyrunner.plan import doubts_of_study, effort_of
 from studyrunner.study.study_file import bundled_studies, read_study
 from studyrunner.variables import ASKED, USUAL
 from tests.mpi.launching import options, results
@@ -90,7 +90,7 @@ def test_a_plan_of_many_points_takes_little_memory():
     study = read_study("sdof_slider", [*many, "axes.scheme=implicit", "axes.step=500"])
     tracemalloc.start()
     try:
-        assert describe_tasks(plan_of(study).results) == "40000 wear histories"
+        assert effort_of(plan_of(study).results).words == "40000 wear histories"
         assert tracemalloc.get_traced_memory()[1] < 250 * study.n_points
     finally:
         tracemalloc.stop()

@@ -14,11 +14,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import Drawn, FloatArray, add_legend, line_style, new_panels, set_log
-from studyrunner.result.view import NO_VOLUME, OWN_STEPS, Result
+from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.units import show_number, show_percent
-
-KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
-"""Axes along which only the numbers change and not what is computed."""
+from studyrunner.variables import OWN_STEPS
 
 QUANTITIES = {"volume": "final worn volume", "response": "response at the end"}
 """What is compared, in words."""
@@ -52,6 +50,10 @@ class Setting(NamedTuple):
         values = {key: value for key, value in self._asdict().items() if value is not None}
         texts = {key: value if isinstance(value, str) else show_number(value, 4) for key, value in values.items()}
         return ", ".join(text if key == "scheme" else f"{key} {text}" for key, text in texts.items())
+
+
+KEYS = Setting._fields
+"""Axes along which only the numbers change and not what is computed."""
 
 
 @dataclass(frozen=True)
