@@ -16,17 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks
+from studyrunner.system import process
 from studyrunner.system.machine import MachineFaultError
-from studyrunner.system.process import (
-    INTERRUPTED,
-    begin_ending,
-    is_ending,
-    keep_talking,
-    last_error,
-    leave_endings,
-    raise_ending,
-    take_endings,
-)
 from studyrunner.user_error import StorageError, UserError
 
 if TYPE_CHECKING:
@@ -71,12 +62,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     ranks = Ranks()
     try:
-        leave_endings()
-        keep_talking()
+        process.leave_endings()
+        process.keep_talking()
         # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         ranks = start_ranks()
-        take_endings()
+        process.take_endings()
         status = CONVERGED
         if ranks.rank == 0:
             status = _lead(ranks, sys.argv[1:] if arguments is None else arguments)
@@ -89,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             follow_rank_0(ranks, evaluator())
         if arguments is None:
             # it has come to its end: what comes while MPI and the interpreter end is of no use to anybody
-            begin_ending()
+            process.begin_ending()
         ranks.close()
         return status
     except LauncherError as error:
@@ -116,15 +107,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _tell(ranks: Ranks, error: BaseException) -> int:
     """Says why a rank has come to its end early, and returns the exit status."""
-    if is_ending(error):
-        begin_ending()
+    if process.is_ending(error):
+        process.begin_ending()
         if ranks.rank > 0 and _leave_to_rank_0(ranks, KeyboardInterrupt()):
             ranks.close()
             return CONVERGED
         if max(ranks.rank, launcher_rank()) == 0 or ranks.size > 1:
             said = str(error) if isinstance(error, KeyboardInterrupt) else ""
             print(f"run-study: {said or 'interrupted'}", file=sys.stderr)
-        return INTERRUPTED
+        return process.INTERRUPTED
     from solver.outcome import describe_error, is_machine_fault
 
     if isinstance(error, StorageError):
@@ -158,17 +149,17 @@ def _leave_to_rank_0(ranks: Ranks, reason: BaseException) -> bool:
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     try:
         options = _parse_options(arguments)
-        raise_ending()
+        process.raise_ending()
         from studyrunner.study.study_file import read_study
 
         study = read_study(options.study, options.overrides)
-        raise_ending()
+        process.raise_ending()
         if options.plan or options.check or options.write_scene is not None:
             return _describe(study, options)
         return _compute(ranks, study, options)
     except UserError as error:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
-        raise_ending()
+        process.raise_ending()
         print(*(f"run-study: {line}" for line in str(error).splitlines()), sep="\n", file=sys.stderr)
     except SystemExit:
         return CONVERGED
@@ -185,7 +176,7 @@ def _describe(study: Study, options: argparse.Namespace) -> int:
     step = ProgressDisplay().step
     if options.plan:
         print(*plan_lines(study, step), sep="\n", flush=True)
-        error = last_error(sys.stdout)
+        error = process.last_error(sys.stdout)
         if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
             raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
     elif options.check:

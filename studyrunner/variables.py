@@ -267,3 +267,10 @@ OF_A_MISSION = {
     "message": OF_A_HISTORY["message"],
 }
 """Those that every result of missions holds."""
+
+IN_FILES = {
+    "cycle": ASKED | OF_A_HISTORY | LOOPS | COUNTS,
+    "modal_amplitude": OF_MODES | OF_A_MODE_POINT,
+    "mission": OF_MISSIONS | OF_A_MISSION,
+}
+"""All that tasks compute, by a dimension that the files of each kind of study alone have."""

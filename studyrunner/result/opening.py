@@ -24,18 +24,7 @@ from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.text import check_result_file, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.values import Wrong
-from studyrunner.variables import (
-    ASKED,
-    CERTIFICATE,
-    COUNTS,
-    LOOPS,
-    OF_A_HISTORY,
-    OF_A_MISSION,
-    OF_A_MODE_POINT,
-    OF_MISSIONS,
-    OF_MODES,
-    Variable,
-)
+from studyrunner.variables import CERTIFICATE, IN_FILES, LOOPS, Variable
 
 ENDED = "ended"
 """Coordinate of an opened result: `outcome` in words."""
@@ -238,11 +227,7 @@ def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Va
     n_values = n_points * math.prod(sizes.get(name, 1) for name in (slow, "response", "block"))
     is_small = n_points <= _MOST_POINTS and n_values <= _MOST_VALUES
     _need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
-    with_axes = ASKED | OF_A_HISTORY | LOOPS | COUNTS | SCENE["exact"]
-    if slow == "mission":
-        with_axes = OF_MISSIONS | OF_A_MISSION
-    elif "modal_amplitude" in axes:
-        with_axes = OF_MODES | OF_A_MODE_POINT
+    with_axes = IN_FILES["modal_amplitude" if "modal_amplitude" in axes else slow] | SCENE["exact"]
     known: dict[str, tuple[tuple[str, ...], Variable | None]] = {}
     for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
         # what is of the scene, or drawn, has those axes along which it differs
