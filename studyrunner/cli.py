@@ -13,12 +13,12 @@ import traceback
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks
 from studyrunner.system import process
 from studyrunner.system.machine import MachineFaultError
-from studyrunner.user_error import StorageError, UserError
+from studyrunner.user_error import Parser, StorageError, UserError
 
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
@@ -169,7 +169,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 def _describe(study: Study, options: argparse.Namespace) -> int:
     """What the options --plan, --check and --write-scene print and write."""
     from studyrunner.plan import plan_lines
-    from studyrunner.result.target import check_output, check_scene_file
+    from studyrunner.result.target import check_output
     from studyrunner.scene.answers import check_study_model, write_study_scene
     from studyrunner.system.progress import ProgressDisplay
 
@@ -185,7 +185,7 @@ def _describe(study: Study, options: argparse.Namespace) -> int:
         print(f"{picture}: the contact pairs and their frames", flush=True)
     else:
         path = options.write_scene
-        write_study_scene(study, check_scene_file("--write-scene", path, study), step)
+        write_study_scene(study, check_output("--write-scene", path, study.files, new=True), step)
         print(f"{path}: the scene of study {study.study.name}", flush=True)
     return CONVERGED
 
@@ -225,15 +225,9 @@ def _answer(path: Path) -> Sequence[str]:
         return (f"no summary: {error}",)
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
-
-
 def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Options from the command line, by their names. Raises UserError; SystemExit after --help, --new and the like."""
-    look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
-    parser = _Parser("run-study", description=_DESCRIPTION, epilog=_EPILOG, **look)
+    parser = Parser("run-study", _DESCRIPTION, _EPILOG)
     add, flag, path = parser.add_argument, dict[str, Any](action="store_true"), dict[str, Any](type=Path)
     which = "TOML file, result file or bundled study (default: dovetail)"
     add("study", nargs="?", default="dovetail", metavar="STUDY", help=which)

@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -116,12 +116,6 @@ class PointResult:
 Result = StartResult | PointResult
 
 
-@cache
-def solver_digest() -> str:
-    """Hash of the source of the solver and of the versions of the packages that it uses."""
-    return package_digest("solver")
-
-
 @dataclass(frozen=True)
 class Identity:
     """What the results of a study depend on beside their tasks.
@@ -134,7 +128,7 @@ class Identity:
 
     def joint(self, joint: TaskJoint) -> tuple[object, ...]:
         """Scene and friction, and the solver."""
-        return (self.scenes[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
+        return (self.scenes[joint.scene], joint.friction_coefficient, *joint.contact, package_digest("solver"))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, Self, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.results import build_result
 from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, digest, up_or_down
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.study.study import Study
 from studyrunner.variables import OWN_STEPS
 
 if TYPE_CHECKING:
@@ -44,12 +43,6 @@ class Excitation:
     amplitude: float
     direction: str
     follow: FollowedFrequency | None
-
-    @classmethod
-    def at(cls, study: Study, at: Mapping[str, int]) -> Self:
-        """That of a point of a study. at: its indices along the axes."""
-        amplitude, direction = (getattr(study.axes, name)[at[name]] for name in ("excitation_amplitude", "sweep"))
-        return cls(amplitude, direction, study.follow)
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,9 @@ def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: Sc
         for at, settings in grid(part.study):
             case = at["excitation_amplitude"], at["sweep"], id(settings)
             if case not in of_cases:
-                starts = cases.setdefault((joint, Excitation.at(part.study, at), settings), {})
+                amplitude, direction = axes.excitation_amplitude[case[0]], axes.sweep[case[1]]
+                excitation = Excitation(amplitude, direction, part.study.follow)
+                starts = cases.setdefault((joint, excitation, settings), {})
                 of_cases[case] = starts.setdefault(law, {})
             frequency, of_law = axes.frequency[at["frequency"]], of_cases[case]
             if frequency not in of_law:
@@ -225,10 +227,6 @@ def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
     for group in groups.values():
         for first in range(0, len(group), MOST_TOGETHER):
             integrated, points = zip(*group[first : first + MOST_TOGETHER], strict=True)
-            yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), _iterations(study, integrated))
-
-
-def _iterations(study: Study, integrated: Sequence[Integrated]) -> float:
-    """Newton iterations of the histories of a task."""
-    cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
-    return iterations_of_histories([(each.scheme, each.step) for each in integrated], cycles)
+            cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
+            iterations = iterations_of_histories([(each.scheme, each.step) for each in integrated], cycles)
+            yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), iterations)

@@ -48,13 +48,6 @@ _WORDS = ("scheme", "sweep")
 _TEXTS = (*_WORDS, "response", "component", "block")
 _DRAWN_VALUES = Variable((), "1", "what the samples draw of an input")
 
-_LIKE_CYCLES = {
-    "mission": "cycle",
-    "last_mission": "last_cycle",
-    "missions_to_target": "cycles_to_target",
-    "missions_to_target_error": "cycles_to_target_error",
-}
-
 
 def open_result(path: str | Path) -> xr.Dataset:
     """Open a result file after a check that it is a result of `run-study`: sizes, dimensions and types.
@@ -130,7 +123,8 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
         if has_unit.any() and not has_unit.all():
             history = history.isel(response=np.flatnonzero(~has_unit))
     if "block" in dataset.dims:
-        renamed = history.rename({name: new for name, new in _LIKE_CYCLES.items() if name in history.variables})
+        names = map(str, history.variables)
+        renamed = history.rename({name: name.replace("mission", "cycle") for name in names if "mission" in name})
         of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
         history, blocks = renamed.drop_vars(of_blocks), renamed[of_blocks]
     if history is not dataset:

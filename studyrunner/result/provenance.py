@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from datetime import UTC, date, datetime
 from importlib import metadata
 
-from studyrunner.kinds.task import solver_digest
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study
+from studyrunner.system.machine import package_digest
 from studyrunner.user_error import UserError
 
 PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4", "h5py", "pydantic")
@@ -32,7 +32,7 @@ _COMMENT = (
 
 def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
     """Attributes that equal runs share, not of time, place or number of ranks; the id is a hash of all inputs."""
-    text, solver = format_study(study), solver_digest()
+    text, solver = format_study(study), package_digest("solver")
     program = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
@@ -82,7 +82,7 @@ def compare_with_archived(study: Study, scene_sha256: str) -> Iterator[str]:
     if there.scene_sha256 not in (None, scene_sha256):
         before = there.scene_sha256[:12] or "missing"
         yield f"its scene_sha256 is {before}, that of the scene built now {scene_sha256[:12]}: another scene"
-    if there.solver_digest != solver_digest():
+    if there.solver_digest != package_digest("solver"):
         yield f"computed by another solver ({there.versions or 'unknown'}; now {versions}): numbers may differ"
 
 

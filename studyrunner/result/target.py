@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from studyrunner.checkpoint.store import read_study
 from studyrunner.study.text import read_archived, read_toml
-from studyrunner.system.machine import new_partial, sync
+from studyrunner.system.machine import find_fault, new_partial
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
 
-_TRIAL = bytes(4096)  # a full disk has room for a name
+_BYTES_OF_TRIAL = 4096  # a full disk has room for a name
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ def identity_of(name: str, model: str) -> str:
     return f'study "{name}" (scene {os.path.basename(model)})'  # noqa: PTH119 - of an empty text as well
 
 
-def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
+def check_output(option: str, path: Path, inputs: Sequence[Path], *, new: bool = False) -> Path:
     """The file at `path`, links followed, after a test that it can be written; nothing is changed.
 
-    option: of the command line, that gave the path. inputs: files that the run reads and must not replace. Raises
-    UserError where the file cannot be written, or is one of the inputs.
+    option: of the command line, that gave the path. inputs: files that the run reads and must not replace. new: whether
+    no file may hold anything there. Raises UserError where the file cannot be written, or is one of the inputs.
     """
     try:
         target = Path(os.path.realpath(path))
@@ -65,14 +65,15 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
             remedy = f"give the name of an ordinary file that may be written, as {progress.name} beside it must be"
         elif is_file and any(source.exists() and target.samefile(source) for source in inputs):
             remedy = f"give another file with {option}: this one is read by the run"
+        elif new and is_file and target.stat().st_size:
+            remedy = "give another name: there is such a file"
         if not remedy:
             trial = new_partial(target)
-            with trial.open("xb") as file:
-                try:
-                    file.write(_TRIAL)
-                    sync(file)
-                finally:
-                    trial.unlink()
+            trial.touch(exist_ok=False)
+            fault = find_fault(trial, _BYTES_OF_TRIAL)
+            trial.unlink()
+            if fault is not None:
+                raise fault
     except OSError as error:
         remedy = f"give a file that can be written: {error.strerror}"
     except ValueError:
@@ -95,14 +96,6 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
             remedy = f"give another name or {how}: {file.name} is of {other}, this is {name}"
             raise UserError("command line", option, str(target.path), remedy)
     return Target(target.path, finished)
-
-
-def check_scene_file(option: str, path: Path, study: Study) -> Path:
-    """As `check_output`, of a scene file. Raises UserError also where there is a file that holds anything."""
-    target = check_output(option, path, study.files)
-    if target.exists() and target.stat().st_size:
-        raise UserError("command line", option, str(target), "give another name: there is such a file")
-    return target
 
 
 def _read_result(option: str, path: Path) -> tuple[str | None, bool]:

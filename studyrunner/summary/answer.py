@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -18,15 +17,7 @@ from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.result.opening import as_history, describe_outcome
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import Result
-from studyrunner.summary.findings import (
-    LEAST_ERROR,
-    Finding,
-    compare_meshes,
-    mode_ranges,
-    shortest_life,
-    wear_and_response,
-    where_is,
-)
+from studyrunner.summary.findings import LEAST_ERROR, Finding, what_came_out, where_is
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_percent, show_rtol
 from studyrunner.variables import OWN_STEPS
@@ -39,7 +30,7 @@ SMALL = 0.1
 _LARGEST = 100.0
 """Size, m, of a model without a mesh: masses on springs that are usual in textbooks move by some 10 m."""
 
-_MOST_FAILURES, _MOST_MODES = 2, 4
+_MOST_FAILURES = 2
 _WIDTH, _LONGEST = 12, 240
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
@@ -97,14 +88,8 @@ def summarise(result: Result) -> Summary:
     """The summary of a result that is opened for the report."""
     stuck = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
     resonance = float(stuck) if stuck.ndim == 0 else math.nan
-    findings, doubts = list[Finding](), list[str]()
-    if result.has_modes:
-        findings += itertools.islice(mode_ranges(result), _MOST_MODES)
-    else:
-        findings += [
-            *wear_and_response(result, resonance),
-            *filter(None, (shortest_life(result), compare_meshes(result))),
-        ]
+    findings, doubts = [*what_came_out(result, resonance)], list[str]()
+    if not result.has_modes:
         doubts += [_not_small(result), _too_far(result), _in_radians(result, resonance), _too_few_counts(result)]
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
     findings += [*(Finding("doubt", "beware", doubt) for doubt in doubts if doubt), *_failures(result)]

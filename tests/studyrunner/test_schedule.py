@@ -15,9 +15,8 @@ from numba.core.event import trigger_event
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
-from studyrunner.mpi.schedule import TaskHandler, serve_tasks
+from studyrunner.mpi.schedule import COMPILING, TaskHandler, serve_tasks
 from studyrunner.study.study_file import read_study
-from studyrunner.system.compiling import COMPILING
 from studyrunner.system.machine import open_mapped, write_mapped
 from studyrunner.system.progress import ProgressDisplay, Standing
 from studyrunner.task_runs import StudyRun
@@ -115,7 +114,7 @@ def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path
     one, other = open_mapped(written), open_mapped(written)
     one["c"][0, 0] = 7.0
     assert other["c"][0, 0] == 0.0
-    written.remove()
+    written.path.unlink()
     for name in ("f", "none", "part"):
         np.testing.assert_array_equal(other[name], given[name])
     assert other["c"].flags.aligned
