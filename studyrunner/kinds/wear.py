@@ -23,7 +23,6 @@ from studyrunner.variables import OWN_STEPS
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from solver.results.history import StartState
     from solver.wear.wearing_joint import WearRequest
 
 _COST_AT_REST = 0.01  # estimated time of a history in which nothing wears, over that of a history with steps
@@ -138,8 +137,12 @@ class Sweep(_FromRest):
         ):
             if start.outcome is Outcome.EXCEPTION and self.resume is not None:
                 raise RuntimeError(start.message)
-            n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
-            yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
+            n_unknowns, moves = 0, False
+            if start.state is not None:
+                n_unknowns = n_displacements * (2 * len(start.resolution.orders) + 1)
+                motion_h = start.state.displacement_h
+                moves = bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))
+            yield StartResult(wanted[place], pack(start), moves, n_unknowns)
 
     def failed(self, place: int, outcome: int, message: str) -> StartResult:  # noqa: ARG002
         """A start without a state."""
@@ -258,9 +261,3 @@ class History(_FromRest):
     def describe(self, place: int) -> str:
         """Its frequency and scheme."""
         return f"{self.frequency:.6g} Hz {self.results[place][0].scheme}"
-
-
-def _moves(start: StartState) -> bool:
-    """Whether the relative motion in the joint is more than the round-off of its mean; no where there is no state."""
-    motion_h = np.zeros((1, 1, 1)) if start.state is None else start.state.displacement_h
-    return bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))

@@ -67,7 +67,11 @@ def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set
     if study.outputs.loops:
         along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
     for name, values in along.items():
-        yield SmallArray(name, (name,), _labels(values), _coordinate_entry(study, name))
+        # whole numbers and flags as NetCDF has them; texts where one value is text
+        texts = any(isinstance(value, str) for value in values)
+        labels = np.array([str(value) for value in values] if texts else values)
+        labels = labels.astype({"b": np.int8, "i": np.int32}.get(labels.dtype.kind, labels.dtype))
+        yield SmallArray(name, (name,), labels, _coordinate_entry(study, name))
     yield from _of_pairs(study, of_scenes, scenes)
     if facts.edge is not None:
         yield SmallArray("contact_edge", ("contact",), facts.edge.astype(np.int8), COORDINATES["contact_edge"])
@@ -101,13 +105,6 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
         if axis.name == name:
             return Variable((), axis.units, axis.meaning, comment=f"Key {axis.table}.{axis.dotted} of the study.")
     return COORDINATES[name]
-
-
-def _labels(values: Sequence[object] | NDArray[np.generic]) -> NDArray[np.generic]:
-    """Values of an axis: whole numbers and flags as NetCDF has them; texts where one value is text."""
-    texts = any(isinstance(value, str) for value in values)
-    array = np.array([str(value) for value in values] if texts else values)
-    return array.astype({"b": np.int8, "i": np.int32}.get(array.dtype.kind, array.dtype))
 
 
 def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SmallArray]:

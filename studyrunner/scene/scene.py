@@ -288,6 +288,4 @@ def _is_edge(away: NDArray[np.float64]) -> bool:
     distance = np.linalg.norm(away, axis=1)
     near = away[distance <= _LONGEST * np.median(distance)] if len(away) else away
     angles = np.sort(np.arctan2(near[:, 1], near[:, 0]))
-    if angles.size < 3:
-        return True
-    return bool(np.diff(angles, append=angles[0] + 2.0 * np.pi).max() > _WIDEST_GAP)
+    return angles.size < 3 or bool(np.diff(angles, append=angles[0] + 2.0 * np.pi).max() > _WIDEST_GAP)
