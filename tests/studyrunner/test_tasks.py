@@ -237,12 +237,7 @@ def test_bundled_studies_are_plausible(name):
     [
         # of 52100 steel, 4.23e-5 mm3/J
         ("sdof_slider", "axes.wear_coefficient=4.23e-5", "wear_coefficient 4.23e-05 ", "mm3/J (then it is 4.23e-14 "),
-        (
-            "dovetail",
-            "axes.friction_coefficient=[0.5, 2.5]",
-            "friction_coefficient 2.5 ",
-            "in percent (then it is 0.025)",
-        ),
+        ("dovetail", "axes.friction_coefficient=[0.5, 2.5]", "friction_coefficient 2.5 ", "percent (then it is 0.025)"),
         ("dovetail", "scene.rotation_speed=314", "rotation_speed 314 rpm ", "in rad/s (then it is 2998.5 rpm)"),
         ("dovetail", "axes.frequency=[0.2, 0.21]", "frequency 0.21 Hz", "in kHz (then it is 210 Hz)"),
         ("dovetail", "axes.frequency=150e3", "frequency 1.5e+05 Hz", "in mHz (then it is 150 Hz)"),
