@@ -89,7 +89,6 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-
     effort = effort_of(itertools.chain(plan.sweeps, plan.results))
     rows = [
         *_of_study(study, facts, plan, effort),

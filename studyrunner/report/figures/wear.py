@@ -42,10 +42,8 @@ def draw_history(result: Result) -> Drawn:
         return f"The file holds {result.cycle_label(0)} only: set [slow_time]."
     largest = float(np.nanmax(result.dataset["worn_volume"].values, initial=0.0))
     wears, axis = largest > NO_VOLUME, selection.course_axis(result)
-    scale, choice = (
-        scale_for("m3", largest if wears else 0.0),
-        selection.choose(result, [axis] if axis else [], _MOST_LINES),
-    )
+    scale = scale_for("m3", largest if wears else 0.0)
+    choice = selection.choose(result, [axis] if axis else [], _MOST_LINES)
     (figure, panel), cycles = plot.new_panel(3.4), scale_for(result.counted, result.cycles)
     highest, ends = _draw_over_cycles(result, panel, "worn_volume", choice, scale), []
     for number, (point, label) in enumerate(choice):
