@@ -8,11 +8,7 @@ For use in Python, from this package itself:
 - `compute_worn_joint`: response curve, loops and natural frequencies of a worn joint, from the wear depths of a result;
 - `UserError`, `StorageError`: what they raise, in one sentence.
 
-The rooms, in the way of a study: `study` (its file, checked), `scene` (its reduced model), `kinds` (the kinds of study:
-their tasks, and how these are computed), `plan` (all tasks of a study, `--plan`), `mpi` (ranks, and which of them does
-which task), `checkpoint` (the file of what is finished), `summary` (the last lines of a run), `result` (the result
-file), `report` (figures and page from result files), `system` (files, signals, streams, progress). On top: `api`,
-`cli`, `run`, `task_runs`, `accessor`. On the ground: `variables`, `user_error`.
+The rooms are in the map of CONTRIBUTING.md.
 """
 
 from __future__ import annotations

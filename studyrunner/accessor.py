@@ -164,10 +164,9 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
             if not other[each].variable.equals(first[each].variable):  # type: ignore[no-untyped-call]
                 raise ValueError(f"The results have different contact pairs: see {each}.")
     models = {name: array for one in datasets for name, array in one.data_vars.items()}
-    gaps: dict[Any, Any] = {name: {"f": math.nan}.get(array.dtype.kind, 0) for name, array in models.items()}
-    gaps |= {name: "" for name, array in models.items() if array.dtype.kind in "OU"} | {
-        "outcome": int(Outcome.NOT_COMPUTED)
-    }
+    missing: dict[str, Any] = {"f": math.nan, "O": "", "U": ""}
+    gaps = {name: missing.get(array.dtype.kind, 0) for name, array in models.items()}
+    gaps["outcome"] = int(Outcome.NOT_COMPUTED)
     texts = [d for d in axes if first[d].dtype.kind in "OU"]
     as_they_come = {d: list(dict.fromkeys(text for one in datasets for text in one[d].values.tolist())) for d in texts}
     parts = [part.sel(as_they_come) for part in xr.align(*datasets, join="outer", fill_value=gaps)]

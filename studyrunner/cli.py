@@ -13,21 +13,12 @@ import traceback
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from studyrunner.mpi.ranks import POLL_SECONDS, LauncherError, Ranks, launcher_rank, start_ranks
+from studyrunner.system import process
 from studyrunner.system.machine import MachineFaultError
-from studyrunner.system.process import (
-    INTERRUPTED,
-    begin_ending,
-    is_ending,
-    keep_talking,
-    last_error,
-    leave_endings,
-    raise_ending,
-    take_endings,
-)
-from studyrunner.user_error import StorageError, UserError
+from studyrunner.user_error import Parser, StorageError, UserError
 
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
@@ -71,12 +62,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     ranks = Ranks()
     try:
-        leave_endings()
-        keep_talking()
+        process.leave_endings()
+        process.keep_talking()
         # One thread a rank: the ranks share the cores. It has to be said before numpy is loaded.
         os.environ.update(dict.fromkeys(_THREADS, "1"))
         ranks = start_ranks()
-        take_endings()
+        process.take_endings()
         status = CONVERGED
         if ranks.rank == 0:
             status = _lead(ranks, sys.argv[1:] if arguments is None else arguments)
@@ -89,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             follow_rank_0(ranks, evaluator())
         if arguments is None:
             # it has come to its end: what comes while MPI and the interpreter end is of no use to anybody
-            begin_ending()
+            process.begin_ending()
         ranks.close()
         return status
     except LauncherError as error:
@@ -116,15 +107,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _tell(ranks: Ranks, error: BaseException) -> int:
     """Says why a rank has come to its end early, and returns the exit status."""
-    if is_ending(error):
-        begin_ending()
+    if process.is_ending(error):
+        process.begin_ending()
         if ranks.rank > 0 and _leave_to_rank_0(ranks, KeyboardInterrupt()):
             ranks.close()
             return CONVERGED
         if max(ranks.rank, launcher_rank()) == 0 or ranks.size > 1:
             said = str(error) if isinstance(error, KeyboardInterrupt) else ""
             print(f"run-study: {said or 'interrupted'}", file=sys.stderr)
-        return INTERRUPTED
+        return process.INTERRUPTED
     from solver.outcome import describe_error, is_machine_fault
 
     if isinstance(error, StorageError):
@@ -158,17 +149,17 @@ def _leave_to_rank_0(ranks: Ranks, reason: BaseException) -> bool:
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     try:
         options = _parse_options(arguments)
-        raise_ending()
+        process.raise_ending()
         from studyrunner.study.study_file import read_study
 
         study = read_study(options.study, options.overrides)
-        raise_ending()
+        process.raise_ending()
         if options.plan or options.check or options.write_scene is not None:
             return _describe(study, options)
         return _compute(ranks, study, options)
     except UserError as error:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
-        raise_ending()
+        process.raise_ending()
         print(*(f"run-study: {line}" for line in str(error).splitlines()), sep="\n", file=sys.stderr)
     except SystemExit:
         return CONVERGED
@@ -178,14 +169,14 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
 def _describe(study: Study, options: argparse.Namespace) -> int:
     """What the options --plan, --check and --write-scene print and write."""
     from studyrunner.plan import plan_lines
-    from studyrunner.result.target import check_output, check_scene_file
+    from studyrunner.result.target import check_output
     from studyrunner.scene.answers import check_study_model, write_study_scene
     from studyrunner.system.progress import ProgressDisplay
 
     step = ProgressDisplay().step
     if options.plan:
         print(*plan_lines(study, step), sep="\n", flush=True)
-        error = last_error(sys.stdout)
+        error = process.last_error(sys.stdout)
         if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
             raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
     elif options.check:
@@ -194,7 +185,7 @@ def _describe(study: Study, options: argparse.Namespace) -> int:
         print(f"{picture}: the contact pairs and their frames", flush=True)
     else:
         path = options.write_scene
-        write_study_scene(study, check_scene_file("--write-scene", path, study), step)
+        write_study_scene(study, check_output("--write-scene", path, study.files, new=True), step)
         print(f"{path}: the scene of study {study.study.name}", flush=True)
     return CONVERGED
 
@@ -234,15 +225,9 @@ def _answer(path: Path) -> Sequence[str]:
         return (f"no summary: {error}",)
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
-
-
 def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Options from the command line, by their names. Raises UserError; SystemExit after --help, --new and the like."""
-    look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
-    parser = _Parser("run-study", description=_DESCRIPTION, epilog=_EPILOG, **look)
+    parser = Parser("run-study", _DESCRIPTION, _EPILOG)
     add, flag, path = parser.add_argument, dict[str, Any](action="store_true"), dict[str, Any](type=Path)
     which = "TOML file, result file or bundled study (default: dovetail)"
     add("study", nargs="?", default="dovetail", metavar="STUDY", help=which)

@@ -43,24 +43,43 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     return build(study, scenes, [each.n_displacements for each in facts], contact_changes(study, scenes, facts))
 
 
-def describe_tasks(tasks: Iterable[Task]) -> str:
-    """Tasks in words."""
-    sweeps, n_results, n_modes = Counter[bool](), Counter[type](), 0
+class Effort(NamedTuple):
+    """What tasks take.
+
+    words: how many of which kind. n_tasks. n_unknowns: most of one task. seconds, longest: estimated time on one rank
+    where every point wears, and of the longest task with the sweep that it waits for.
+    """
+
+    words: str
+    n_tasks: int
+    n_unknowns: int
+    seconds: float
+    longest: float
+
+
+def effort_of(tasks: Iterable[Task]) -> Effort:
+    """In one pass, the sweeps first: the tasks may be made on the way, and there may be a million of them."""
+    n_tasks, n_unknowns, seconds, longest = 0, 0, 0.0, 0.0
+    ways, n_results, costs = Counter[str](), Counter[type](), dict[int, float]()
     for task in tasks:
+        n_tasks, n_unknowns, seconds = n_tasks + 1, max(n_unknowns, task.n_unknowns), seconds + task.cost
         # of a history those that are integrated
         n_results[type(task)] += len(task.integrated) if isinstance(task, History) else task.n_results
         if isinstance(task, Sweep):
-            sweeps[task.excitation.direction == "ramp"] += 1
-        elif isinstance(task, Mode):
-            n_modes += 1
-    ways = " and ".join(count(sweeps[ramp], word) for ramp, word in ((False, "sweep"), (True, "ramp")) if sweeps[ramp])
+            ways["ramp" if task.excitation.direction == "ramp" else "sweep"] += 1
+            costs[task.number] = task.cost
+        ways["mode"] += isinstance(task, Mode)
+        start = task.waits_for
+        longest = max(longest, task.cost + (0.0 if start is None else costs.get(start[0], 0.0)))
+    by = " and ".join(count(ways[word], word) for word in ("sweep", "ramp") if ways[word])
     parts = {
-        Sweep: f"{count(n_results[Sweep], 'start state')} by {ways}",
+        Sweep: f"{count(n_results[Sweep], 'start state')} by {by}",
         History: count(n_results[History], "wear history", "wear histories"),
-        Mode: f"{count(n_modes, 'nonlinear mode')} over the amplitude, {count(n_results[Mode], 'point')}",
+        Mode: f"{count(ways['mode'], 'nonlinear mode')} over the amplitude, {count(n_results[Mode], 'point')}",
         Mission: f"{count(n_results[Mission], 'mission history', 'mission histories')}, each computed by one rank",
     }
-    return ", and ".join(text for kind, text in parts.items() if n_results[kind])
+    words = ", and ".join(text for kind, text in parts.items() if n_results[kind])
+    return Effort(words, n_tasks, n_unknowns, seconds, longest)
 
 
 def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
@@ -70,7 +89,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-    effort = _effort_of(plan)
+    effort = effort_of(itertools.chain(plan.sweeps, plan.results))
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),
@@ -80,38 +99,8 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     return [f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows]
 
 
-class _Effort(NamedTuple):
-    """What the tasks of a plan take.
-
-    words: the tasks. n_unknowns: most of one task. seconds, longest: estimated time on one rank where every point
-    wears, and of the longest task with the sweep that it waits for.
-    """
-
-    words: str
-    n_unknowns: int
-    seconds: float
-    longest: float
-
-
-def _effort_of(plan: TaskPlan) -> _Effort:
-    """In one pass: the tasks may be made on the way, and there may be a million of them."""
-    n_tasks, n_unknowns, seconds, longest = 0, 0, 0.0, 0.0
-    sweeps = {sweep.number: sweep.cost for sweep in plan.sweeps}
-
-    def look() -> Iterator[Task]:
-        nonlocal n_tasks, n_unknowns, seconds, longest
-        for task in itertools.chain(plan.sweeps, plan.results):
-            n_tasks, n_unknowns, seconds = n_tasks + 1, max(n_unknowns, task.n_unknowns), seconds + task.cost
-            start = task.waits_for
-            longest = max(longest, task.cost if start is None else task.cost + sweeps[start[0]])
-            yield task
-
-    words = describe_tasks(look())
-    return _Effort(f"{n_tasks}: {words}", n_unknowns, seconds, longest)
-
-
 def _of_study(
-    study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan, effort: _Effort
+    study: Study, of_scenes: Sequence[SceneFacts], plan: TaskPlan, effort: Effort
 ) -> Iterator[tuple[str, str]]:
     facts = merge_facts(of_scenes)
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
@@ -137,11 +126,11 @@ def _of_study(
         yield "cycles", f"{until}; {n_stored} states are stored, spaced evenly in worn volume and cycles"
     elif study.kind.counted:
         yield "cycles", f"{study.output_counts[-1]:g}, of which {count(n_stored, 'count is', 'counts are')} stored"
-    yield "tasks", effort.words
+    yield "tasks", f"{effort.n_tasks}: {effort.words}"
 
 
 def _of_effort(
-    study: Study, facts: SceneFacts, plan: TaskPlan, effort: _Effort, built_with: float, prepared_in: float
+    study: Study, facts: SceneFacts, plan: TaskPlan, effort: Effort, built_with: float, prepared_in: float
 ) -> Iterator[tuple[str, str]]:
     """built_with: memory for building a scene, bytes. prepared_in: CPU time until the scenes are built, s."""
     shown = [

@@ -10,9 +10,9 @@ from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import Store
 from studyrunner.mpi.ranks import Ranks, job_size
 from studyrunner.mpi.schedule import serve_tasks
-from studyrunner.plan import build_tasks, describe_tasks, doubts_of_study
+from studyrunner.plan import build_tasks, doubts_of_study, effort_of
 from studyrunner.result.arrays import small_arrays
-from studyrunner.result.provenance import compare_with_archived, describe_date, describe_run
+from studyrunner.result.provenance import compare_with_archived, describe_run
 from studyrunner.result.target import Target, identity_of
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
@@ -41,7 +41,7 @@ def compute_study(
 
     target: as `check_result` gives it; a finished result is replaced by one without missing points only. store: the
     open file of its progress: while it is open no other run writes the result. fresh: whether the run begins anew.
-    retry_failed: whether failed points are computed again. date: as `check_date` gives it.
+    retry_failed: whether failed points are computed again. date: of the result, see `check_date`.
 
     Raises UserError where a scene is wrong; StorageError where something cannot be written; KeyboardInterrupt where the
     run is ended from outside, with what is left in words, after finished points have been written.
@@ -50,7 +50,7 @@ def compute_study(
     scenes = build_scenes(ranks, study, store, display.step)
     facts = merge_facts(scenes.facts)
     attributes = {**describe_run(study, facts), **({} if scenes.stored is None else scenes.stored.origin)}
-    attributes |= describe_date(date)
+    attributes |= {} if date is None else {"date_created": date}
     plan = build_tasks(study, scenes.scenes, scenes.facts)
     completion = CompletionIndex(study, plan, facts, [each.digest for each in scenes.facts], store)
     store.note_study(identity_of(study.study.name, study.scene.model))
@@ -75,12 +75,12 @@ def compute_study(
     with display:
         for line in _notes(ranks, study, scenes, store, facts):
             display.say(line)
-        run = StudyRun(completion, scenes.models, display)
+        run = StudyRun(completion, scenes.models, display, ranks.size)
         if run.n_points:
             display.say(f"from an earlier run: {run.n_points} of {count(plan.n_points, 'point')}")
         try:
             if run.tasks:
-                display.say(f"computing {describe_tasks(run.tasks)}")
+                display.say(f"computing {effort_of(run.tasks).words}")
             serve_tasks(ranks, run, evaluator())
             display.say("writing the result")
             return write()

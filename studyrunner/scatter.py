@@ -6,14 +6,16 @@ By hand: a column of `scipy.stats.qmc` depends on the number of columns; its pla
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ConfigDict, Field
 
 from studyrunner.values import NotNegative, Positive, Section, Whole, Wrong
+
+if TYPE_CHECKING:
+    from solver.model import ContactInterface
 
 Array = NDArray[np.float64]
 Method = Literal["sobol", "latin_hypercube", "random", "saltelli"]
@@ -201,16 +203,8 @@ def flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
 # --- what is drawn ---
 
 
-@dataclass(frozen=True)
-class ScatteredPairs:
-    """Contact pairs between which inputs may differ. surface (n_pairs,): labels. position (n_pairs, 3): m, or NaN."""
-
-    surface: tuple[str, ...]
-    position: Array
-
-
 def draw(
-    section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ScatteredPairs | None = None
+    section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ContactInterface | None = None
 ) -> dict[str, Array]:
     """What the samples draw of each input that is the same for all pairs, (samples,) or (n_values, samples) of an axis;
     with pairs of each input that belongs to them, (samples, n_pairs). Without width the study's own values, exactly.
@@ -245,7 +239,7 @@ def draw(
     return found
 
 
-def _field(name: str, length: float, pairs: ScatteredPairs) -> Array:
+def _field(name: str, length: float, pairs: ContactInterface) -> Array:
     """Factor L (n_pairs, n_pairs) of a Gaussian field L z of unit variance, z independent.
 
     Correlation exp(-(r / length)^2 / 2) of two pairs of a surface at the distance r; surfaces are independent.

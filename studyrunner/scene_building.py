@@ -73,7 +73,7 @@ class SceneModels:
             return task
         used = {number for each in self._of_ranks.values() for scenes in each for number in scenes}
         for number in self._files.keys() - used:
-            self._files.pop(number).remove()
+            self._files.pop(number).path.unlink(missing_ok=True)
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
     def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
@@ -93,8 +93,7 @@ class SceneTask:
     number: int
     study: Study
     known: Packed | None = None
-    cost: float = 1.0
-    n_results: int = 1
+    costs: tuple[float, ...] = (1.0,)
     gives_starts: bool = False
     cost_keys: CostKeys = (("scene",),)
 

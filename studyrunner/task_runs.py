@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter, OrderedDict, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error, is_machine_fault
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
@@ -81,10 +80,12 @@ class StudyRun(TaskHandler):
     """Rank 0 while the tasks of a study are done: their state, and the tasks that results make possible.
 
     A wear history becomes possible with its start state, while the sweep goes on. Results go to `completion`. models:
-    for the ranks that do not have them. tasks: those that are left. n_points: that are finished.
+    for the ranks that do not have them. n_ranks: that compute. tasks: those that are left. n_points: that are finished.
     """
 
-    def __init__(self, completion: CompletionIndex, models: SceneModels, display: ProgressDisplay) -> None:
+    def __init__(
+        self, completion: CompletionIndex, models: SceneModels, display: ProgressDisplay, n_ranks: int
+    ) -> None:
         super().__init__()
         self.n_points = completion.n_points_finished
         self._completion, self._models, self._display = completion, models, display
@@ -94,10 +95,10 @@ class StudyRun(TaskHandler):
         self._words: dict[str, str] = {}  # where a task is
         self._suspects: list[Task] = []  # they wait for the one that is under way
         self._tried = ""
-        self._n_compiled: int | None = n_compiled()
-        self._left: dict[str, float] = defaultdict(float)  # estimated seconds, by group
+        self._n_ranks, self._n_left = n_ranks, len(self.tasks)
+        self._left: dict[tuple[Hashable, ...], float] = defaultdict(float)  # estimated seconds, by group
         for task in self.tasks:
-            self._left[task.group] += task.cost
+            self._left[task.group] += sum(task.costs)
 
     def begin(self) -> Iterator[Task]:
         """Tasks that are possible at the beginning."""
@@ -113,14 +114,15 @@ class StudyRun(TaskHandler):
 
     def take(self, task: Task, result: Result) -> Sequence[Task]:
         """Takes a result; returns tasks that the result makes possible."""
+        self._left[task.group] -= task.costs[self._n_given[task.key]]
         self._n_given[task.key] += 1
         is_last = self._n_given[task.key] == task.n_results
-        self._left[task.group] -= task.cost / task.n_results
         self._completion.add(task, result)
         self.n_points += len(task.points(result.place))
         new = self._start(task, result) if isinstance(result, StartResult) else ()
         if is_last:
             del self._n_given[task.key]
+            self._n_left -= 1
             if task.key == self._tried:
                 self._tried = ""
                 new, self._suspects = [*new, *self._suspects], []
@@ -135,29 +137,26 @@ class StudyRun(TaskHandler):
 
     def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
         """Writes and shows what is due."""
-        if self._n_compiled is not None and n_compiled() > self._n_compiled:
-            self._n_compiled = None
-            self._display.say("the solver is compiled for this machine, once after an installation")
         self._completion.store.tick()
         self._display.tick(lambda: self.look(running()))
 
     def look(self, running: Sequence[tuple[Task, int, float]]) -> Standing:
         """State of the tasks. running: as `Dispatcher.running`."""
-        factors = {group: self.costs.correction(((group,),)) for group in self._left}
+        factors = {group: self.costs.correction((group,)) for group in self._left}
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
-        done, longest = sum(self.costs.sums.get(group, (0.0, 0.0, 0))[0] for group in factors), 0.0
+        done, longest = sum(self.costs.sums.get(group[-1], (0.0, 0.0, 0))[0] for group in factors), 0.0
         names = []
         for task, n_left, elapsed in running:
-            expected = task.cost / task.n_results * factors[task.group]
+            expected = task.costs[-n_left] * factors[task.group]
             still = max(expected - elapsed, _LATE * elapsed)
-            left, done, longest = left + still - expected, done + elapsed, max(longest, still)
-            words = f" ({self._words[task.key]})" if task.key in self._words else ""
+            left, done, longest = left + still - expected, done + min(elapsed, expected), max(longest, still)
+            words = f" ({self._words[task.key]})" if self._words.get(task.key) else ""
             names.append(task.describe(task.places[task.n_results - n_left]) + words)
         return Standing(
             n_done=self.n_points,
             n_points=self._completion.plan.n_points,
             share=done / max(done + left, 1e-9),
-            seconds_left=max(longest, left / max(1, len(running))),
+            seconds_left=max(longest, left / max(1, min(self._n_ranks, self._n_left))),
             running=tuple(names),
         )
 
@@ -167,7 +166,7 @@ class StudyRun(TaskHandler):
         new = [task.from_start(result) for task in planned]
         for sign, tasks in ((-1.0, planned), (1.0, new)):
             for task in tasks:
-                self._left[task.group] += sign * task.cost
+                self._left[task.group] += sign * sum(task.costs)
         return new
 
     def _without_suspects(self, tasks: Iterable[Task]) -> list[Task]:

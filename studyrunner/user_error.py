@@ -5,12 +5,14 @@ By hand: `rich` takes five control characters out of a text, and leaves those th
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date, time
 from pathlib import Path
+from typing import NoReturn
 
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_REMEDY = 80, 240, 600
 _MOST_LINES = 20
@@ -64,6 +66,18 @@ class StorageError(Exception):
             f"{show_text(str(path))}: {show_text(reason)}: {remedy};"
             " what was computed is kept, and the same command goes on from it"
         )
+
+
+class Parser(argparse.ArgumentParser):
+    """Options of a command. A wrong one raises UserError."""
+
+    def __init__(self, command: str, description: str, epilog: str) -> None:
+        look = argparse.RawDescriptionHelpFormatter
+        super().__init__(command, None, description, epilog, formatter_class=look, allow_abbrev=False)
+
+    def error(self, message: str) -> NoReturn:
+        """Raises UserError."""
+        raise UserError("command line", "options", None, f"{message}; {self.prog} --help lists them")
 
 
 class Verbatim(str):

@@ -92,11 +92,8 @@ OF_SAMPLES = (
 FOLLOWED_FREQUENCY = ("excitation_frequency", "excitation_frequency_error")
 """Further ones of a study that names none and whose frequency follows the resonance."""
 
-USUAL = tuple(
-    name
-    for name in ASKED
-    if not name.startswith(("wear_depth_max", "wear_depth_last")) and name not in FOLLOWED_FREQUENCY
-)
+_OF_SAMPLES_ALONE = ("wear_depth_max", "wear_depth_max_error", "wear_depth_last")
+USUAL = tuple(name for name in ASKED if name not in (*_OF_SAMPLES_ALONE, *FOLLOWED_FREQUENCY))
 """Those of other studies that name none."""
 
 LOOPS = {
@@ -115,6 +112,9 @@ LOOPS = {
 
 COUNTS = {"cycle_count": Variable(_CYCLE, "1", "number of vibration cycles of the output", "inf: the final state.")}
 """That of a study to the end, slow_time.cycles = inf, whose coordinate cycle is the number of the output."""
+
+OWN_STEPS = ("adaptive", "final")
+"""Schemes that choose their steps, without `step`: for another wear coefficient the same ones at other counts."""
 
 LOOP_PHASES = 128
 """Phases of a loop, equally spaced over a period from 0: those that the solver has."""
@@ -249,14 +249,11 @@ OF_MISSIONS = {
 }
 """Those that `outputs.variables` asks for in a study of missions, in the order of the file."""
 
-_OF_SAMPLES_ALONE = ("wear_depth_max", "wear_depth_max_error", "wear_depth_last")
-
 OF_MISSIONS_BY_DEFAULT = tuple(name for name in OF_MISSIONS if name not in _OF_SAMPLES_ALONE)
 """Those of a study of missions that names none."""
 
 OF_SAMPLED_MISSIONS = tuple(name for name in OF_MISSIONS if name not in ("wear_depth", "wear_depth_error"))
 """Those of a study of missions with [scatter] that names none."""
-
 
 OF_A_MISSION = {
     "outcome": OF_A_HISTORY["outcome"],
@@ -270,3 +267,10 @@ OF_A_MISSION = {
     "message": OF_A_HISTORY["message"],
 }
 """Those that every result of missions holds."""
+
+IN_FILES = {
+    "cycle": ASKED | OF_A_HISTORY | LOOPS | COUNTS,
+    "modal_amplitude": OF_MODES | OF_A_MODE_POINT,
+    "mission": OF_MISSIONS | OF_A_MISSION,
+}
+"""All that tasks compute, by a dimension that the files of each kind of study alone have."""

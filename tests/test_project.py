@@ -3,12 +3,19 @@
 import importlib
 import pkgutil
 import re
+import runpy
 import tomllib
 from pathlib import Path
 
 import pytest
 
 import tests.benchmarks
+from solver.outcome import Outcome
+from studies.fe_models.deck.read import HARMLESS, KEYWORDS
+from studies.scenes import BUNDLED
+from studyrunner.report.contents import FIGURES
+from studyrunner.study.sections import SECTIONS
+from studyrunner.variables import ASKED, OF_A_HISTORY, OF_A_MISSION, OF_MISSIONS, OF_MODES
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = [ROOT / name for name in ("solver", "studies", "studyrunner")]
@@ -92,3 +99,12 @@ def test_the_page_of_the_physics_says_where_each_equation_is():
         assert wanted <= set().union(*there), f"equations {sorted(wanted)} in {files}"
         said |= wanted
     assert said == EQUATIONS
+
+
+def test_the_reference_names_all():
+    text = runpy.run_path(str(ROOT / "docs" / "reference.py"))["reference"]()
+    names = {f"{table}.{key}" for table in ("study", "solver", "slow_time") for key in SECTIONS[table].model_fields}
+    names |= {str(outcome) for outcome in Outcome} | {figure.name for figure in FIGURES} | set(BUNDLED)
+    names |= {*ASKED, *OF_A_HISTORY, *OF_MODES, *OF_MISSIONS, *OF_A_MISSION, *KEYWORDS, *HARMLESS}
+    assert [name for name in names if f"`{name}" not in text] == []
+    assert len({figure.name for figure in FIGURES}) == len(FIGURES)

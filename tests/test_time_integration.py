@@ -4,18 +4,8 @@ import numpy as np
 import pytest
 
 from solver import SolverSettings, backbone, build_model, frequency_response
+from tests.benchmarks import time_integration as in_time
 from tests.benchmarks.free_decay import decay_of, free_decay
-from tests.benchmarks.time_integration import (
-    at_rest,
-    build,
-    first_harmonic,
-    fitted_weights,
-    loaded,
-    one_period,
-    ramp,
-    settle,
-    wear,
-)
 from tests.references import den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
 from tests.rings import ring_of_sectors
 from tests.solver.models import cyclic_model, glued_frequency, scene
@@ -26,12 +16,12 @@ OMEGA = 2.0 * np.pi * FREQUENCY
 
 
 def test_the_differences_are_exact_for_the_excitation():
-    weights = fitted_weights(3.0, 0.02)
+    weights = in_time.fitted_weights(3.0, 0.02)
     times = 0.7 - 0.02 * np.arange(3)
     assert weights @ np.cos(3.0 * times) == pytest.approx(-3.0 * np.sin(2.1), rel=1e-9)
     assert weights.sum() == pytest.approx(0.0, abs=1e-9)
     # those of a short step are the usual ones
-    np.testing.assert_allclose(0.02 * fitted_weights(1e-2, 0.02), [1.5, -2.0, 0.5], rtol=1e-5)
+    np.testing.assert_allclose(0.02 * in_time.fitted_weights(1e-2, 0.02), [1.5, -2.0, 0.5], rtol=1e-5)
 
 
 @pytest.mark.slow
@@ -42,11 +32,11 @@ def test_a_mass_on_rigid_ground_moves_as_in_den_hartogs_closed_form():
     first = abs(slider_orbit(MASS, 0.0, STIFFNESS, FORCE, 5.0, OMEGA).harmonic(0))
     errors = []
     for n_steps in (200, 3200):
-        structure = build(model, 0.5, FREQUENCY, FORCE, n_steps)
-        motions = [at_rest(model, structure, model.contact.gap)]
+        structure = in_time.build(model, 0.5, FREQUENCY, FORCE, n_steps)
+        motions = [in_time.at_rest(model, structure, model.contact.gap)]
         for _ in range(40):
-            motions.append(one_period(structure, motions[-1], model.contact.gap))
-        found = np.mean([abs(first_harmonic(structure, motion, np.eye(1))[0]) for motion in motions[-8:]])
+            motions.append(in_time.one_period(structure, motions[-1], model.contact.gap))
+        found = np.mean([abs(in_time.first_harmonic(structure, motion, np.eye(1))[0]) for motion in motions[-8:]])
         work = np.mean([motion.work[0] for motion in motions[-8:]])
         errors.append(max(abs(found / first - 1.0), abs(work / (10.0 * path) - 1.0)))
     assert errors[0] < 1e-2
@@ -56,13 +46,13 @@ def test_a_mass_on_rigid_ground_moves_as_in_den_hartogs_closed_form():
 @pytest.mark.slow
 def test_wear_of_a_slider_follows_its_differential_equation():
     model = scene("sdof_slider", damping=8.0)
-    structure = build(model, 0.5, FREQUENCY, FORCE, 400)
+    structure = in_time.build(model, 0.5, FREQUENCY, FORCE, 400)
     gap = model.contact.gap
-    motion = settle(structure, at_rest(model, structure, gap), gap, work_change=5e-3)
+    motion = in_time.settle(structure, in_time.at_rest(model, structure, gap), gap, work_change=5e-3)
     # the mount of the closing displacement is massless
     for part in (np.full(1, 0.0), np.full(1, 1e-9)):
-        assert at_rest(model, structure, part).force[0] == pytest.approx(10.0 - 1e5 * part[0], rel=1e-6)
-    *_, (cycle, depth, _) = wear(model, structure, motion, 1.1e-11, 600.0, 1e5)
+        assert in_time.at_rest(model, structure, part).force[0] == pytest.approx(10.0 - 1e5 * part[0], rel=1e-6)
+    *_, (cycle, depth, _) = in_time.wear(model, structure, motion, 1.1e-11, 600.0, 1e5)
     exact = slider_wear_depth([0.0, 1e5], lambda limit: slider_amplitude(MASS, 8.0, STIFFNESS, FORCE, limit, OMEGA))
     assert cycle == pytest.approx(1e5)
     assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
@@ -70,8 +60,8 @@ def test_wear_of_a_slider_follows_its_differential_equation():
 
 def decaying(model, place, pull, frequency, periods):
     """Free decay of a displacement that is let go at `pull`, m: amplitude, frequency, Hz, damping ratio by cycle."""
-    structure = build(model, 0.5, frequency, 0.0, 200)
-    rest = at_rest(model, structure, model.contact.gap)
+    structure = in_time.build(model, 0.5, frequency, 0.0, 200)
+    rest = in_time.at_rest(model, structure, model.contact.gap)
     begun = rest.x.copy()
     begun[:, place] += pull
     signal = free_decay(structure, rest._replace(x=begun), model.contact.gap, periods)[:, place]
@@ -125,9 +115,9 @@ def test_a_travelling_wave_in_time_is_the_periodic_state_of_its_sector():
     frequency, force = 0.93 * glued_frequency(model), 20.0
     found = frequency_response(model, np.array([frequency]), force, 0.4)
     ring = ring_of_sectors(model)
-    structure, motion = loaded(ring, 0.4, ramp(frequency, force, 60), 240)
+    structure, motion = in_time.loaded(ring, 0.4, in_time.ramp(frequency, force, 60), 240)
     work = motion.work.reshape(3, 2)
     np.testing.assert_allclose(work, work[[0]].repeat(3, axis=0), rtol=1e-3)
-    tip = first_harmonic(structure, motion, ring.linear[0].response)
+    tip = in_time.first_harmonic(structure, motion, ring.linear[0].response)
     assert np.linalg.norm(tip - found.response[0]) <= (found.response_error[0] + 5e-3) * np.linalg.norm(tip)
     assert (motion.work > 0.0).all()

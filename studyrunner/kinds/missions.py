@@ -11,29 +11,16 @@ from solver.contact.wear_law import WearLaw
 from solver.missions.mission import Begin, Block, MissionRequest
 from solver.packing import Packed
 from solver.settings import Direction, Passage, WearTarget
+from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
 from studyrunner.kinds.results import mission_values
-from studyrunner.kinds.task import (
-    Identity,
-    Index,
-    Keep,
-    PointResult,
-    Task,
-    TaskJoint,
-    TaskPlan,
-    digest,
-    grid,
-    joint_of,
-    n_unknowns_of,
-    number_points,
-)
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
 
-_NO_JOINT = TaskJoint(0, None)
+_NO_JOINT = tasks.TaskJoint(0, None)
 
 
 @dataclass(frozen=True)
@@ -41,7 +28,7 @@ class PlannedBlock:
     """A block of a mission, as the `Block` of the solver, but cycles are in one mission, also of a passage."""
 
     name: str
-    joint: TaskJoint
+    joint: tasks.TaskJoint
     frequency: float | Passage
     excitation_amplitude: float
     cycles: float
@@ -54,7 +41,7 @@ class PlannedBlock:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mission(Task):
+class Mission(tasks.Task):
     """A mission history: blocks of vibration, one after the other, many times. It has one result.
 
     first: how the first mission begins where its first block continues; "" elsewhere.
@@ -68,13 +55,13 @@ class Mission(Task):
     missions: tuple[float, ...]
     until: WearTarget | None
 
-    def hashes(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: tasks.Identity) -> tuple[str, ...]:
         """Hash of the history: of all blocks with their scenes."""
         blocks = [(identity.joint(block.joint), replace(block, joint=_NO_JOINT)) for block in self.blocks]
         wear = (self.wear_coefficient, self.law, self.first, self.settings)
-        return (digest("mission", blocks, wear, self.missions, self.until, identity.record),)
+        return (tasks.digest("mission", blocks, wear, self.missions, self.until, identity.record),)
 
-    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
+    def compute(self, models: Mapping[int, ReducedModel], keep: tasks.Keep) -> Iterator[tasks.PointResult]:
         """The history."""
         # numba is loaded where a task runs, so that --plan and --help do without it
         from solver.missions.history import integrate_missions
@@ -94,7 +81,7 @@ class Mission(Task):
         read = tuple(sorted({0, 1} | wanted | {max(number - 1, 0) for number in wanted}))
         first = cast("Direction", self.first)
         asked = MissionRequest(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
-        yield PointResult(mission_values(self, integrate_missions(asked, note, self.resume)))
+        yield tasks.PointResult(mission_values(self, integrate_missions(asked, note, self.resume)))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""
@@ -103,13 +90,13 @@ class Mission(Task):
 
 def build_tasks(
     study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
-) -> TaskPlan:
+) -> tasks.TaskPlan:
     """Tasks of a study of missions, one for equal points. contacts: drawn for the pairs of each part, by block."""
-    points: dict[Mission, list[Index]] = {}
+    points: dict[Mission, list[tasks.Index]] = {}
     for part, numbers, of_blocks in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
-        for at, settings in grid(part.study):
+        for at, settings in tasks.grid(part.study):
             blocks = tuple(_blocks(part.study, at, numbers, of_blocks))
-            n_unknowns = n_unknowns_of(max(n_displacements[number] for number in numbers), settings.harmonics)
+            n_unknowns = tasks.n_unknowns_of(max(n_displacements[number] for number in numbers), settings.harmonics)
             ways = [(block.begin, block.frequency) for block in blocks]
             task = Mission(
                 number=0,
@@ -126,7 +113,7 @@ def build_tasks(
                 until=study.until,
             )
             points.setdefault(task, []).append((*(at[name] for name in study.own_axes), *part.place))
-    return number_points({task: [tuple(indices)] for task, indices in points.items()}, study)
+    return tasks.number_points({task: [tuple(indices)] for task, indices in points.items()}, study)
 
 
 def _blocks(
@@ -142,5 +129,5 @@ def _blocks(
         cycles = given.cycles_at(frequency)
         if given.passage is not None:
             frequency, begin = given.passage, given.passage.sweep
-        joint = joint_of(study, scene, contact)
+        joint = tasks.joint_of(study, scene, contact)
         yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))

@@ -8,22 +8,9 @@ from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
+from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
 from studyrunner.kinds.results import first_harmonic, named
-from studyrunner.kinds.task import (
-    Identity,
-    Keep,
-    PointResult,
-    Task,
-    TaskJoint,
-    TaskPlan,
-    digest,
-    grid,
-    joint_of,
-    n_unknowns_of,
-    number_points,
-    up_or_down,
-)
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
 from studyrunner.variables import OF_A_MODE_POINT
@@ -33,13 +20,13 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mode(Task):
+class Mode(tasks.Task):
     """A nonlinear mode; a result at each modal amplitude.
 
     mode: its number, from 1. direction: "up" or "down" along the amplitude. amplitudes: m sqrt(kg), ascending.
     """
 
-    joint: TaskJoint
+    joint: tasks.TaskJoint
     mode: int
     direction: str
     amplitudes: tuple[float, ...]
@@ -47,14 +34,14 @@ class Mode(Task):
     @property
     def order(self) -> tuple[int, ...]:
         """Indices of the amplitudes in the order in which they are computed."""
-        return up_or_down(len(self.amplitudes), self.direction)
+        return tasks.up_or_down(len(self.amplitudes), self.direction)
 
-    def hashes(self, identity: Identity) -> tuple[str, ...]:
+    def hashes(self, identity: tasks.Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
         own = (identity.joint(self.joint), self.mode, self.direction, self.settings, identity.record)
-        return tuple(digest("mode", *own, amplitude) for amplitude in self.amplitudes)
+        return tuple(tasks.digest("mode", *own, amplitude) for amplitude in self.amplitudes)
 
-    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
+    def compute(self, models: Mapping[int, ReducedModel], keep: tasks.Keep) -> Iterator[tasks.PointResult]:
         """Points of the mode."""
         del keep
         from solver.modes.points import follow_mode
@@ -71,7 +58,7 @@ class Mode(Task):
                 "damping_ratio_error": found.damping_error,
                 "outcome": int(found.outcome),
             }
-            yield PointResult(named((*self.variables, *OF_A_MODE_POINT), own, found), wanted[place])
+            yield tasks.PointResult(named((*self.variables, *OF_A_MODE_POINT), own, found), wanted[place])
 
     def describe(self, place: int) -> str:
         """Where along the amplitude."""
@@ -80,21 +67,23 @@ class Mode(Task):
 
 def build_tasks(
     study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
-) -> TaskPlan:
+) -> tasks.TaskPlan:
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
     amplitudes = study.axes.modal_amplitude or ()
     ascending = sorted(range(len(amplitudes)), key=lambda place: amplitudes[place])
+    first, whole = (iterations_of_mode(number) for number in (1, len(amplitudes)))
     modes: dict[Mode, list[dict[str, int]]] = {}
     for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
-        joint = joint_of(part.study, scene, contact)
+        joint = tasks.joint_of(part.study, scene, contact)
         of_part = dict(zip(study.axes_of_parts, part.place, strict=True))
-        for at, settings in grid(study):
-            n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
+        for at, settings in tasks.grid(study):
+            n_unknowns = tasks.n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
             mode = Mode(
                 number=0,
                 scenes=(scene,),
                 settings=settings,
-                cost=seconds_of(n_unknowns, iterations_of_mode(len(amplitudes))),
+                cost=seconds_of(n_unknowns, whole),
+                first_share=first / whole,
                 n_unknowns=n_unknowns,
                 joint=joint,
                 mode=study.axes.mode[at["mode"]],
@@ -111,4 +100,4 @@ def build_tasks(
         ]
         for mode, lines in modes.items()
     }
-    return number_points(indices, study)
+    return tasks.number_points(indices, study)

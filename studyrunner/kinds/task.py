@@ -10,9 +10,9 @@ import itertools
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -116,12 +116,6 @@ class PointResult:
 Result = StartResult | PointResult
 
 
-@cache
-def solver_digest() -> str:
-    """Hash of the source of the solver and of the versions of the packages that it uses."""
-    return package_digest("solver")
-
-
 @dataclass(frozen=True)
 class Identity:
     """What the results of a study depend on beside their tasks.
@@ -134,14 +128,15 @@ class Identity:
 
     def joint(self, joint: TaskJoint) -> tuple[object, ...]:
         """Scene and friction, and the solver."""
-        return (self.scenes[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
+        return (self.scenes[joint.scene], joint.friction_coefficient, *joint.contact, package_digest("solver"))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
     """A task, which gives one result or several, one after the other, each at a place of its own.
 
-    number: among the sweeps, or the other tasks, of the study. cost: estimated time, s.
+    number: among the sweeps, or the other tasks, of the study. cost: estimated time, s. first_share: its part until the
+        first result; the others take equal ones of the rest.
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
     skipped: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
     names: of the results in the file of a run, by place (`hashes`). key: of the task there.
@@ -157,6 +152,7 @@ class Task(ABC):
     scenes: tuple[int, ...]
     settings: SolverSettings
     cost: float
+    first_share: float = 1.0
     n_unknowns: int
     skipped: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
@@ -182,6 +178,12 @@ class Task(ABC):
         return len(self.places)
 
     @property
+    def costs(self) -> tuple[float, ...]:
+        """Estimated time, s, of each result that is needed."""
+        others = (1.0 - self.first_share) / max(1, len(self.order) - 1)
+        return tuple(self.cost * (others if number else self.first_share) for number in range(self.n_results))
+
+    @property
     def waits_for(self) -> tuple[int, int] | None:
         """Number of the sweep, and place of the start state, without which the task cannot begin."""
         return None
@@ -192,13 +194,13 @@ class Task(ABC):
 
     @property
     def cost_keys(self) -> CostKeys:
-        """Groups of similar tasks, see `CostModel`."""
-        return ((type(self).__name__,),)
+        """Groups of similar tasks, see `CostModel`: first of all tasks, which tell how fast the machine is."""
+        return (("task", type(self).__name__),)
 
     @property
-    def group(self) -> str:
+    def group(self) -> tuple[Hashable, ...]:
         """Most general of the groups."""
-        return str(self.cost_keys[0][0])
+        return self.cost_keys[0][:2]
 
     def points(self, place: int) -> tuple[Index, ...]:
         """Points that have the result at a place."""

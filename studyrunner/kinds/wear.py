@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, Self, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,11 @@ from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.results import build_result
 from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, digest, up_or_down
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.study.study import Study
+from studyrunner.variables import OWN_STEPS
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from solver.results.history import StartState
     from solver.wear.wearing_joint import WearRequest
-
-OWN_STEPS = ("adaptive", "final")
-"""Schemes that choose their steps: for another wear coefficient the same ones at other counts."""
 
 _COST_AT_REST = 0.01  # estimated time of a history in which nothing wears, over that of a history with steps
 _NEIGHBOURS = 4  # frequencies whose histories take about as long
@@ -46,12 +42,6 @@ class Excitation:
     amplitude: float
     direction: str
     follow: FollowedFrequency | None
-
-    @classmethod
-    def at(cls, study: Study, at: Mapping[str, int]) -> Self:
-        """That of a point of a study. at: its indices along the axes."""
-        amplitude, direction = (getattr(study.axes, name)[at[name]] for name in ("excitation_amplitude", "sweep"))
-        return cls(amplitude, direction, study.follow)
 
 
 @dataclass(frozen=True)
@@ -147,8 +137,12 @@ class Sweep(_FromRest):
         ):
             if start.outcome is Outcome.EXCEPTION and self.resume is not None:
                 raise RuntimeError(start.message)
-            n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
-            yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
+            n_unknowns, moves = 0, False
+            if start.state is not None:
+                n_unknowns = n_displacements * (2 * len(start.resolution.orders) + 1)
+                motion_h = start.state.displacement_h
+                moves = bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))
+            yield StartResult(wanted[place], pack(start), moves, n_unknowns)
 
     def failed(self, place: int, outcome: int, message: str) -> StartResult:  # noqa: ARG002
         """A start without a state."""
@@ -210,7 +204,7 @@ class History(_FromRest):
         kind = "history" if self.moves else "history at rest"
         near, here = (kind, self.sweep, "near", self.position // _NEIGHBOURS), (kind, self.sweep, self.position)
         wear = (kind, self.wear_coefficient, tuple((each.step, each.scheme) for each in self.integrated))
-        return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
+        return (("task", kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
 
     def from_start(self, result: StartResult) -> History:
         """The history from a start state. Its time grows with the unknowns: a history seldom factorises anew."""
@@ -267,9 +261,3 @@ class History(_FromRest):
     def describe(self, place: int) -> str:
         """Its frequency and scheme."""
         return f"{self.frequency:.6g} Hz {self.results[place][0].scheme}"
-
-
-def _moves(start: StartState) -> bool:
-    """Whether the relative motion in the joint is more than the round-off of its mean; no where there is no state."""
-    motion_h = np.zeros((1, 1, 1)) if start.state is None else start.state.displacement_h
-    return bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -19,9 +19,10 @@ from solver.contact.wear_law import WearLaw
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, Index, TaskJoint, TaskPlan, grid, joint_of, n_unknowns_of
-from studyrunner.kinds.wear import OWN_STEPS, Excitation, History, Integrated, Sweep
+from studyrunner.kinds.wear import Excitation, History, Integrated, Sweep
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
+from studyrunner.variables import OWN_STEPS
 
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
@@ -71,45 +72,21 @@ class _Together(NamedTuple):
     iterations: float
 
 
-class _FromStart(NamedTuple):
-    """The histories from one start state. first: number of the first task. case: what they share with others."""
-
-    first: int
-    case: Mapping[str, Any]
-    law: WearLaw
-    sweep: int
-    position: int
-    frequency: float
-    tasks: Sequence[_Together]
-    at: Sequence[Index]
-
-    def history(self, number: int) -> History:
-        """A task, by its number among those from this state."""
-        integrated, points, iterations = self.tasks[number]
-        return History(
-            number=self.first + number,
-            law=self.law,
-            sweep=self.sweep,
-            position=self.position,
-            frequency=self.frequency,
-            integrated=integrated,
-            indices=tuple(tuple(self.at[point] for point in same) for same in points),
-            cost=seconds_of(self.case["n_unknowns"], iterations),
-            **self.case,
-        )
+_Sharing = Callable[[tuple[_Values, ...]], tuple[tuple[_Together, ...], Counter[str]]]
+"""`_share_histories` of a study: most start states have points with the same values."""
 
 
 class _Histories(Sequence[History]):
     """The histories of a study, each made when it is asked for: `--plan` of 10^6 points takes a fifth of the memory."""
 
-    def __init__(self, starts: Sequence[_FromStart]) -> None:
-        self._starts = starts
+    def __init__(self, make: Callable[[], Iterator[History]], length: int) -> None:
+        self._make, self._length = make, length
 
     def __len__(self) -> int:
-        return self._starts[-1].first + len(self._starts[-1].tasks)
+        return self._length
 
     def __iter__(self) -> Iterator[History]:
-        return (start.history(number) for start in self._starts for number in range(len(start.tasks)))
+        return self._make()
 
     def __getitem__(self, place: Any) -> Any:
         return tuple(self)[place]
@@ -123,7 +100,6 @@ def build_tasks(
     Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
     their own never do. The order and the numbers of the tasks depend on the study alone.
     """
-    sweeps, histories, causes = list[Sweep](), list[_FromStart](), Counter[str]()
     outputs: dict[str, Any] = {
         "cycles": study.output_counts,
         "variables": tuple(study.recorded),
@@ -131,32 +107,51 @@ def build_tasks(
         "until": study.until,
         "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
     }
-    # most start states have points with the same values
     sharing = cache(partial(_share_histories, study))
-    n_histories = 0
+    sweeps, of_sweeps, causes, n_histories = list[Sweep](), list[_Starts](), Counter[str](), 0
     for (joint, excitation, settings), starts in _cases(study, contacts, scenes).items():
         ascending, direction = sorted(set[float]().union(*starts.values())), excitation.direction
         n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
         case: dict[str, Any] = {"joint": joint, "excitation": excitation, "settings": settings}
         case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
-        of_case = case | outputs
         for frequencies in [[one] for one in ascending] if direction == "ramp" else [ascending]:
-            cost = seconds_of(n_unknowns, iterations_of_sweep(direction, len(frequencies)))
-            sweep = Sweep(number=len(sweeps), frequencies=tuple(frequencies), cost=cost, **case)
-            sweeps.append(sweep)
-            for position, frequency in enumerate(frequencies):
-                for law, of_law in starts.items():
-                    if frequency not in of_law:
-                        continue
-                    values, at = of_law.pop(frequency)
-                    tasks, of_start = sharing(tuple(values))
-                    where = law, sweep.number, position, frequency
-                    histories.append(_FromStart(n_histories, of_case, *where, tasks, at))
-                    n_histories += len(tasks)
-                    if of_start:
-                        causes.update(of_start)
+            first, whole = (iterations_of_sweep(direction, number) for number in (1, len(frequencies)))
+            case |= {"cost": seconds_of(n_unknowns, whole), "first_share": first / whole}
+            sweeps.append(Sweep(number=len(sweeps), frequencies=tuple(frequencies), **case))
+            of_sweeps.append(starts)
+        for points in itertools.chain.from_iterable(of_law.values() for of_law in starts.values()):
+            tasks, shared = sharing(tuple(points.values))
+            n_histories += len(tasks)
+            causes.update(shared)
+
+    make = partial(_make_histories, tuple(zip(sweeps, of_sweeps, strict=True)), sharing, outputs)
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
-    return TaskPlan(_Histories(histories), left_out, study.n_points, tuple(sweeps))
+    return TaskPlan(_Histories(make, n_histories), left_out, study.n_points, tuple(sweeps))
+
+
+def _make_histories(
+    sweeps: Sequence[tuple[Sweep, _Starts]], sharing: _Sharing, outputs: Mapping[str, Any]
+) -> Iterator[History]:
+    """The histories from the start states of all sweeps, in the order of the study."""
+    number = itertools.count()
+    for sweep, starts in sweeps:
+        case = {name: getattr(sweep, name) for name in ("joint", "excitation", "settings", "scenes", "n_unknowns")}
+        for position, frequency in enumerate(sweep.frequencies):
+            for law, of_law in starts.items():
+                values, at = of_law.get(frequency, ((), ()))
+                for together in sharing(tuple(values))[0]:
+                    yield History(
+                        number=next(number),
+                        law=law,
+                        sweep=sweep.number,
+                        position=position,
+                        frequency=frequency,
+                        integrated=together.integrated,
+                        indices=tuple(tuple(at[point] for point in same) for same in together.points),
+                        cost=seconds_of(sweep.n_unknowns, together.iterations),
+                        **case,
+                        **outputs,
+                    )
 
 
 def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet) -> dict[_Case, _Starts]:
@@ -169,7 +164,9 @@ def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: Sc
         for at, settings in grid(part.study):
             case = at["excitation_amplitude"], at["sweep"], id(settings)
             if case not in of_cases:
-                starts = cases.setdefault((joint, Excitation.at(part.study, at), settings), {})
+                amplitude, direction = axes.excitation_amplitude[case[0]], axes.sweep[case[1]]
+                excitation = Excitation(amplitude, direction, part.study.follow)
+                starts = cases.setdefault((joint, excitation, settings), {})
                 of_cases[case] = starts.setdefault(law, {})
             frequency, of_law = axes.frequency[at["frequency"]], of_cases[case]
             if frequency not in of_law:
@@ -230,10 +227,6 @@ def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
     for group in groups.values():
         for first in range(0, len(group), MOST_TOGETHER):
             integrated, points = zip(*group[first : first + MOST_TOGETHER], strict=True)
-            yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), _iterations(study, integrated))
-
-
-def _iterations(study: Study, integrated: Sequence[Integrated]) -> float:
-    """Newton iterations of the histories of a task."""
-    cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
-    return iterations_of_histories([(each.scheme, each.step) for each in integrated], cycles)
+            cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
+            iterations = iterations_of_histories([(each.scheme, each.step) for each in integrated], cycles)
+            yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), iterations)

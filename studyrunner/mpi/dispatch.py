@@ -16,9 +16,8 @@ from typing import Any
 Job = Any
 """What is done as a whole by one rank: a task of a study, or a scene to build. It has
 
-- cost: estimated time, s, positive, of which each result takes an equal share;
+- costs: estimated time of each result that the job gives, one after the other, s; 0 of one that comes with another;
 - cost_keys: groups of similar jobs, see `CostModel`;
-- n_results: that the job gives one after the other, at least 1;
 - gives_starts: whether other jobs wait for the results.
 """
 
@@ -119,7 +118,7 @@ class Dispatcher:
         """Adds jobs that have become possible."""
         for job in jobs:
             keys = job.cost_keys
-            entry = (-job.cost * self._costs.correction(keys), self._n_known, job, keys)
+            entry = (-sum(job.costs) * self._costs.correction(keys), self._n_known, job, keys)
             heapq.heappush(self._first if job.gives_starts else self._others, entry)
             self._n_known += 1
 
@@ -129,14 +128,15 @@ class Dispatcher:
             rank, _ = self._free.popitem()
             is_first = self._first and (self.wants_more or not self._others)
             _, number, job, _ = heapq.heappop(self._first if is_first else self._others)
-            self._given[number] = _Running(job, job.n_results, self._clock())
+            self._given[number] = _Running(job, len(job.costs), self._clock())
             yield rank, number, job
 
     def deliver(self, rank: int, number: int, seconds: float) -> Job:
         """Notes a result, which took so many seconds; returns its job."""
         given = self._given[number]
         job = given.job
-        self._costs.learn(job.cost_keys, job.cost / job.n_results, seconds)
+        if (estimated := job.costs[-given.n_left]) > 0.0:
+            self._costs.learn(job.cost_keys, estimated, seconds)
         given.n_left, given.began = given.n_left - 1, self._clock()
         if given.n_left == 0:
             del self._given[number]
@@ -163,10 +163,10 @@ class Dispatcher:
         self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
         costs = CostModel(self._costs.sums)
         for job, _, seconds in self.running():
-            at_least = _AS_LONG_AGAIN * seconds
-            if not job.gives_starts and at_least > job.cost * costs.correction(job.cost_keys):
-                costs.learn(job.cost_keys, job.cost, at_least)
+            at_least, estimated = _AS_LONG_AGAIN * seconds, sum(job.costs)
+            if not job.gives_starts and at_least > estimated * costs.correction(job.cost_keys):
+                costs.learn(job.cost_keys, estimated, at_least)
         self._others = [
-            (-job.cost * costs.correction(keys), number, job, keys) for _, number, job, keys in self._others
+            (-sum(job.costs) * costs.correction(keys), number, job, keys) for _, number, job, keys in self._others
         ]
         heapq.heapify(self._others)

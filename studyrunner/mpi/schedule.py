@@ -12,7 +12,10 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
+
+from numba.core.event import Event, Listener, register
 
 from studyrunner.mpi.dispatch import CostModel, Dispatcher, Job
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks
@@ -22,6 +25,9 @@ from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 SECONDS_TO_PROGRESS = 3.0
 """Shortest time between two reports of progress of a job, s; longer with many ranks. With the time that a report waits
 for others (`checkpoint.store`) a kill loses no step that was finished more than 5 s before, where steps are short."""
+
+COMPILING = "compiling the solver, once after an installation"
+"""What a user waits for at first; it is no part of what a job takes."""
 
 _MANY_RANKS = 100  # with more, each reports less often, as rank 0 writes all reports to the disk
 _LOOKS_A_TICK = 100
@@ -46,6 +52,36 @@ class _Reply(NamedTuple):
     number: int
     content: Any
     seconds: float | None = None
+
+
+class _Compiler(Listener):
+    """seconds: in which this process has compiled functions. say: takes `COMPILING` at the begin, "" at the end."""
+
+    def __init__(self) -> None:
+        self.seconds, self._began, self._depth = 0.0, 0.0, 0
+        self.say: Callable[[str], object] = str
+
+    def working_seconds(self) -> float:
+        """A clock, s, that stands still while a function is compiled."""
+        return time.perf_counter() - self.seconds
+
+    def on_start(self, event: Event) -> None:  # noqa: ARG002
+        """Begin of a function, which may be inside another one."""
+        if self._depth == 0:
+            self._began = time.perf_counter()
+            self.say(COMPILING)
+        self._depth += 1
+
+    def on_end(self, event: Event) -> None:  # noqa: ARG002
+        """End of a function."""
+        self._depth -= 1
+        if self._depth == 0:
+            self.seconds += time.perf_counter() - self._began
+            self.say("")
+
+
+_compiler = _Compiler()
+register("numba:compile", _compiler)  # type: ignore[no-untyped-call]
 
 
 class TaskHandler:
@@ -108,7 +144,8 @@ def follow_rank_0(ranks: Ranks, run: Run, check: Callable[[], None] = raise_endi
 
 def _work(assignment: _Assignment, ranks: Ranks, run: Run, check: Callable[[], None]) -> None:
     """Sends the results of a job, each as soon as it is there."""
-    job, n_given, began = assignment.job, 0, time.perf_counter()
+    job, n_given, clock = assignment.job, 0, _compiler.working_seconds
+    n_results, began = len(job.costs), clock()
     pause = SECONDS_TO_PROGRESS * max(1.0, ranks.size / _MANY_RANKS)
     sent, first = dict[type, float](), began  # data and words have times of their own
 
@@ -116,25 +153,28 @@ def _work(assignment: _Assignment, ranks: Ranks, run: Run, check: Callable[[], N
         ranks.send(_Reply(assignment.number, content, seconds), 0)
         ranks.flush()
 
-    def keep(progress: object) -> None:
+    def keep(progress: object, *, at_once: bool = False) -> None:
         check()
         # a job that has given all its results has no progress
-        if n_given < job.n_results and time.perf_counter() > sent.get(type(progress), first) + pause:
+        if n_given < n_results and (at_once or clock() > sent.get(type(progress), first) + pause):
             send(progress)
-            sent[type(progress)] = time.perf_counter()
+            sent[type(progress)] = clock()
 
+    _compiler.say = partial(keep, at_once=True)
     try:
         for result in run(job, keep):
             n_given += 1
-            if n_given > job.n_results:
+            if n_given > n_results:
                 break
-            send(result, time.perf_counter() - began)
-            began = time.perf_counter()
+            send(result, clock() - began)
+            began = clock()
     except UnseenFileError as error:
         send(error)
         return
-    if n_given != job.n_results:
-        raise ValueError(f"not {job.n_results} results from {job}")
+    finally:
+        _compiler.say = str
+    if n_given != n_results:
+        raise ValueError(f"not {n_results} results from {job}")
 
 
 class _OwnThread(Ranks):

@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from studyrunner.system.process import keep_talking, take_endings
-from studyrunner.user_error import StorageError, UserError
+from studyrunner.user_error import Parser, StorageError, UserError
 
 if TYPE_CHECKING:
     from studyrunner.result.view import Result
@@ -40,15 +40,9 @@ exit status:
   2  bad input, nothing was written: one line says what is wrong"""
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise UserError("command line", "options", None, f"{message}; study-report --help lists them")
-
-
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """The options; paths are None where left out. Raises UserError where they are wrong, SystemExit after --help."""
-    look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
-    parser = _Parser("study-report", description=_DESCRIPTION, epilog=_EPILOG, **look)
+    parser = Parser("study-report", _DESCRIPTION, _EPILOG)
     add, flag = parser.add_argument, dict[str, Any](action="store_true")
     add("result", metavar="OUT.nc", type=Path, help="result file of run-study")
     add("-o", dest="folder", metavar="FOLDER", type=Path, help="where to write (default: OUT-report, here)")
@@ -79,14 +73,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     take_endings()
     try:
         return _report(parse_options(sys.argv[1:] if arguments is None else arguments))
-    except UserError as error:
+    except (UserError, StorageError) as error:
         print(f"study-report: {error}", file=sys.stderr)
-        return BAD_INPUT
+        return BAD_INPUT if isinstance(error, UserError) else UNEXPECTED
     except SystemExit:
         return WRITTEN
-    except StorageError as error:
-        print(f"study-report: {error}", file=sys.stderr)
-        return UNEXPECTED
     except KeyboardInterrupt:
         print("study-report: interrupted", file=sys.stderr)
         return INTERRUPTED

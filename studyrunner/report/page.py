@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import json
 import math
-import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import resources
@@ -31,6 +30,7 @@ from studyrunner.result.pairs import axes_of_scenes, of_shown_scene, pairs_of_sc
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.summary.answer import summarise
+from studyrunner.system.machine import replacing
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_number, units_of
@@ -55,12 +55,8 @@ def write_page(result: Result, items: Iterable[Item], path: Path) -> str:
         raise_ending()
         counts[type(item).__name__] += 1
         parts.append(_save(item, path.parent) if isinstance(item, Drawing) else item)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    with replacing(path) as partial:
         partial.write_text(_build_page(result, parts), encoding="utf-8", newline="\n")
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
     shown = f"{count(counts['Drawing'], 'figure')}, {count(counts['Table'], 'table')}, {counts['Missing']} left out"
     return f"{shown}, {path.stat().st_size / 1e6:.1f} MB"
 

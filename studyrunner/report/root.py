@@ -129,7 +129,12 @@ def read_root(result: Result) -> RootSurface | None:
     _, first, body = np.unique(component[faces[:, 0]], return_index=True, return_inverse=True)
     body = np.argsort(np.argsort(first))[body].astype(np.int64)
     flank, touching, at, normals = _find_contact_faces(nodes, faces, pairs.position, flank)
-    names = _name_bodies(body, parts)
+    # the part most of its faces belong to; with a number where bodies share it
+    found = [Counter(parts[body == number].tolist()).most_common(1)[0][0] for number in range(int(body.max()) + 1)]
+    names = tuple(
+        name if name and found.count(name) == 1 else f"{name or 'body'} {found[: place + 1].count(name)}"
+        for place, name in enumerate(found)
+    )
     return RootSurface(nodes, faces, body, names, flank, flanks, touching, at, normals) if touching.size else None
 
 
@@ -139,16 +144,6 @@ def read_mesh(result: Result) -> tuple[Floats, Places, NDArray[np.str_]]:
     faces = result.dataset["mesh_quad"].values.astype(np.int64)
     parts = result.dataset["mesh_part"].values.astype(np.str_) if result.has("mesh_part") else np.full(len(faces), "")
     return nodes, faces, parts
-
-
-def _name_bodies(body: Places, parts: NDArray[np.str_]) -> tuple[str, ...]:
-    """The part most of its faces belong to; with a number where bodies share it."""
-    names = [Counter(parts[body == number].tolist()).most_common(1)[0][0] for number in range(int(body.max()) + 1)]
-    count = Counter(names)
-    return tuple(
-        name if name and count[name] == 1 else f"{name or 'body'} {names[: place + 1].count(name)}"
-        for place, name in enumerate(names)
-    )
 
 
 def face_normals(nodes: Floats, faces: Places) -> Floats:

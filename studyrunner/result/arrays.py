@@ -9,24 +9,18 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.scene import scene_set
 from studyrunner.scene.answers import SmallArray
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import (
-    PairArrays,
-    SceneSet,
-    along_axes,
-    drawn_pairs,
-    merge_facts,
-    pair_arrays,
-    scatters_pairs,
-    worn_depth,
-)
 from studyrunner.study.parts import block_of_input, draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
 
-_OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
+_NAMED = COORDINATES | {
+    "gap": Variable(("contact",), "m", "initial gap of the contact pair"),
+    "area": Variable(("contact",), "m2", "area of the contact pair"),
+}
 
 
 def attributes(name: str, entry: Variable) -> dict[str, object]:
@@ -46,15 +40,15 @@ def attributes(name: str, entry: Variable) -> dict[str, object]:
 
 
 def small_arrays(
-    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SmallArray] = ()
+    study: Study, scenes: scene_set.SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SmallArray] = ()
 ) -> list[SmallArray]:
     """Coordinates of the file, and its variables that no task computes. of_scene: what the study asks of the scene."""
-    names, stuck = along_axes(study, scenes, [np.array(each.stuck_frequency) for each in facts])
+    names, stuck = scene_set.along_axes(study, scenes, [np.array(each.stuck_frequency) for each in facts])
     ratios = study.axes.frequency_ratio
     hertz = [] if ratios is None else [(("frequency_ratio", *names), np.multiply.outer(ratios, stuck))]
     return [
         *(SmallArray("frequency", *each, COORDINATES["frequency"]) for each in hertz),
-        *coordinates(study, merge_facts(facts), pair_arrays(study, facts, scenes)),
+        *coordinates(study, facts, scenes),
         SmallArray("stuck_frequency", names, stuck, STUCK_FREQUENCY),
         *_worn_coordinate(study, facts),
         *sample_coordinates(study, facts, scenes),
@@ -62,8 +56,9 @@ def small_arrays(
     ]
 
 
-def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[SmallArray]:
-    """Coordinates of the file but those of samples and worn joints."""
+def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
+    """Coordinates of the file but those of samples and worn joints. of_scenes: facts of each."""
+    facts = scene_set.merge_facts(of_scenes)
     along: dict[str, Sequence[object] | NDArray[np.generic]] = dict(study.dimensions)
     counted = np.array(study.output_counts, dtype=int if study.mission else float)
     along.setdefault(study.kind.counted or "cycle", counted)
@@ -72,17 +67,31 @@ def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[
     if study.outputs.loops:
         along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
     for name, values in along.items():
-        yield SmallArray(name, (name,), _labels(values), _coordinate_entry(study, name))
-    of_pairs: dict[str, NDArray[np.generic]] = {
-        f"contact_{axis}": pairs.position[..., column] for column, axis in enumerate("xyz")
-    }
-    of_pairs |= {"contact_area": pairs.area, "contact_surface": pairs.surface}
-    if pairs.exists is not None:
-        of_pairs["contact_exists"] = pairs.exists.astype(np.int8)
-    for name, values in of_pairs.items():
-        yield SmallArray(name, pairs.dimensions, np.array(values), COORDINATES[name])
+        # whole numbers and flags as NetCDF has them; texts where one value is text
+        texts = any(isinstance(value, str) for value in values)
+        labels = np.array([str(value) for value in values] if texts else values)
+        labels = labels.astype({"b": np.int8, "i": np.int32}.get(labels.dtype.kind, labels.dtype))
+        yield SmallArray(name, (name,), labels, _coordinate_entry(study, name))
+    yield from _of_pairs(study, of_scenes, scenes)
     if facts.edge is not None:
         yield SmallArray("contact_edge", ("contact",), facts.edge.astype(np.int8), COORDINATES["contact_edge"])
+
+
+def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
+    """Where the pairs are, along the axes along which scenes differ in them; NaN and "" of a pair that one lacks."""
+    names, numbers = scene_set.axes_of_difference(study, scenes, [each.pairs for each in facts])
+    contacts = [each.contact for each in facts]
+    shape = (len(facts), max(each.n_contact for each in contacts))
+    position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
+    surface = np.full(shape, "", np.array([label for each in contacts for label in each.surface]).dtype)
+    for number, each in enumerate(contacts):
+        own = slice(each.n_contact)
+        position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
+    found: dict[str, NDArray[np.generic]] = {f"contact_{axis}": position[..., k] for k, axis in enumerate("xyz")}
+    found |= {"contact_area": area, "contact_surface": surface}
+    found |= {"contact_exists": np.isfinite(area).astype(np.int8)} if names else {}
+    for name, values in found.items():
+        yield SmallArray(name, (*names, "contact"), np.array(values[numbers]), COORDINATES[name])
 
 
 def _coordinate_entry(study: Study, name: str) -> Variable:
@@ -98,15 +107,6 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
     return COORDINATES[name]
 
 
-def _labels(values: Sequence[object] | NDArray[np.generic]) -> NDArray[np.generic]:
-    """Values of an axis: whole numbers and flags as NetCDF has them; texts where one value is text."""
-    texts = any(isinstance(value, str) for value in values)
-    array = np.array([str(value) for value in values] if texts else values)
-    if array.dtype.kind == "b":
-        return array.astype(np.int8)
-    return array.astype(np.int32) if array.dtype.kind == "i" else array
-
-
 def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SmallArray]:
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
     if study.scene.worn is None or len(facts) > 1:
@@ -114,12 +114,12 @@ def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Smal
     axis = next((axis for axis in study.scene_axes if axis.key == ("worn",)), None)
     # the axis of worn states is the last one
     states = (study,) if axis is None else study.variants[: len(axis.values)]
-    values = np.array([worn_depth(state, facts[0]) for state in states])
+    values = np.array([scene_set.worn_depth(state, facts[0]) for state in states])
     dimensions, values = (("contact",), values[0]) if axis is None else ((axis.name, "contact"), values)
     yield SmallArray("worn_depth", dimensions, values, WORN_DEPTH)
 
 
-def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
+def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
     """The drawn values of each input, in its unit, along the samples, and along axes and pairs where they differ.
 
     NaN where a scene does not have a pair.
@@ -133,8 +133,8 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneS
         names = (*of_scenes, *((name,) if first.ndim == 2 else ()), "sample")
         values = np.array([each[name] for each in drawn]).reshape(*of_scenes.values(), *first.shape)
         yield _sample_coordinate(study, name, names, values)
-    if scatters_pairs(study):
-        of_parts = [of_part for _, _, of_part in drawn_pairs(study, scenes, facts)]
+    if scene_set.scatters_pairs(study):
+        of_parts = [of_part for _, _, of_part in scene_set.drawn_pairs(study, scenes, facts)]
         n_contact = max(each.contact.n_contact for each in facts)
         for name in of_parts[0]:
             values = np.full((len(of_parts), n_contact), np.nan)
@@ -153,10 +153,8 @@ def _sample_coordinate(study: Study, name: str, names: Sequence[str], values: ND
             values = np.asarray(values.take(0, axis=place))
         else:
             dimensions = (axis, *dimensions)
-    if name in COORDINATES:
-        units, meaning = COORDINATES[name].units, COORDINATES[name].long_name
-    elif name in _OF_CONTACT:
-        units, meaning = _OF_CONTACT[name]
+    if name in _NAMED:
+        units, meaning = _NAMED[name].units, _NAMED[name].long_name
     elif name in study.wear.numbers:
         # `surfaces_flat` is the factor of the surface "flat"
         units, meaning = describe_key(type(study.wear), *name.split("_", 1))

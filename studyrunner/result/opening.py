@@ -24,18 +24,7 @@ from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.text import check_result_file, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.values import Wrong
-from studyrunner.variables import (
-    ASKED,
-    CERTIFICATE,
-    COUNTS,
-    LOOPS,
-    OF_A_HISTORY,
-    OF_A_MISSION,
-    OF_A_MODE_POINT,
-    OF_MISSIONS,
-    OF_MODES,
-    Variable,
-)
+from studyrunner.variables import CERTIFICATE, IN_FILES, LOOPS, Variable
 
 ENDED = "ended"
 """Coordinate of an opened result: `outcome` in words."""
@@ -58,13 +47,6 @@ _OF_SCENE |= {name: entry for name, entry in COORDINATES.items() if entry.dimens
 _WORDS = ("scheme", "sweep")
 _TEXTS = (*_WORDS, "response", "component", "block")
 _DRAWN_VALUES = Variable((), "1", "what the samples draw of an input")
-
-_LIKE_CYCLES = {
-    "mission": "cycle",
-    "last_mission": "last_cycle",
-    "missions_to_target": "cycles_to_target",
-    "missions_to_target_error": "cycles_to_target_error",
-}
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -141,7 +123,8 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
         if has_unit.any() and not has_unit.all():
             history = history.isel(response=np.flatnonzero(~has_unit))
     if "block" in dataset.dims:
-        renamed = history.rename({name: new for name, new in _LIKE_CYCLES.items() if name in history.variables})
+        names = map(str, history.variables)
+        renamed = history.rename({name: name.replace("mission", "cycle") for name in names if "mission" in name})
         of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
         history, blocks = renamed.drop_vars(of_blocks), renamed[of_blocks]
     if history is not dataset:
@@ -238,11 +221,7 @@ def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Va
     n_values = n_points * math.prod(sizes.get(name, 1) for name in (slow, "response", "block"))
     is_small = n_points <= _MOST_POINTS and n_values <= _MOST_VALUES
     _need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
-    with_axes = ASKED | OF_A_HISTORY | LOOPS | COUNTS | SCENE["exact"]
-    if slow == "mission":
-        with_axes = OF_MISSIONS | OF_A_MISSION
-    elif "modal_amplitude" in axes:
-        with_axes = OF_MODES | OF_A_MODE_POINT
+    with_axes = IN_FILES["modal_amplitude" if "modal_amplitude" in axes else slow] | SCENE["exact"]
     known: dict[str, tuple[tuple[str, ...], Variable | None]] = {}
     for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
         # what is of the scene, or drawn, has those axes along which it differs

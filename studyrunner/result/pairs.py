@@ -68,10 +68,6 @@ class Grid:
     across: Floats
     along: Floats
 
-    def upwards(self) -> Grid:
-        """The same grid from its last line on."""
-        return Grid(self.pair[::-1], self.across[-1] - self.across[::-1], self.along)
-
 
 @dataclass(frozen=True)
 class Flank:
@@ -257,8 +253,10 @@ def find_flanks(result: Result) -> tuple[Flank, ...]:
             plane = plane * np.sign(np.take_along_axis(plane, largest, axis=1))
             seen = centred @ plane[:2].T
             with contextlib.suppress(ValueError):
-                grid = find_grid(position).upwards() if len(position) > 1 else None
+                grid = find_grid(position) if len(position) > 1 else None
             if grid is not None:
+                # from its last line on
+                grid = Grid(grid.pair[::-1], grid.across[-1] - grid.across[::-1], grid.along)
                 first, across = position[grid.pair[0]], position[grid.pair[:, 0]]
                 plane, edges = np.stack([first[-1] - first[0], across[-1] - across[0]]), _cell_edges(grid, flank.area)
             named = words if words and (grid is None or len(grid.along) > 1) else (_name(plane[0]), _name(plane[1]))

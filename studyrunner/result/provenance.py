@@ -8,19 +8,13 @@ from collections.abc import Iterator
 from datetime import UTC, date, datetime
 from importlib import metadata
 
-from studyrunner.kinds.task import solver_digest
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study
+from studyrunner.system.machine import package_digest
 from studyrunner.user_error import UserError
 
 PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4", "h5py", "pydantic")
-
-POINTS_LEFT = "points_not_computed"
-"""Attribute of a result file: number of points that are not computed, 0 in a finished result."""
-
-NOW = "now"
-"""Stands for the time at which the run begins."""
 
 _REFERENCE = (
     "Salles et al.: Dynamic analysis of fretting-wear in joint interface by a multiscale harmonic"
@@ -38,7 +32,7 @@ _COMMENT = (
 
 def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
     """Attributes that equal runs share, not of time, place or number of ranks; the id is a hash of all inputs."""
-    text, solver = format_study(study), solver_digest()
+    text, solver = format_study(study), package_digest("solver")
     program = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
     return {
         "Conventions": "CF-1.11, ACDD-1.3",
@@ -88,28 +82,20 @@ def compare_with_archived(study: Study, scene_sha256: str) -> Iterator[str]:
     if there.scene_sha256 not in (None, scene_sha256):
         before = there.scene_sha256[:12] or "missing"
         yield f"its scene_sha256 is {before}, that of the scene built now {scene_sha256[:12]}: another scene"
-    if there.solver_digest != solver_digest():
+    if there.solver_digest != package_digest("solver"):
         yield f"computed by another solver ({there.versions or 'unknown'}; now {versions}): numbers may differ"
 
 
 def check_date(text: str, place: str, key: str) -> str:
-    """A date, or date and time, in the extended form of ISO 8601, from any of its forms; or `NOW`.
+    """A date, or date and time, in the extended form of ISO 8601, from any of its forms; "now": that of the call.
 
     place, key: where the input was given, for the message. Raises UserError where the text is neither.
     """
-    if text == NOW:
-        return NOW
+    text = datetime.now(UTC).isoformat(timespec="seconds") if text == "now" else text
     for kind in (date, datetime):
         try:
             return kind.fromisoformat(text).isoformat().replace("+00:00", "Z")
         except ValueError:
             continue
-    remedy = f'give a date of ISO 8601, as 2026-11-23 or 2026-11-23T14:05:00Z, or "{NOW}"'
+    remedy = 'give a date of ISO 8601, as 2026-11-23 or 2026-11-23T14:05:00Z, or "now"'
     raise UserError(place, key, text, remedy)
-
-
-def describe_date(checked: str | None) -> dict[str, str]:
-    """The date, where asked for, see `check_date`: equal runs may differ in it."""
-    if checked == NOW:
-        checked = datetime.now(UTC).replace(microsecond=0, tzinfo=None).isoformat() + "Z"
-    return {} if checked is None else {"date_created": checked}

@@ -10,19 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from studies.hdf5 import open_hdf5, read_attribute
-from studies.scene_error import SceneError
 from studyrunner.checkpoint.store import read_study
-from studyrunner.result.provenance import POINTS_LEFT
-from studyrunner.study.text import read_toml
-from studyrunner.system.machine import new_partial, sync
+from studyrunner.study.text import read_archived, read_toml
+from studyrunner.system.machine import find_fault, new_partial
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
 
-_TRIAL = bytes(4096)  # a full disk has room for a name
-_UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError, UserError)
+_BYTES_OF_TRIAL = 4096  # a full disk has room for a name
 
 
 @dataclass(frozen=True)
@@ -48,11 +44,11 @@ def identity_of(name: str, model: str) -> str:
     return f'study "{name}" (scene {os.path.basename(model)})'  # noqa: PTH119 - of an empty text as well
 
 
-def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
+def check_output(option: str, path: Path, inputs: Sequence[Path], *, new: bool = False) -> Path:
     """The file at `path`, links followed, after a test that it can be written; nothing is changed.
 
-    option: of the command line, that gave the path. inputs: files that the run reads and must not replace. Raises
-    UserError where the file cannot be written, or is one of the inputs.
+    option: of the command line, that gave the path. inputs: files that the run reads and must not replace. new: whether
+    no file may hold anything there. Raises UserError where the file cannot be written, or is one of the inputs.
     """
     try:
         target = Path(os.path.realpath(path))
@@ -69,14 +65,15 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
             remedy = f"give the name of an ordinary file that may be written, as {progress.name} beside it must be"
         elif is_file and any(source.exists() and target.samefile(source) for source in inputs):
             remedy = f"give another file with {option}: this one is read by the run"
+        elif new and is_file and target.stat().st_size:
+            remedy = "give another name: there is such a file"
         if not remedy:
             trial = new_partial(target)
-            with trial.open("xb") as file:
-                try:
-                    file.write(_TRIAL)
-                    sync(file)
-                finally:
-                    trial.unlink()
+            trial.touch(exist_ok=False)
+            fault = find_fault(trial, _BYTES_OF_TRIAL)
+            trial.unlink()
+            if fault is not None:
+                raise fault
     except OSError as error:
         remedy = f"give a file that can be written: {error.strerror}"
     except ValueError:
@@ -101,26 +98,14 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
     return Target(target.path, finished)
 
 
-def check_scene_file(option: str, path: Path, study: Study) -> Path:
-    """As `check_output`, of a scene file. Raises UserError also where there is a file that holds anything."""
-    target = check_output(option, path, study.files)
-    if target.exists() and target.stat().st_size:
-        raise UserError("command line", option, str(target), "give another name: there is such a file")
-    return target
-
-
 def _read_result(option: str, path: Path) -> tuple[str | None, bool]:
     """Identity of the study of an existing result, None without one, and whether the result is finished."""
-    with contextlib.suppress(*_UNREADABLE):
+    with contextlib.suppress(OSError, KeyError, TypeError, UserError):
         # damaged, or unreadable: it may be anything
         if not path.exists() or path.stat().st_size == 0:
             return None, False
-        with open_hdf5(path) as file:
-            text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
-            stored: Any = b"" if text is None else text.item()
-            table: Any = read_toml(stored if isinstance(stored, bytes) else stored.encode(), "")
-            # version 0.4.0 does not say how many points are left
-            finished = left is None or left.item() == 0
-            return identity_of(str(table["study"]["name"]), str(table["scene"]["model"])), finished
+        archived = read_archived(path, "")
+        table: Any = read_toml(archived.study.encode(), "")
+        return identity_of(str(table["study"]["name"]), str(table["scene"]["model"])), archived.is_finished
     remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"
     raise UserError("command line", option, str(path), remedy)

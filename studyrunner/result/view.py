@@ -29,9 +29,6 @@ NO_VOLUME = 1e-24
 NO_MOTION = 1e-12
 """Motion, m, below which it is round-off: less than the size of an atom."""
 
-OWN_STEPS = ("adaptive", "final")
-"""Schemes that choose their steps, without `step`."""
-
 _AT_ONCE = 2**21  # numbers that are read at once
 
 Mask = NDArray[np.bool_]

@@ -24,12 +24,11 @@ from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import RESULTS
 from studyrunner.result.arrays import attributes
-from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.result.target import Target
 from studyrunner.scene.answers import SmallArray, StoredScene
 from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.study.study import Study
-from studyrunner.study.text import SCENE_GROUP
+from studyrunner.study.text import POINTS_LEFT, SCENE_GROUP
 from studyrunner.system.machine import find_fault, replacing
 from studyrunner.user_error import StorageError
 from studyrunner.variables import LOOPS, Variable

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.scene import Progress
-from studyrunner.scatter import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, harmonics_to_build
 from studyrunner.study.mistakes import keys_as_given
 from studyrunner.study.parts import Part, draw_inputs, parts_of
@@ -119,39 +118,6 @@ def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
     )
 
 
-@dataclass(frozen=True)
-class PairArrays:
-    """Where the pairs are, for the coordinates of the result file.
-
-    dimensions: axes along which the pairs differ, then "contact". position (..., n_contact, 3): m. area
-    (..., n_contact): m2. surface (..., n_contact): labels. exists (..., n_contact): whether there is a pair, else NaN
-    and empty labels stand there; None where all scenes have the same pairs.
-    """
-
-    dimensions: tuple[str, ...]
-    position: NDArray[np.float64]
-    area: NDArray[np.float64]
-    surface: NDArray[np.str_]
-    exists: NDArray[np.bool_] | None
-
-
-def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | None = None) -> PairArrays:
-    """Positions, areas and labels of the pairs of all scenes of a study. facts: of each scene of `find_scenes`."""
-    names, numbers = axes_of_difference(study, scenes or find_scenes(study), [each.pairs for each in facts])
-    contacts = [each.contact for each in facts]
-    if not names:
-        one = contacts[0]
-        return PairArrays(("contact",), one.position, one.area, np.array(one.surface), None)
-    shape = (len(facts), max(each.n_contact for each in contacts))
-    position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
-    surface = np.full(shape, "", np.array([label for each in contacts for label in each.surface]).dtype)
-    for number, each in enumerate(contacts):
-        own = slice(each.n_contact)
-        position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
-    exists = np.isfinite(area[numbers])
-    return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
-
-
 def along_axes(study: Study, scenes: SceneSet, values: Sequence[NDArray[Any]]) -> tuple[tuple[str, ...], NDArray[Any]]:
     """Axes along which arrays of the scenes differ, and these arrays along the axes. values: of each scene, alike."""
     names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in values])
@@ -231,7 +197,7 @@ def drawn_pairs(
                 of_all = np.nan if variant.friction_coefficient is None else variant.friction_coefficient
                 friction = np.full(contact.n_contact, of_all) if friction is None else friction
                 values = {"gap": contact.gap, "area": contact.area, "friction_coefficient": friction}
-                drawn[key] = draw_inputs(variant, ScatteredPairs(contact.surface, contact.position), values)
+                drawn[key] = draw_inputs(variant, contact, values)
             yield variant, own, {name: each[sample] for name, each in drawn.get(key, {}).items()}
 
 

@@ -16,7 +16,7 @@ from studies.scene import ContactStiffness, as_scene
 from studies.scene_error import SceneError
 from studies.scenes import scene_parameters
 from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
-from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file
+from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file, result_errors
 from studyrunner.system.progress import count as counted
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Axis, NotNegative, Section, Wrong, listed
@@ -236,14 +236,9 @@ def read_worn(table: object, source: str, folder: Path) -> Worn:
         return given
     path = folder / given.result
     check_result_file(path, str(path))
-    try:
-        with xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
-            depth = _depths_in(dataset, given.model_extra or {}, given.cycle, source)
+    with result_errors(str(path)), xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
+        depth = _depths_in(dataset, given.model_extra or {}, given.cycle, source)
         return Worn(depth=depth.tolist(), cycle=given.cycle, result=given.result)
-    except (OSError, RuntimeError, ValueError, TypeError, KeyError, IndexError):
-        # what the libraries raise where a file is no result, or damaged
-        remedy = "give a result file of run-study that is whole"
-        raise UserError(str(path), "the file", Verbatim("damaged"), remedy) from None
 
 
 def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:

@@ -14,21 +14,9 @@ from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner import variables
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
+from studyrunner.study import sections
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.scene_section import SceneSection
-from studyrunner.study.sections import (
-    AUTO,
-    OWN_AXES,
-    SOLVER_AXES,
-    AxesSection,
-    LoadingSection,
-    MissionBlock,
-    OutputsSection,
-    SlowTimeSection,
-    SolverSection,
-    StudySection,
-    WearSection,
-)
 from studyrunner.study.text import Archived
 from studyrunner.values import Section
 
@@ -58,7 +46,7 @@ class Kind:
 
 
 def _other_axes(*axes: str) -> tuple[str, ...]:
-    return tuple(name for name in AxesSection.model_fields if name not in axes)
+    return tuple(name for name in sections.AxesSection.model_fields if name not in axes)
 
 
 _OF_MODES = ("mode", "sweep")
@@ -90,8 +78,8 @@ MODES = Kind(
     tuple(variables.OF_MODES),
     unused={
         "axes": _other_axes(*_OF_MODES, "modal_amplitude"),
-        "slow_time": tuple(SlowTimeSection.model_fields),
-        "wear": tuple(WearSection.model_fields),
+        "slow_time": tuple(sections.SlowTimeSection.model_fields),
+        "wear": tuple(sections.WearSection.model_fields),
         "outputs": ("loops",),
     },
     why="leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
@@ -129,16 +117,16 @@ class Study(Section):
       fastest, the study with these values in [scene] and [wear]. This study has their first values.
     """
 
-    study: StudySection
+    study: sections.StudySection
     scene: SceneSection
-    axes: AxesSection
-    wear: WearSection = WearSection()
-    slow_time: SlowTimeSection = SlowTimeSection()
-    solver: SolverSection = SolverSection()
-    outputs: OutputsSection = OutputsSection()
+    axes: sections.AxesSection
+    wear: sections.WearSection = sections.WearSection()
+    slow_time: sections.SlowTimeSection = sections.SlowTimeSection()
+    solver: sections.SolverSection = sections.SolverSection()
+    outputs: sections.OutputsSection = sections.OutputsSection()
     scatter: ScatterSection | None = None
-    loading: LoadingSection | None = None
-    mission: tuple[MissionBlock, ...] = ()
+    loading: sections.LoadingSection | None = None
+    mission: tuple[sections.MissionBlock, ...] = ()
     block_studies: tuple[Study, ...] = Field((), exclude=True)
     follow: FollowedFrequency | None = Field(None, exclude=True)
     source: str = Field(exclude=True)
@@ -204,13 +192,15 @@ class Study(Section):
     @property
     def given_harmonics(self) -> tuple[int, ...]:
         """Values of `harmonics` that are numbers."""
-        return tuple(number for number in self.solver.harmonics if number != AUTO)
+        return tuple(number for number in self.solver.harmonics if number != sections.AUTO)
 
     @property
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
         names = {} if self.axes.frequency_ratio is None else {"frequency": "frequency_ratio"}
-        own = {names.get(name, name): self.solver if name in SOLVER_AXES else self.axes for name in self.own_axes}
+        own = {
+            names.get(name, name): self.solver if name in sections.SOLVER_AXES else self.axes for name in self.own_axes
+        }
         found = {name: getattr(table, name) or () for name, table in own.items()} | self.axes_of_parts
         if self.axes.modal_amplitude is not None:
             worn = found.pop("cycle", (0.0,))
@@ -232,6 +222,6 @@ class Study(Section):
     def own_axes(self) -> tuple[str, ...]:
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
         # those of which every block of a mission gives a value of its own are none
-        idle = [name for name in OWN_AXES if self.mission and all(block.gives(name) for block in self.mission)]
-        several = [key for key in SOLVER_AXES if key in self.solver_axes or len(getattr(self.solver, key)) > 1]
+        idle = [name for name in sections.OWN_AXES if self.mission and all(block.gives(name) for block in self.mission)]
+        several = [key for key in sections.SOLVER_AXES if key in self.solver_axes or len(getattr(self.solver, key)) > 1]
         return (*(name for name in self.kind.axes if name not in idle), *several)

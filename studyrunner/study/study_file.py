@@ -11,37 +11,16 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter import flat_table
+from studyrunner.study import scene_axes, sections
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
 from studyrunner.study.parts import with_room_for_wear
 from studyrunner.study.rules import broken_rules
-from studyrunner.study.scene_axes import (
-    SceneAxis,
-    Tables,
-    as_checked,
-    is_table,
-    keys_below_axes,
-    only_table,
-    take_axes,
-    variants_of,
-)
 from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, parameters_of, read_worn
-from studyrunner.study.sections import (
-    DEFAULT,
-    OWN_AXES,
-    SECTIONS,
-    SOLVER_AXES,
-    VARIABLES,
-    AxesSection,
-    SlowTimeSection,
-    WearSection,
-    read_blocks,
-)
 from studyrunner.study.study import MODES, Study
 from studyrunner.study.text import format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError
@@ -100,11 +79,11 @@ def _study_path(argument: str) -> Path:
     raise UserError(argument, "the study", None, remedy)
 
 
-def _tables_of(table: Mapping[str, object], source: str) -> Tables:
+def _tables_of(table: Mapping[str, object], source: str) -> scene_axes.Tables:
     """The tables of a study file, those that are always read as empty ones; copies, in which keys may be changed."""
-    tables: Tables = {name: {} for name in SECTIONS if name not in _ON_REQUEST} | {"scene": {}}
+    tables: scene_axes.Tables = {name: {} for name in sections.SECTIONS if name not in _ON_REQUEST} | {"scene": {}}
     for name, section in table.items():
-        if (meant := nearest_name(name, (*SECTIONS, "scene", "mission"))) != name:
+        if (meant := nearest_name(name, (*sections.SECTIONS, "scene", "mission"))) != name:
             raise UserError(source, name, section, f"unknown table, give {meant}")
         if name != "mission" and not isinstance(section, dict):
             raise UserError(source, name, section, f"give a table [{name}] with keys")
@@ -114,9 +93,9 @@ def _tables_of(table: Mapping[str, object], source: str) -> Tables:
     return tables
 
 
-def _about_scenes(tables: Tables) -> str:
+def _about_scenes(tables: scene_axes.Tables) -> str:
     """All that the scenes of a study depend on, as text."""
-    keys = [(name, value) for name, value in tables["axes"].items() if name not in AxesSection.model_fields]
+    keys = [(name, value) for name, value in tables["axes"].items() if name not in sections.AxesSection.model_fields]
     scene = {name: value for name, value in tables["scene"].items() if name != "worn"}
     return json.dumps([scene, keys, tables.get("scatter")], sort_keys=True, default=str)
 
@@ -126,7 +105,7 @@ def _scene_of_result(table: Mapping[str, object], source: str) -> SceneSection:
     tables = _tables_of(table, source)
     model, _ = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
     kind = parameters_of(model, source)
-    given = next(variants_of(tables, take_axes(tables, kind, source)))["scene"]
+    given = next(scene_axes.variants_of(tables, scene_axes.take_axes(tables, kind, source)))["scene"]
     return SceneSection(model=model, parameters=check_tables({"scene": kind}, {"scene": given}, source)["scene"])
 
 
@@ -139,35 +118,35 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     model, worn = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
     kind = parameters_of(model, source, origin.path.parent if origin.archived is None else None)
     worn = None if worn is None else read_worn(worn, source, origin.path.parent)
-    solver_axes = tuple(key for key in SOLVER_AXES if key in tables["axes"])
-    axes = take_axes(tables, kind, source)
-    blocks = read_blocks(tables.pop("mission"), kind, source) if "mission" in tables else ()
+    solver_axes = tuple(key for key in sections.SOLVER_AXES if key in tables["axes"])
+    axes = scene_axes.take_axes(tables, kind, source)
+    blocks = sections.read_blocks(tables.pop("mission"), kind, source) if "mission" in tables else ()
     if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
         tables.setdefault("loading", {})
-    kinds: dict[str, type[BaseModel]] = {name: each for name, each in SECTIONS.items() if name in tables}
-    with keys_as_given({**keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
-        variants, studies = [*variants_of(tables, axes)], list[Study]()
-        sections = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
-        worn_axis: tuple[SceneAxis, ...] = ()
+    kinds: dict[str, type[BaseModel]] = {name: each for name, each in sections.SECTIONS.items() if name in tables}
+    with keys_as_given({**scene_axes.keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
+        variants, studies = [*scene_axes.variants_of(tables, axes)], list[Study]()
+        given_tables = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
+        worn_axis: tuple[scene_axes.SceneAxis, ...] = ()
         if worn is not None and worn.cycle:
-            name = "cycle" if sections["axes"].modal_amplitude else WORN_AXIS
+            name = "cycle" if given_tables["axes"].modal_amplitude else WORN_AXIS
             meaning = "number of vibration cycles that have worn the joint before"
-            worn_axis = (SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),)
+            worn_axis = (scene_axes.SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),)
         fixed = {"mission": blocks, "source": source, "folder": origin.path.parent, "archived": origin.archived}
         fixed |= {"solver_axes": solver_axes, "scene_axes": (*axes, *worn_axis)}
         for given in variants:
-            checked = check_tables({"scene": kind, "wear": WearSection}, given, source)
+            checked = check_tables({"scene": kind, "wear": sections.WearSection}, given, source)
             for state in (None,) if worn is None else worn.states():
                 scene = SceneSection(model=model, parameters=checked["scene"], worn=state)
                 known = studies[0].scene if studies else None
                 own = {"scene": find_scene(scene, origin, known), "wear": checked["wear"]}
-                study = Study.model_construct(**{**sections, **fixed, **own})
+                study = Study.model_construct(**{**given_tables, **fixed, **own})
                 raise_wrong(source, broken_rules(study))
                 study = study.model_copy(update={"scene_axes": ()})
                 studies.append(_complete(_with_block_studies(study, given["scene"], origin)))
     study = studies[0]
-    if scene_axes := (*as_checked(axes, study), *worn_axis):
-        study = study.model_copy(update={"scene_axes": scene_axes, "variants": tuple(studies)})
+    if found := (*scene_axes.as_checked(axes, study), *worn_axis):
+        study = study.model_copy(update={"scene_axes": found, "variants": tuple(studies)})
     return study
 
 
@@ -181,7 +160,7 @@ def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) 
             of_block = find_scene(
                 SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin, scene
             )
-        own = {name: (getattr(block, name),) for name in OWN_AXES if isinstance(getattr(block, name), float)}
+        own = {name: (getattr(block, name),) for name in sections.OWN_AXES if isinstance(getattr(block, name), float)}
         if block.engine_order is not None:
             speed, key = dict(parameters).get("rotation_speed"), f"mission.{block.name}.engine_order"
             if not isinstance(speed, int | float) or speed <= 0.0:
@@ -189,7 +168,7 @@ def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) 
                 raise UserError(source, key, block.engine_order, remedy)
             own["frequency"] = (block.engine_order * float(speed) / 60.0,)
         axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own})
-        update = {"mission": (), "slow_time": SlowTimeSection(), "scene": of_block, "axes": axes}
+        update = {"mission": (), "slow_time": sections.SlowTimeSection(), "scene": of_block, "axes": axes}
         studies.append(study.model_copy(update=update))
     return study.model_copy(update={"block_studies": tuple(studies)})
 
@@ -206,13 +185,15 @@ def _complete(study: Study) -> Study:
         low, high = study.loading.between
         update["follow"] = FollowedFrequency(cast("Followed", frequency[0]), low, high)
         frequency = (0.5 * low + 0.5 * high,)
-    if DEFAULT in names:
+    if sections.DEFAULT in names:
         names |= {*(kind.usual if study.scatter is None else kind.of_samples)}
         names |= {*(FOLLOWED_FREQUENCY if study.loading is not None else ())}
         names |= {"mesh"} & {*study.scene.offers}
-    outputs = study.outputs.model_copy(update={"variables": tuple(name for name in VARIABLES if name in names)})
+    outputs = study.outputs.model_copy(
+        update={"variables": tuple(name for name in sections.VARIABLES if name in names)}
+    )
     update |= {"axes": axes.model_copy(update={"frequency": frequency}), "outputs": outputs}
-    update |= {"slow_time": SlowTimeSection(cycles=0.0)} if kind is MODES else {}
+    update |= {"slow_time": sections.SlowTimeSection(cycles=0.0)} if kind is MODES else {}
     update["block_studies"] = tuple(each.model_copy(update={"outputs": outputs}) for each in study.block_studies)
     return with_room_for_wear(study.model_copy(update=update))
 
@@ -236,10 +217,10 @@ def format_study(study: Study) -> str:
             continue
         given, place = tables[axis.table], axes
         for name in axis.key[:-1]:
-            given, place = only_table(given[name]), place.setdefault(name, {})
+            given, place = scene_axes.only_table(given[name]), place.setdefault(name, {})
         del given[axis.key[-1]]
         place[axis.key[-1]] = list(axis.values)
-    for key in SOLVER_AXES:
+    for key in sections.SOLVER_AXES:
         if key in study.own_axes:
             axes[key] = tables["solver"].pop(key)
         else:
@@ -264,10 +245,10 @@ def _worn_states(study: Study) -> dict[str, object] | None:
 # --- overrides ---
 
 
-def _override(table: Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
+def _override(table: scene_axes.Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
     """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
     if isinstance(overrides, Mapping):
-        source, option, given = "overrides", "", [(key, _plain(value)) for key, value in overrides.items()]
+        source, option, given = "overrides", "", [(key, _as_toml(value)) for key, value in overrides.items()]
     else:
         texts = [overrides] if isinstance(overrides, str) else overrides
         source, option, given = "command line", "--set ", [_key_and_value(text) for text in texts]
@@ -277,7 +258,7 @@ def _override(table: Tables, overrides: str | Sequence[str] | Mapping[str, objec
             raise UserError(source, f"{option}{key}", value, remedy)
 
 
-def _set_key(table: Tables, key: str, value: object) -> bool:
+def _set_key(table: scene_axes.Tables, key: str, value: object) -> bool:
     """Sets the key of a dotted name, or with None leaves it out; whether there is a table that can hold it."""
     (*names, last), place = key.split("."), cast("Any", table)
     for name in names:
@@ -295,11 +276,11 @@ def _set_key(table: Tables, key: str, value: object) -> bool:
     place[last] = value
     place.pop(_INSTEAD.get(key, ""), None)
     # the last place where a key is given counts, here or under [axes]
-    tables = ("solver",) if last in SOLVER_AXES else ("scene", "wear")
+    tables = ("solver",) if last in sections.SOLVER_AXES else ("scene", "wear")
     others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}
-    for other in others.get(".".join(names), ()) if not is_table(value) else ():
+    for other in others.get(".".join(names), ()) if not scene_axes.is_table(value) else ():
         given = table.get(other)
-        if isinstance(given, dict) and not is_table(given.get(last)):
+        if isinstance(given, dict) and not scene_axes.is_table(given.get(last)):
             given.pop(last, None)
     return True
 
@@ -319,12 +300,7 @@ def _key_and_value(text: str) -> tuple[str, object]:
     return key, parsed["value"]
 
 
-def _plain(value: object) -> object:
+def _as_toml(value: object) -> object:
     """A value as TOML has it: numpy's numbers and arrays, tuples and paths are none of its types."""
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
-    return str(value) if isinstance(value, Path) else value
+    plain = json.dumps(value, default=lambda each: each.tolist() if hasattr(each, "tolist") else str(each))
+    return json.loads(plain)

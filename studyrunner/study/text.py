@@ -12,12 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from studies.hdf5 import is_hdf5, open_hdf5, read_text_attribute
+from studies.hdf5 import is_hdf5, open_hdf5, read_attribute, read_text_attribute
 from studies.scene_error import SceneError
 from studyrunner.user_error import UserError, Verbatim, toml_key, toml_value
 
 SCENE_GROUP = "scene"
 """Group of a result file with the contents of a scene file."""
+
+POINTS_LEFT = "points_not_computed"
+"""Attribute of a result file: number of points that are not computed, 0 in a finished result."""
 
 _LARGEST = 5 * 2**19  # bytes: an axis of 100 000 values
 
@@ -55,7 +58,7 @@ class Archived:
 
     study: the effective study, TOML. scene_sha256, solver_digest, versions: hashes of scene and solver, and versions of
     packages; empty where unknown; scene_sha256 None where the scenes are no longer those of the file. holds_scene:
-    whether the group SCENE_GROUP is there.
+    whether the group SCENE_GROUP is there. is_finished: whether no point is left; version 0.4.0 does not say so.
     """
 
     study: str
@@ -63,33 +66,38 @@ class Archived:
     solver_digest: str
     versions: str
     holds_scene: bool
+    is_finished: bool
 
 
 @contextmanager
-def _user_errors(name: str) -> Iterator[None]:
+def result_errors(name: str) -> Iterator[None]:
     """What is wrong with a result file, called `name` by the user, becomes UserError."""
     try:
         yield
-    except (OSError, RuntimeError, ValueError, TypeError, KeyError) as error:
-        reason = error.value if isinstance(error, SceneError) else getattr(error, "strerror", None) or "damaged"
+    except (OSError, RuntimeError, ValueError, TypeError, LookupError) as error:
+        # errors of the NetCDF library have numbers below zero
+        of_system = isinstance(error, OSError) and (error.errno or 0) > 0
+        reason = (
+            error.value if isinstance(error, SceneError) else getattr(error, "strerror", "") * of_system or "damaged"
+        )
         raise UserError(name, "the file", Verbatim(reason), "give a result file of run-study that is whole") from None
 
 
 def read_archived(path: Path, name: str) -> Archived:
     """Reads the attributes of a result file that the user calls `name`. Raises UserError."""
-    with _user_errors(name), open_hdf5(path) as file:
+    with result_errors(name), open_hdf5(path) as file:
         names = ("study", "scene_sha256", "solver_digest", "versions")
         study, scene, solver, versions = (read_text_attribute(file, name) for name in names)
-        holds_scene = SCENE_GROUP in file
+        holds_scene, left = SCENE_GROUP in file, read_attribute(file, POINTS_LEFT)
     if not study:
         remedy = "missing: give a study file (TOML) or a result file of run-study"
         raise UserError(name, "the attribute study", None, remedy)
-    return Archived(study, scene, solver, versions, holds_scene)
+    return Archived(study, scene, solver, versions, holds_scene, left is None or left.item() == 0)
 
 
 def check_result_file(path: Path, name: str) -> None:
     """Raises UserError where a file that the user calls `name` is no result file."""
-    with _user_errors(name):
+    with result_errors(name):
         if not path.is_file() or not is_hdf5(path):
             what = "is no NetCDF file (NetCDF-4)" if path.exists() else "there is none of this name"
             raise UserError(name, "the file", None, f"{what}, give a result file of run-study")

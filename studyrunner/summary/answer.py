@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -12,23 +11,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.result.opening import as_history, describe_outcome
 from studyrunner.result.pairs import contact_pairs
-from studyrunner.result.view import OWN_STEPS, Result
-from studyrunner.summary.findings import (
-    LEAST_ERROR,
-    Finding,
-    compare_meshes,
-    mode_ranges,
-    shortest_life,
-    wear_and_response,
-    where_is,
-)
+from studyrunner.result.view import Result
+from studyrunner.summary.findings import LEAST_ERROR, Finding, what_came_out, where_is
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_percent, show_rtol
+from studyrunner.variables import OWN_STEPS
 
 MOST_LINES = 9
 
@@ -38,7 +29,7 @@ SMALL = 0.1
 _LARGEST = 100.0
 """Size, m, of a model without a mesh: masses on springs that are usual in textbooks move by some 10 m."""
 
-_MOST_FAILURES, _MOST_MODES = 2, 4
+_MOST_FAILURES = 2
 _WIDTH, _LONGEST = 12, 240
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
@@ -96,14 +87,8 @@ def summarise(result: Result) -> Summary:
     """The summary of a result that is opened for the report."""
     stuck = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
     resonance = float(stuck) if stuck.ndim == 0 else math.nan
-    findings, doubts = list[Finding](), list[str]()
-    if result.has_modes:
-        findings += itertools.islice(mode_ranges(result), _MOST_MODES)
-    else:
-        findings += [
-            *wear_and_response(result, resonance),
-            *filter(None, (shortest_life(result), compare_meshes(result))),
-        ]
+    findings, doubts = [*what_came_out(result, resonance)], list[str]()
+    if not result.has_modes:
         doubts += [_not_small(result), _too_far(result), _in_radians(result, resonance), _too_few_counts(result)]
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
     findings += [*(Finding("doubt", "beware", doubt) for doubt in doubts if doubt), *_failures(result)]
@@ -123,11 +108,14 @@ def _failures(result: Result) -> Iterator[Finding]:
         if number == Outcome.CONVERGED:
             continue
         word, sentence = describe_outcome(number)
-        point, reason = _first_ended(result, number)
+        place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
+        # the volumes in the message of a point whose error is known are no results
+        is_silent = not result.has("message") or (number == Outcome.SENSITIVE and np.isfinite(result.errors[place]))
+        reason = "" if is_silent else str(result.dataset["message"].values[place])
         reason = f"{reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if len(reason) > _LONGEST else reason
         advice, first = ADVICE.get(number, ""), reason[:1].upper() + reason[1:]
         if result.varying:
-            first = f"First: {': '.join(filter(None, (where_is(result, point), reason)))}"
+            first = f"First: {': '.join(filter(None, (where_is(result, result.point_at(place)), reason)))}"
         sentences = (re.split(r"[.:](?:\s|$)", sentence)[0] or word, advice, first)
         of = f"{n_points} of {count(result.computed.size, 'point')}: " if result.computed.size > 1 else ""
         is_complete = number in COMPLETE
@@ -140,14 +128,6 @@ def _failures(result: Result) -> Iterator[Finding]:
         n_left = sum(each.values["n_points"] for each in left)
         text = f"{count(n_left, 'more point')}: {', '.join(each.name.replace('_', ' ') for each in left)}"
         yield Finding("others", left[0].label, text, {"n_points": n_left})
-
-
-def _first_ended(result: Result, number: int) -> tuple[dict[str, int], str]:
-    """The first point that ended in this way, and what is to be added to its outcome, which may be nothing."""
-    place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
-    # the volumes in the message of a point whose error is known are no results
-    is_silent = not result.has("message") or (number == Outcome.SENSITIVE and np.isfinite(result.errors[place]))
-    return result.point_at(place), "" if is_silent else str(result.dataset["message"].values[place])
 
 
 # --- values that are hardly what was meant ---
@@ -223,7 +203,12 @@ def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
     responses = result.has("response_error") and result.blocks is None
     has_errors = result.has("error_estimate") and np.isfinite(result.rtol).any() and result.computed.any()
     if result.has_modes:
-        of, errors = "point", _errors_of_modes(result)
+        # the largest of natural frequency and damping ratio
+        of, errors = "point", np.zeros(result.computed.shape)
+        for name in ("natural_frequency", "damping_ratio"):
+            if result.has(name, f"{name}_error"):
+                value, error = np.abs(result.dataset[name].values), result.dataset[f"{name}_error"].values
+                errors = np.maximum(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
     elif result.wears and has_errors and (wore or not responses):
         of, errors = "worn volume", result.errors
     elif responses:
@@ -267,13 +252,3 @@ def _describe_certainty(n_points: int, values: Mapping[str, Any]) -> str:
     text += f", {n_unknown} not known" if n_unknown else ""
     where = ", ".join(filter(None, (values["where"], within)))
     return f"{text}; least certain: {where}{advice}" if worst > 0.0 else text
-
-
-def _errors_of_modes(result: Result) -> NDArray[np.float64]:
-    """Largest relative error of natural frequency and damping ratio; in the shape of the axes."""
-    errors = np.zeros(result.computed.shape)
-    for name in ("natural_frequency", "damping_ratio"):
-        if result.has(name, f"{name}_error"):
-            value, error = np.abs(result.dataset[name].values), result.dataset[f"{name}_error"].values
-            errors = np.maximum(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
-    return errors

@@ -5,6 +5,7 @@ Only results are in it: a history that was not computed to the end, or is known 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -24,6 +25,7 @@ from studyrunner.units import scale_for, show_cycles, show_known, show_number, s
 LEAST_ERROR = 1e-4
 """Relative error that is shown, of any smaller one."""
 
+_MOST_MODES = 4
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
 
@@ -58,10 +60,19 @@ def _known(value: float, error: float, units: str) -> str:
     return _show(value, units) + show_known(max(error / value, LEAST_ERROR) if value > 0.0 else 0.0 * error)
 
 
+def what_came_out(result: Result, stuck: float) -> Iterator[Finding]:
+    """The answer: wear, response, life, meshes, or modes. stuck: first frequency with the joint stuck, Hz, or NaN."""
+    if result.has_modes:
+        yield from itertools.islice(_mode_ranges(result), _MOST_MODES)
+        return
+    yield from _wear_and_response(result, stuck)
+    yield from filter(None, (_shortest_life(result), compare_meshes(result)))
+
+
 # --- wear and vibration ---
 
 
-def wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
+def _wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
     """The point that wears most, of points that differ in numerical settings only the best known one; its response.
 
     Where no wear is known, the response of the point that figures show. stuck: first frequency with the joint stuck,
@@ -221,7 +232,7 @@ def _peak(result: Result, point: Point, of: int) -> tuple[float, float]:
 # --- modes, life, meshes ---
 
 
-def mode_ranges(result: Result) -> Iterator[Finding]:
+def _mode_ranges(result: Result) -> Iterator[Finding]:
     """Of each mode the ends of natural frequency and damping ratio over the points where it was found."""
     numbers = [name for name in result.varying if name != "mode" and result.dataset[name].dtype.kind in "iuf"]
     ends = {name: [show_number(float(result.dataset[name].values[place])) for place in (0, -1)] for name in numbers}
@@ -243,7 +254,7 @@ def mode_ranges(result: Result) -> Iterator[Finding]:
         yield Finding(f"mode {number}", f"mode {number}", text, values)
 
 
-def shortest_life(result: Result) -> Finding | None:
+def _shortest_life(result: Result) -> Finding | None:
     """The shortest life of the points of a study with a target; None without a target."""
     until = result.study.get("slow_time", {}).get("until")
     if not isinstance(until, dict) or not result.has("cycles_to_target"):

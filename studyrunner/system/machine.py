@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import hashlib
 import json
 import mmap
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 _BYTES_OF_TRIAL = 2**22  # a disk is full for a library that writes a part of a result, not for a few bytes
 _NO_SYNC = (errno.EINVAL, errno.ENOTSUP)
@@ -26,12 +27,6 @@ _COMPUTING = ("fretwear", "numba", "numpy", "scipy")
 
 
 # --- files: under a name that no other has, and on the disk before they get their own name ---
-
-
-def sync(file: IO[bytes]) -> None:
-    """What was written is on the disk when this returns."""
-    file.flush()
-    os.fsync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
@@ -80,12 +75,13 @@ def replacing(path: Path) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
-def find_fault(path: Path) -> OSError | None:
+def find_fault(path: Path, n_bytes: int = _BYTES_OF_TRIAL) -> OSError | None:
     """Why a file that is there cannot be written, as the system says it; None where it can be."""
     try:
         with path.open("ab") as file:
-            file.write(bytes(_BYTES_OF_TRIAL))
-            sync(file)
+            file.write(bytes(n_bytes))
+            file.flush()
+            os.fsync(file.fileno())
     except OSError as error:
         return error
     return None
@@ -104,17 +100,13 @@ class UnseenFileError(Exception):
 class MappedFile:
     """An object whose arrays are in a file.
 
-    head: the object without the contents of its arrays. places: begin and end of each content in the file, bytes.
+    head: the object without the contents of its arrays. places: begin and end of each content in the file, bytes. Ranks
+    that have mapped the file keep the object when it is removed.
     """
 
     path: Path
     head: bytes
     places: tuple[tuple[int, int], ...]
-
-    def remove(self) -> None:
-        """Removes the file; ranks that have mapped it keep the object."""
-        with contextlib.suppress(OSError):
-            self.path.unlink()
 
 
 def write_mapped(thing: object, path: Path) -> MappedFile:
@@ -157,6 +149,7 @@ class MachineFaultError(Exception):
     """A fault of the machine (`solver.outcome.is_machine_fault`) in the words of a rank, with which the run ends."""
 
 
+@functools.cache
 def package_digest(package: str) -> str:
     """Hash of all source files of a package, with their paths, and of the versions. Raises ModuleNotFoundError.
 

@@ -166,7 +166,7 @@ def replay(plan: TaskPlan, costs: DovetailCosts | ScatterCosts, n_ranks: int) ->
     """Tasks of a plan on ranks with a simulated clock: time, s, efficiency, and the one that no order exceeds."""
     clock = work = longest_way = 0.0
     index = MemoryIndex(plan)
-    plan, progress = index.plan, StudyRun(index, None, None)  # type: ignore[arg-type]
+    plan, progress = index.plan, StudyRun(index, None, None, n_ranks)  # type: ignore[arg-type]
     dispatcher: Dispatcher = Dispatcher(n_ranks, progress.costs, lambda: clock)
     ticket = itertools.count()
     arrivals: list[tuple[float, int, int, int, float, Result]] = []
@@ -190,7 +190,7 @@ def replay(plan: TaskPlan, costs: DovetailCosts | ScatterCosts, n_ranks: int) ->
             seconds = costs.history(task)
             longest_way = max(longest_way, ways[task.sweep, task.position] + seconds)
             points = (PointResult({"outcome": 0}, place) for place in task.order)
-            results = [(point, seconds / task.n_results) for point in points]
+            results = [(point, 0.0 if point.place else seconds) for point in points]
         for result, seconds in results:
             now += seconds
             work += seconds

@@ -9,6 +9,7 @@ import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,12 +20,13 @@ from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES
 from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates
-from studyrunner.result.provenance import POINTS_LEFT, describe_run
+from studyrunner.result.provenance import describe_run
 from studyrunner.result.view import Result, open_for_report
-from studyrunner.scatter import ScatteredPairs, ScatterSection, draw
+from studyrunner.scatter import ScatterSection, draw
 from studyrunner.scene.scene import SceneFacts, variable_sizes
-from studyrunner.scene.scene_set import pair_arrays
+from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study import Study
+from studyrunner.study.text import POINTS_LEFT
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOPS, OF_A_HISTORY, OF_SAMPLES, USUAL, Variable
 from tests.studyrunner.fakes import FACTS
 
@@ -231,7 +233,7 @@ def sample_file(scatter: str = SCATTER, jump: float = 0.0) -> xr.Dataset:
     pairs = flank_positions()
     section = ScatterSection.model_validate(tomllib.loads(scatter)["scatter"])
     own = {"friction_coefficient": 0.5, "wear_coefficient": 1e-11, "gap": np.zeros(len(pairs))}
-    values = draw(section, own) | draw(section, own, ScatteredPairs(("flank",) * len(pairs), pairs))
+    values = draw(section, own) | draw(section, own, SimpleNamespace(surface=("flank",) * len(pairs), position=pairs))
     friction, wear, gap = (values[name] for name in own)
     dataset = build_file({"frequency": (211.5, 212.0), "sample": range(len(wear))}, SAMPLE_CYCLES, variables=OF_SAMPLES)
     rate = 1e-3 * (wear * friction * (1.0 + 1e5 * gap.mean(axis=1)) + jump * (friction > 0.51))
@@ -306,7 +308,7 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[PointResult
                 dataset[name].values[point] = values
     coords = {
         array.name: xr.Variable(array.dimensions, array.values, attributes(array.name, array.entry))
-        for array in coordinates(study, facts, pair_arrays(study, [facts]))
+        for array in coordinates(study, [facts], find_scenes(study))
     }
     return dataset.assign_coords(coords).assign_attrs({**describe_run(study, facts), POINTS_LEFT: np.int32(0)})
 

@@ -14,9 +14,10 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_CRASHES
 from studyrunner.checkpoint.store import RESULTS
-from studyrunner.kinds.task import Identity, solver_digest
+from studyrunner.kinds.task import Identity
 from studyrunner.kinds.wear import Sweep
 from studyrunner.study.study_file import read_study
+from studyrunner.system.machine import package_digest
 from studyrunner.task_runs import StudyRun
 from tests.studyrunner.fakes import FACTS, fake_evaluate, fake_sweep, open_completion, plan_of
 
@@ -39,7 +40,7 @@ def completion_of(folder, *overrides):
 
 def compute(completion, n_tasks=1000):
     """Does what is left as a run does, up to a number of tasks; how many start states and histories it computed."""
-    progress = StudyRun(completion, None, None)
+    progress = StudyRun(completion, None, None, 1)
     waiting = list(progress.begin())
     n_starts = n_histories = 0
     while waiting and n_starts + n_histories < n_tasks:
@@ -165,7 +166,7 @@ def test_tasks_with_which_runs_have_crashed_are_tried_one_after_the_other(folder
     with completion_of(folder) as completion:
         first, *others = completion.plan.sweeps
         completion.store.crashes |= {sweep.key: 1 for sweep in completion.plan.sweeps}
-        progress = StudyRun(completion, None, None)
+        progress = StudyRun(completion, None, None, 1)
         (tried,) = progress.begin()
         assert tried.number == first.number
         new = [progress.take(tried, start) for start in fake_sweep(tried)]
@@ -208,7 +209,7 @@ def names_of(scene=FACTS.digest):
     """All names of the results of a study; which keys change them is in the table above."""
     study = read_study("sdof_slider", ["axes.frequency=[150, 155]", "axes.scheme=implicit", "axes.step=[100, 150]"])
     plan, identity = plan_of(study, FACTS.n_displacements), Identity((scene,), "kind")
-    solver_digest.cache_clear()
+    package_digest.cache_clear()
     return {name for task in (*plan.sweeps, *plan.results) for name in task.hashes(identity)}
 
 
@@ -230,4 +231,4 @@ def test_another_scene_version_or_source_of_the_solver_makes_all_results_others(
             change()
             seen.append(names_of())
             assert all(seen[-1].isdisjoint(each) for each in seen[:-1])
-    solver_digest.cache_clear()
+    package_digest.cache_clear()

@@ -1,12 +1,14 @@
 """[scatter]: the designs, the values that samples draw, and studies of samples from the file to the result."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.stats import kstest
 
 from studyrunner.result.arrays import sample_coordinates
-from studyrunner.scatter import ScatteredPairs, ScatterSection, draw, flat_table, unit_design
+from studyrunner.scatter import ScatterSection, draw, flat_table, unit_design
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.parts import draw_inputs, parts_of
@@ -17,7 +19,7 @@ from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
 NORMAL = {"normal": {"mean": 0.5, "std": 0.03}}
-PAIRS = ScatteredPairs(("left",) * 3 + ("right",) * 2, np.linspace(0.0, 1.0, 15).reshape(5, 3))
+PAIRS = SimpleNamespace(surface=("left",) * 3 + ("right",) * 2, position=np.linspace(0.0, 1.0, 15).reshape(5, 3))
 OWN = {"friction_coefficient": 0.3, "gap": np.linspace(0.0, 4e-6, 5), "wear_coefficient": 1.1e-11, "area": 0.1 + 0.2}
 FRICTION = "scatter.friction_coefficient={normal={std=0.03}}"
 WEAR = "scatter.wear_coefficient={lognormal={factor=1.5}}"
@@ -77,7 +79,7 @@ def test_each_input_and_each_surface_has_a_draw():
 
 def test_neighbouring_pairs_are_correlated_over_the_length():
     along = np.outer(np.repeat([0.0, 1.0, 3.0], 2), [1.0, 0.0, 0.0])
-    pairs = ScatteredPairs(("left", "right") * 3, along)
+    pairs = SimpleNamespace(surface=("left", "right") * 3, position=along)
     gap = {"normal": {"std": 2.0}, "of": "each pair", "correlation_length": 1.0}
     values = drawn({"gap": np.zeros(6)}, pairs, gap=gap, samples=4096)["gap"]
     expected = np.where(
@@ -103,7 +105,7 @@ def test_neighbouring_pairs_are_correlated_over_the_length():
     ],
 )
 def test_draws_that_cannot_be_are_refused(own, name, given):
-    nowhere = ScatteredPairs(PAIRS.surface, np.full((5, 3), np.nan))
+    nowhere = SimpleNamespace(surface=PAIRS.surface, position=np.full((5, 3), np.nan))
     with pytest.raises(Wrong) as caught:
         drawn(OWN | own, nowhere, **{name: given}, samples=8192)
     assert caught.value.key.startswith(f"scatter.{name}")

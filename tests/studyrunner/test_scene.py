@@ -14,8 +14,7 @@ from studies.scene_file import write_scene
 from studyrunner.cli import main
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.answers import write_study_scene
-from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, largest_harmonics
+from studyrunner.scene.scene import _parts, build_study_scene, describe_scene, edge_pairs, largest_harmonics
 from studyrunner.scene_building import SceneTask, build_scene_task
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError

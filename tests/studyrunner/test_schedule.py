@@ -10,13 +10,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba.core.event import trigger_event
 
-from studyrunner import task_runs
-from studyrunner.cli import main
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
-from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
-from studyrunner.mpi.schedule import TaskHandler, serve_tasks
+from studyrunner.mpi.ranks import Ranks, launcher_rank, launcher_size
+from studyrunner.mpi.schedule import COMPILING, TaskHandler, serve_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.system.machine import open_mapped, write_mapped
 from studyrunner.system.progress import ProgressDisplay, Standing
@@ -28,8 +27,7 @@ from tests.studyrunner.fakes import fake_history, fake_sweep, plan_of
 @dataclass(frozen=True)
 class Job:
     kind: str
-    cost: float
-    n_results: int = 1
+    costs: tuple[float, ...] = (1.0,)
     gives_starts: bool = False
 
     @property
@@ -38,9 +36,11 @@ class Job:
 
 
 def serve(tasks, run, take=lambda *_: []):
-    handler = TaskHandler()
-    handler.begin, handler.take = lambda: tasks, take
+    """What was learnt of the costs, and the progress that was said."""
+    handler, said = TaskHandler(), []
+    handler.begin, handler.take, handler.keep = lambda: tasks, take, lambda _, progress: said.append(progress)
     serve_tasks(Ranks(), handler, lambda job, _: run(job))
+    return handler.costs.sums, said
 
 
 def test_long_tasks_go_first_and_results_make_new_ones():
@@ -48,9 +48,9 @@ def test_long_tasks_go_first_and_results_make_new_ones():
 
     def take(job, result):
         done.append((job.kind, result))
-        return [Job("a1", 1e5), Job("a2", 1e6)] if job.kind == "a" else []
+        return [Job("a1", (1e5,)), Job("a2", (1e6,))] if job.kind == "a" else []
 
-    serve([Job("b", 10.0), Job("a", 1.0, gives_starts=True)], lambda job: iter([job.kind.upper()]), take)
+    serve([Job("b", (10.0,)), Job("a", gives_starts=True)], lambda job: iter([job.kind.upper()]), take)
     assert done == [("a", "A"), ("a2", "A2"), ("a1", "A1"), ("b", "B")]
 
 
@@ -67,8 +67,19 @@ def test_results_arrive_while_their_task_goes_on():
         taken.set()
         return []
 
-    serve([Job("a", 1.0, n_results=2)], run, take)
+    serve([Job("a", (1.0, 1.0))], run, take)
     assert results == [1, 2]
+
+
+def test_compiling_is_said_and_is_no_part_of_what_a_task_takes():
+    def run(_):
+        with trigger_event("numba:compile"), trigger_event("numba:compile"):
+            time.sleep(0.5)
+        yield "first"
+
+    sums, said = serve([Job("a")], run)
+    assert said == [COMPILING, ""]
+    assert sums["all"][0] < 0.5
 
 
 @pytest.mark.parametrize(
@@ -86,13 +97,6 @@ def test_what_the_launcher_says(environment, size, rank):
     assert (launcher_size(environment), launcher_rank(environment)) == (size, rank)
 
 
-def test_several_processes_without_mpi_are_refused(monkeypatch):
-    monkeypatch.setenv("PMI_SIZE", "2")
-    monkeypatch.setitem(sys.modules, "mpi4py", None)
-    with pytest.raises(LauncherError, match="2 processes"):
-        start_ranks()
-
-
 # --- arrays in a file that several processes map, and which ranks see it ---
 
 
@@ -103,7 +107,7 @@ def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path
     one, other = open_mapped(written), open_mapped(written)
     one["c"][0, 0] = 7.0
     assert other["c"][0, 0] == 0.0
-    written.remove()
+    written.path.unlink()
     for name in ("f", "none", "part"):
         np.testing.assert_array_equal(other[name], given[name])
     assert other["c"].flags.aligned
@@ -150,16 +154,6 @@ def test_a_bar_on_a_terminal(monkeypatch):
     assert "5 of 20 points, 25 %, about 30 s left, running: 210 Hz implicit" in screen.getvalue()
 
 
-@pytest.mark.parametrize("compiles", [True, False])
-def test_a_run_that_has_to_compile_says_so_once(compiles, solver, tmp_path, monkeypatch, capsys):
-    solver.disturb = lambda *_: time.sleep(0.05)
-    numbers = itertools.count(3) if compiles else itertools.repeat(3)
-    monkeypatch.setattr(task_runs, "n_compiled", lambda: next(numbers))
-    assert main(["sdof_slider", "--set", "axes.frequency=100", "-o", str(tmp_path / "out.nc")]) == 0
-    said = capsys.readouterr().err
-    assert said.count("the solver is compiled for this machine") == int(compiles)
-
-
 def tasks_of():
     axes = ("frequency={start=1, stop=2, num=8}", "wear_coefficient=[1e-12, 7e-12]", "step=1000", "scheme=implicit")
     return plan_of(read_study("sdof_slider", [f"axes.{each}" for each in (*axes, "sweep=['up', 'down']")]), 2)
@@ -167,18 +161,25 @@ def tasks_of():
 
 def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     plan = tasks_of()
-    progress = StudyRun(MemoryIndex(plan), None, None)
-    assert progress.look(()).seconds_left == pytest.approx(sum(task.cost for task in progress.tasks))
+    progress = StudyRun(MemoryIndex(plan), None, None, 2)
+    planned = sum(task.cost for task in progress.tasks)
+    # one rank waits for a start state
+    running = [(progress.tasks[0], plan.sweeps[0].n_results, 0.0)]
+    assert progress.look(running).seconds_left == pytest.approx(planned / 2)
     histories = []
     for sweep in plan.sweeps:
-        for start in fake_sweep(sweep):
-            progress.costs.learn(sweep.cost_keys, sweep.cost / sweep.n_results, 1.0)
+        for start, seconds in zip(fake_sweep(sweep), sweep.costs, strict=True):
+            # the first one is dearer, as was planned, and says nothing of the others
+            assert sum(sweep.costs) == pytest.approx(sweep.cost)
+            assert sweep.costs[0] > 5.0 * sweep.costs[1]
+            progress.costs.learn(sweep.cost_keys, seconds, seconds)
             histories.extend(progress.take(sweep, start))
+            assert progress.look(()).seconds_left <= planned / 2
     for number, task in enumerate(histories, start=1):
         progress.costs.learn(task.cost_keys, task.cost, 2.0 * task.cost)
         progress.take(task, fake_history(task))
-        left = 2.0 * sum(history.cost for history in histories[number:])
-        if number > 8:
+        left = sum(history.cost for history in histories[number:])
+        if 8 < number < len(histories) - 1:
             assert progress.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
     assert progress.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
     assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
@@ -189,14 +190,14 @@ def test_what_waits_is_bounded(monkeypatch):
     monkeypatch.setattr(dispatch, "_WAITING", 10)
     monkeypatch.setattr(dispatch, "_WAITING_A_RANK", 0)
     dispatcher = Dispatcher(1, CostModel(), time.monotonic)
-    dispatcher.add([Job("sweep", 1.0, 4, True)] * 50)
+    dispatcher.add([Job("sweep", (1.0,) * 4, True)] * 50)
     most, n_done, waiting = 0, 0, 0
     while not dispatcher.done:
         ((rank, number, task),) = dispatcher.assign()
-        for _ in range(task.n_results):
+        for _ in task.costs:
             dispatcher.deliver(rank, number, 1.0)
             if task.gives_starts:
-                dispatcher.add([Job("history", 1.0)])
+                dispatcher.add([Job("history")])
                 waiting += 1
         if not task.gives_starts:
             n_done, waiting = n_done + 1, waiting - 1

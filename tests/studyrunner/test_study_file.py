@@ -84,15 +84,8 @@ def test_several_values_of_a_solver_key_are_an_axis(key, values):
 @pytest.mark.parametrize(
     ("text", "overrides"),
     [
-        (
-            SLIDER,
-            [
-                "solver.harmonics=3",
-                "axes.rtol=[0.1, 0.2]",
-                "study.title='\\ \"title\" with é'",
-                "slow_time.outputs=[0]",
-            ],
-        ),
+        (SLIDER, ["solver.harmonics=3", "axes.rtol=[0.1, 0.2]"]),
+        (SLIDER, ["study.title='\\ \"title\" with é'", "slow_time.outputs=[0]"]),
         (SLIDER, ["axes.samples=[64, 'auto']", "wear.law=threshold", "axes.threshold=[0, 5]"]),
         (SLIDER, ["wear.surfaces={support=0.5}", "scatter={samples=8, surfaces={support={lognormal={factor=1.5}}}}"]),
         (SLIDER, ["scene.worn={result='worn.nc', cycle=[0, 1000]}"]),

@@ -20,26 +20,16 @@ from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import write_matrix_input
 from tests.studies.fe_models.plates import Plates
 from tests.studies.scene_models import plain, sector
-from tests.studyrunner.small_studies import (
-    FOLLOWED,
-    LAP_JOINT,
-    MISSIONS,
-    MODES,
-    ROOT_OF_A_DECK,
-    SAMPLES,
-    SLIDER,
-    TO_THE_END,
-    write_depths,
-)
+from tests.studyrunner import small_studies as small
 
-SCENE = SLIDER.replace("sdof_slider", "rough.h5").replace("harmonics = 5", "samples = 64")
-RATIO = SLIDER.replace("frequency =", "frequency_ratio =")
+SCENE = small.SLIDER.replace("sdof_slider", "rough.h5").replace("harmonics = 5", "samples = 64")
+RATIO = small.SLIDER.replace("frequency =", "frequency_ratio =")
 DRAW = "scatter.friction_coefficient"
 
 # a row: overrides, and the keys that the lines name, with their values where these are not those of the row; the key of
 # the last override where nothing is said
 WRONG = {
-    SLIDER: f"""
+    small.SLIDER: f"""
         axes.freqency=1
         slow_time.schemes=implicit
         axis.frequency=1 -> axis = {{frequency = 1}}
@@ -94,15 +84,15 @@ WRONG = {
         scene.worn={{result='ended.nc', cycle=[1]}} -> scene.worn.cycle = 1.0
         axes.scheme=final ; solver.samples=8 -> solver.samples, axes.scheme
     """,
-    SLIDER.replace("[study]\nname", "[other]\nname"): "-> other",
-    SLIDER.replace('model = "sdof_slider"\n', ""): "-> scene.model",
-    SLIDER.replace("model", "modle"): "axes.stepp=3 -> scene.model",
-    SLIDER.replace("[scene]", "[scenes]"): "scenes.mas=1 -> scenes",
-    SLIDER.replace("frequency = [150.0]\n", ""): "-> axes.frequency",
-    SLIDER.replace("[slow", "harmonics = [1, 3]\n[slow"): "-> solver.harmonics = 5",
-    SLIDER.replace("[150.0]", "1e999999999"): "-> axes.frequency = inf",
-    SLIDER + '"\\u001b]0;x\\u0007" = 1\n': r"-> solver.\x1b]0;x\x07",
-    SLIDER + '[wear]\nlaw = "threshold"\n[scatter]\nsamples = 0\nmu = {normal = {sigma = 1}}\n': """
+    small.SLIDER.replace("[study]\nname", "[other]\nname"): "-> other",
+    small.SLIDER.replace('model = "sdof_slider"\n', ""): "-> scene.model",
+    small.SLIDER.replace("model", "modle"): "axes.stepp=3 -> scene.model",
+    small.SLIDER.replace("[scene]", "[scenes]"): "scenes.mas=1 -> scenes",
+    small.SLIDER.replace("frequency = [150.0]\n", ""): "-> axes.frequency",
+    small.SLIDER.replace("[slow", "harmonics = [1, 3]\n[slow"): "-> solver.harmonics = 5",
+    small.SLIDER.replace("[150.0]", "1e999999999"): "-> axes.frequency = inf",
+    small.SLIDER + '"\\u001b]0;x\\u0007" = 1\n': r"-> solver.\x1b]0;x\x07",
+    small.SLIDER + '[wear]\nlaw = "threshold"\n[scatter]\nsamples = 0\nmu = {normal = {sigma = 1}}\n': """
         scene.mas=1 ; scene.area=-1 ; axes.damping=[-0.2, 0.1] ; axes.shceme=euler -> axes.shceme, wear.threshold, \
 scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
     """,
@@ -110,28 +100,28 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
     "dovetail": "axes.nodal_diameter=[0] ; outputs.variables=['natural_frequency']",
     "cylinder_on_flat": "axes.surfaces={flat=[0.5, 1.0]} -> wear.surfaces",
     RATIO: "-> axes.frequency_ratio = [150.0]",
-    TO_THE_END: """
+    small.TO_THE_END: """
         axes.scheme=['adaptive', 'explicit'] -> axes.scheme = "explicit"
         slow_time.outputs=[0, 10]
         slow_time.cycles=5 ; axes.scheme=final
         slow_time.until={wear_depth=1} ; axes.scheme=final
         outputs.variables=['default', 'exact'] -> outputs.variables = "exact"
     """,
-    FOLLOWED: """
+    small.FOLLOWED: """
         axes.frequency=['peak', 200.0]
         axes.frequency=200.0 -> loading
         loading.between=[230.0, 180.0]
         axes.sweep=ramp -> axes.frequency
         scatter={samples=3, frequency={normal={std=1.0}}} -> scatter.frequency
     """,
-    MODES: """
+    small.MODES: """
         axes.frequency=200
         axes.sweep=ramp
         slow_time.cycles=10 ; wear.law=energy -> slow_time.cycles, wear.law
         outputs.loops=[0]
         scene.worn={depth=0.0} -> scene.worn.cycle
     """,
-    MISSIONS: """
+    small.MISSIONS: """
         slow_time.cycles=1e5
         slow_time.outputs=[0, 1.5]
         slow_time.until={frequency_shift = 0.1}
@@ -149,7 +139,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         scatter={samples=4, frequency={normal={std=1.0}}} -> scatter.frequency
         mission.heavy.mass=-1
     """,
-    SAMPLES: f"""
+    small.SAMPLES: f"""
         scatter.samples=1000000 ; axes.frequency=[1, 2] -> scatter.samples
         scatter.method=saltelli ; scatter.samples=12
         {DRAW}.uniform={{half_width = 1.0}} -> {DRAW}
@@ -165,7 +155,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         scatter.area={{normal={{std=1e-6}}}} ; outputs.variables=['exact']
         scatter.stiffness={{normal={{std=1}}}} ; outputs.scene=true
     """,
-    SAMPLES.replace("[150.0]", "1\nfrequency_ratio = 1"): "-> axes.frequency",
+    small.SAMPLES.replace("[150.0]", "1\nfrequency_ratio = 1"): "-> axes.frequency",
     # scene files: with and without friction of their own, of fewer nodal diameters than the harmonics need
     SCENE: """
         scene.friction_coefficient=0.3
@@ -175,7 +165,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         scene.model=wave.h5 ; scene.friction_coefficient=0.3 ; solver.harmonics=4 -> wave.h5: nd/16
         scene.model=wave.h5 ; scene.friction_coefficient=0.3 ; axes.harmonics=['auto', 4] -> wave.h5: nd/16
     """,
-    ROOT_OF_A_DECK: """
+    small.ROOT_OF_A_DECK: """
         scene.contact=[["BLADS","DISKS"]]
         scene.load.set=TOP
         scene.model=none.inp
@@ -188,10 +178,10 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         scene.clamp=[]
         scene.tolerance=1e-12 ; scene.contact=[["TIP","DISKS"]]
     """,
-    ROOT_OF_A_DECK.replace("friction_coefficient = 0.1\n", ""): """
+    small.ROOT_OF_A_DECK.replace("friction_coefficient = 0.1\n", ""): """
         axes.friction_coefficient={A=[0.1, 0.2]} -> axes.friction_coefficient.A
     """,
-    LAP_JOINT: """
+    small.LAP_JOINT: """
         scene.model=lap.med
         scene.units=mm-t-s ; scene.matrices=job -> scene.units
         scene.matrices=job ; scene.stress_stiffening=false
@@ -259,14 +249,14 @@ def files(tmp_path_factory):
         "wave": replace(wave, linear=held),
     }.items():
         write_scene(model, folder / f"{name}.h5")
-    write_depths(folder / "worn.nc", 150.0, [0.0, 1000.0], 1)
+    small.write_depths(folder / "worn.nc", 150.0, [0.0, 1000.0], 1)
     with xr.open_dataset(folder / "worn.nc") as worn:
         worn.rename(cycle="mission").to_netcdf(folder / "missions.nc")
-    write_depths(folder / "ended.nc", 150.0, [0.0, 1000.0], 1, counts=[0.0, 1234.5])
+    small.write_depths(folder / "ended.nc", 150.0, [0.0, 1000.0], 1, counts=[0.0, 1234.5])
     (folder / "part.nc").write_bytes((folder / "worn.nc").read_bytes()[:1000])
     for number, content in enumerate(NO_TOML):
         (folder / f"{number}.toml").write_bytes(content)
-    (folder / "s.toml").write_text(SLIDER)
+    (folder / "s.toml").write_text(small.SLIDER)
     return folder
 
 
@@ -305,11 +295,11 @@ def test_each_mistake_is_a_line_and_nothing_is_computed(study, overrides, keys, 
 
 @pytest.mark.parametrize(("command", "begin"), COMMANDS)
 def test_commands_that_cannot_be_right(command, begin, files, refuses):
-    (files / "s.toml").write_text(SLIDER, encoding="utf-8")
+    (files / "s.toml").write_text(small.SLIDER, encoding="utf-8")
     refuses(command.split(), begin)
 
 
 def test_write_protected_output(files, refuses, monkeypatch):
-    (files / "s.toml").write_text(SLIDER, encoding="utf-8")
+    (files / "s.toml").write_text(small.SLIDER, encoding="utf-8")
     monkeypatch.setattr(os, "access", lambda *_: False)
     refuses(["s.toml", "-o", "worn.nc", "--overwrite"], "command line: -o")

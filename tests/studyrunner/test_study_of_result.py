@@ -92,7 +92,7 @@ def test_it_is_the_model_in_the_file_that_is_run_and_another_scene_or_solver_is_
         for name in ("mass", "damping", "stiffness", "load/static", "load/harmonic", "contact/normal_load"):
             file[f"scene/{name}"][...] *= 2.0
     not_built()
-    monkeypatch.setattr(provenance, "solver_digest", lambda: "another")
+    monkeypatch.setattr(provenance, "package_digest", lambda _: "another")
     capsys.readouterr()
     one = results("kept.nc")
     half = options(f"axes.wear_coefficient={0.5 * one.wear_coefficient.item()!r}")

@@ -43,12 +43,8 @@ def test_of_numerical_settings_the_best_known_is_shown():
     """Explicit steps wear most, and are known least: they are no other case."""
     volumes = {(0, 0): 1.0, (1, 0): 2.0, (1, 1): 9.0, (1, 2): 2.1, (2, 2): 2.05}
     errors = {(1, 0): 0.04, (1, 1): 0.4, (1, 2): 0.01}
-    found = summary(
-        wearing(
-            *GRID, volume=lambda p: 1e-9 * volumes.get(at(p), 0.0), error_estimate=lambda p: errors.get(at(p), 0.02)
-        )
-    )
-    wear = found.values["wear"]
+    known = {"error_estimate": lambda p: errors.get(at(p), 0.02)}
+    wear = summary(wearing(*GRID, volume=lambda p: 1e-9 * volumes.get(at(p), 0.0), **known)).values["wear"]
     assert (wear["point"]["frequency"], wear["point"]["scheme"]) == (1, 2)
     assert (wear["n_compared"], wear["n_left_out"], wear["count"]) == (3, 0, 20_000.0)
     assert wear["worn_volume"] == pytest.approx(2.1e-9)
@@ -121,11 +117,8 @@ def test_nothing_wore_says_why():
     two = ("axes.frequency=[1, 2]", "axes.scheme=adaptive")
     unknown = wearing(*two, volume=lambda p: 1e-9 * p[0], error_estimate=lambda p: 0.01 + p[0])
     assert "at 1 of 2 points" in summary(unknown).lines[0]
-    stuck = summary(
-        result_of_study(read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))).assign(
-            stuck_frequency=212.6
-        )
-    )
+    dovetail = read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))
+    stuck = summary(result_of_study(dovetail).assign(stuck_frequency=212.6))
     assert "nothing wore: all pairs stick at all 3 points (first resonance 212.6 Hz" in stuck.lines[0]
     assert stuck.values["certainty"]["of"] == "response"
 
@@ -178,11 +171,8 @@ def test_the_shortest_life():
     assert never["n_beyond"] == 3
     unsure = made.assign(cycles_to_target_error=1e9 + made["cycles_to_target"]).isel(frequency=[0])
     assert dict(summary(unsure).rows)["life"] == "the life of 1 point is not known"
-    at_once = summary(
-        made.assign(
-            cycles_to_target=made["cycles_to_target"] * 0.0, cycles_to_target_error=0.0 * made["cycles_to_target"]
-        )
-    )
+    zero = 0.0 * made["cycles_to_target"]
+    at_once = summary(made.assign(cycles_to_target=zero, cycles_to_target_error=zero))
     assert at_once.values["life"]["count"] == 0.0
 
 

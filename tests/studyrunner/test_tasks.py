@@ -15,7 +15,7 @@ from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.cli import main
 from studyrunner.kinds.results import build_result
-from studyrunner.plan import describe_tasks, doubts_of_study
+from studyrunner.plan import doubts_of_study, effort_of
 from studyrunner.study.study_file import bundled_studies, read_study
 from studyrunner.variables import ASKED, USUAL
 from tests.mpi.launching import options, results
@@ -90,7 +90,7 @@ def test_a_plan_of_many_points_takes_little_memory():
     study = read_study("sdof_slider", [*many, "axes.scheme=implicit", "axes.step=500"])
     tracemalloc.start()
     try:
-        assert describe_tasks(plan_of(study).results) == "40000 wear histories"
+        assert effort_of(plan_of(study).results).words == "40000 wear histories"
         assert tracemalloc.get_traced_memory()[1] < 250 * study.n_points
     finally:
         tracemalloc.stop()
@@ -237,12 +237,7 @@ def test_bundled_studies_are_plausible(name):
     [
         # of 52100 steel, 4.23e-5 mm3/J
         ("sdof_slider", "axes.wear_coefficient=4.23e-5", "wear_coefficient 4.23e-05 ", "mm3/J (then it is 4.23e-14 "),
-        (
-            "dovetail",
-            "axes.friction_coefficient=[0.5, 2.5]",
-            "friction_coefficient 2.5 ",
-            "in percent (then it is 0.025)",
-        ),
+        ("dovetail", "axes.friction_coefficient=[0.5, 2.5]", "friction_coefficient 2.5 ", "percent (then it is 0.025)"),
         ("dovetail", "scene.rotation_speed=314", "rotation_speed 314 rpm ", "in rad/s (then it is 2998.5 rpm)"),
         ("dovetail", "axes.frequency=[0.2, 0.21]", "frequency 0.21 Hz", "in kHz (then it is 210 Hz)"),
         ("dovetail", "axes.frequency=150e3", "frequency 1.5e+05 Hz", "in mHz (then it is 150 Hz)"),

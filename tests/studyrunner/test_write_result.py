@@ -21,7 +21,7 @@ from studyrunner.result import write as writing
 from studyrunner.result.arrays import coordinates
 from studyrunner.result.provenance import describe_run
 from studyrunner.result.target import Target
-from studyrunner.scene.scene_set import pair_arrays
+from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from studyrunner.system import machine
 from studyrunner.user_error import StorageError
@@ -52,7 +52,7 @@ def write_study(study, results, path):
     """The file of a run of the study with these results."""
     plan = plan_of(study, FACTS.n_displacements)
     completion = fake_completion(study, plan, results, Target(path).progress)
-    arrays = [*coordinates(study, FACTS, pair_arrays(study, [FACTS]))]
+    arrays = [*coordinates(study, [FACTS], find_scenes(study))]
     with contextlib.closing(completion.store):
         return writing.write_result(study, FACTS, completion, Target(path), arrays, describe_run(study, FACTS))
 

@@ -14,11 +14,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import Drawn, FloatArray, add_legend, line_style, new_panels, set_log
-from studyrunner.result.view import NO_VOLUME, OWN_STEPS, Result
+from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.units import show_number, show_percent
-
-KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
-"""Axes along which only the numbers change and not what is computed."""
+from studyrunner.variables import OWN_STEPS
 
 QUANTITIES = {"volume": "final worn volume", "response": "response at the end"}
 """What is compared, in words."""
@@ -54,11 +52,15 @@ class Setting(NamedTuple):
         return ", ".join(text if key == "scheme" else f"{key} {text}" for key, text in texts.items())
 
 
+KEYS = Setting._fields
+"""Axes along which only the numbers change and not what is computed."""
+
+
 @dataclass(frozen=True)
 class ComparedPoint:
     """What each setting gave at one point of the other axes; arrays (n_setting,).
 
-    label: the point in words, empty where nothing but settings varies. time: CPU s. worn: m3. errors: of `QUANTITIES`,
+    label: the point in words, empty where nothing but settings varies. time: CPU s. errors: of `QUANTITIES`,
     relative, NaN for the reference itself and what was not computed; of the volume infinite where the reference wears
     nothing. reference: row of the finest setting, None where the exact answer is known, or nothing. uncertainty: of the
     reference, relative, infinite where not known.
@@ -67,7 +69,6 @@ class ComparedPoint:
     label: str
     settings: tuple[Setting, ...]
     time: FloatArray
-    worn: FloatArray
     errors: Mapping[str, FloatArray]
     reference: int | None
     uncertainty: Mapping[str, float]
@@ -144,8 +145,7 @@ def _compare(label: str, settings: tuple[Setting, ...], values: Mapping[str, Flo
     away = np.linalg.norm(response - response_there, axis=-1) / (float(np.linalg.norm(response_there)) or np.nan)
     compared = computed & (np.arange(len(settings)) != reference)
     errors = {name: np.where(compared, each, np.nan) for name, each in zip(QUANTITIES, (volume, away), strict=True)}
-    worn = np.where(computed, worn, np.nan)
-    return ComparedPoint(label, settings, values["run_time"], worn, errors, reference, uncertainty)
+    return ComparedPoint(label, settings, values["run_time"], errors, reference, uncertainty)
 
 
 def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:

@@ -11,32 +11,22 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from studyrunner.report import drawing as plot
+from studyrunner.report import root as mesh
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray
 from studyrunner.report.figures.pairs import largest_pair
-from studyrunner.report.root import (
-    MESH,
-    RootSurface,
-    draw_scale_bar,
-    find_views,
-    from_aslant,
-    paint_faces,
-    read_mesh,
-    read_root,
-    rgb,
-)
 from studyrunner.result.pairs import NO_DEPTH, has_depths, last_depth
 from studyrunner.result.view import Result
 from studyrunner.units import Scale, scale_for, show_number
 
-OF_SECTOR = (*MESH, "mesh_part", "natural_frequency")
+OF_SECTOR = (*mesh.MESH, "mesh_part", "natural_frequency")
 """Variables that the figure of the sector shows."""
 
 _MOST_CLOSE_UPS, _MOST_PAIRS, _MOST_FACES = 2, 20_000, 60_000
 
 
-def _read_surface(result: Result) -> RootSurface | None:
+def _read_surface(result: Result) -> mesh.RootSurface | None:
     """The surface as it is drawn; None without a mesh, or with too many pairs to see each."""
-    surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
+    surface = mesh.read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
     return None if surface is None else surface.near_contact(_MOST_FACES)
 
 
@@ -72,22 +62,22 @@ def draw_fraction(result: Result, name: str) -> Drawn:
     return _paint(surface, surface.nodes, values, scale, label), label.capitalize(), largest
 
 
-def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale: Scale, label: str) -> Figure:
+def _paint(surface: mesh.RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale: Scale, label: str) -> Figure:
     """The root with these nodes, and its contact surfaces from close by, coloured by values of the pairs in SI."""
-    views = find_views(surface)
+    views = mesh.find_views(surface)
     close_ups = views[:-1][:_MOST_CLOSE_UPS]
     ratios = [1.0] + [2.0] * len(close_ups)
     figure, (panels,) = plot.new_panels(1, len(ratios), 3.4, width_ratios=ratios)
     norm = Normalize(0.0, scale(float(of_pairs.max())).item() or 1.0)
     at_nodes = np.full(len(nodes), np.nan)
     at_nodes[surface.contact_nodes] = scale(of_pairs[surface.pairs])
-    colours, touch = rgb(surface.bodies, surface.body), surface.flank >= 0
+    colours, touch = mesh.rgb(surface.bodies, surface.body), surface.flank >= 0
     of_faces = at_nodes[surface.faces[touch]].mean(axis=1)
     colours[touch] = mpl.colormaps[mpl.rcParams["image.cmap"]](norm(of_faces))[:, :3]
     for panel, view in zip(panels, [views[-1], *close_ups], strict=True):
         faces = surface.faces[view.faces]
-        paint_faces(panel, nodes, faces, colours[view.faces], view)
-        draw_scale_bar(panel, nodes[np.unique(faces)], view)
+        mesh.paint_faces(panel, nodes, faces, colours[view.faces], view)
+        mesh.draw_scale_bar(panel, nodes[np.unique(faces)], view)
         panel.set_title(view.title)
     plot.add_colour_bar(figure, panels, norm, scale.label(label), fraction=0.05, panchor=False)
     return figure
@@ -95,15 +85,15 @@ def _paint(surface: RootSurface, nodes: FloatArray, of_pairs: FloatArray, scale:
 
 def draw_sector(result: Result) -> Drawn:
     """The natural frequencies over the nodal diameter, a line a mode, and the mesh beside them where there is one."""
-    has_mesh = result.has(*MESH)
+    has_mesh = result.has(*mesh.MESH)
     ratios = [1.0, 1.7] if has_mesh else [1.0]
     figure, (panels,) = plot.new_panels(1, len(ratios), 4.0, width_ratios=ratios)
     if has_mesh:
-        nodes, faces, parts = read_mesh(result)
+        nodes, faces, parts = mesh.read_mesh(result)
         names, body = np.unique(parts, return_inverse=True)
-        view = from_aslant(nodes, len(faces))
-        paint_faces(panels[0], nodes, faces, rgb(tuple(names.tolist()), body), view)
-        draw_scale_bar(panels[0], nodes, view)
+        view = mesh.from_aslant(nodes, len(faces))
+        mesh.paint_faces(panels[0], nodes, faces, mesh.rgb(tuple(names.tolist()), body), view)
+        mesh.draw_scale_bar(panels[0], nodes, view)
     panel, modes = panels[-1], result.dataset["natural_frequency"].transpose("nodal_diameter", "mode")
     for number, mode in enumerate(modes.values.T):
         style = {"linewidth": 0.8, "markersize": 3.5, "marker": plot.line_style(number)["marker"], "color": "0.35"}

@@ -13,17 +13,8 @@ from matplotlib.colors import Normalize
 
 from solver.outcome import Outcome, absolute
 from studyrunner.report import drawing as plot
+from studyrunner.report import selection
 from studyrunner.report.drawing import Drawn, FloatArray, Table
-from studyrunner.report.selection import (
-    Choice,
-    Course,
-    cell_edges,
-    choose,
-    course_axis,
-    find_course,
-    labelled,
-    slow_time,
-)
 from studyrunner.result.view import NO_VOLUME, Point, Result
 from studyrunner.units import Scale, scale_for, show_known, show_number, show_percent
 
@@ -50,14 +41,15 @@ def draw_history(result: Result) -> Drawn:
     if len(result.cycles) == 1:
         return f"The file holds {result.cycle_label(0)} only: set [slow_time]."
     largest = float(np.nanmax(result.dataset["worn_volume"].values, initial=0.0))
-    wears, axis = largest > NO_VOLUME, course_axis(result)
-    scale, choice = scale_for("m3", largest if wears else 0.0), choose(result, [axis] if axis else [], _MOST_LINES)
+    wears, axis = largest > NO_VOLUME, selection.course_axis(result)
+    scale = scale_for("m3", largest if wears else 0.0)
+    choice = selection.choose(result, [axis] if axis else [], _MOST_LINES)
     (figure, panel), cycles = plot.new_panel(3.4), scale_for(result.counted, result.cycles)
     highest, ends = _draw_over_cycles(result, panel, "worn_volume", choice, scale), []
     for number, (point, label) in enumerate(choice):
         worn = result.at("worn_volume", point).values
         if np.isfinite(worn[-1]):
-            ends.append(labelled(f"{scale.show(float(worn[-1]), 4)}{_with_error(result, point)}", label))
+            ends.append(selection.labelled(f"{scale.show(float(worn[-1]), 4)}{_with_error(result, point)}", label))
         _mark_events(result, panel, point, cycles, scale, plot.line_style(number)["color"])
     panel.set_xlim(0.0, panel.dataLim.xmax or None)  # 0: a target before the second count
     panel.set_ylabel(scale.label("worn volume"))
@@ -72,7 +64,7 @@ def draw_excitation(result: Result) -> Drawn:
         return None
     if not result.has("excitation_frequency"):
         return result.lacks("excitation_frequency")
-    choice, (figure, panel) = choose(result, [], _MOST_LINES), plot.new_panel(3.4)
+    choice, (figure, panel) = selection.choose(result, [], _MOST_LINES), plot.new_panel(3.4)
     _draw_over_cycles(result, panel, "excitation_frequency", choice, Scale(1.0, "Hz"))
     panel.set_ylabel("frequency (Hz)")
     return figure, f"The excitation follows the {result.followed}", choice.sentence
@@ -82,7 +74,7 @@ def _at_the_end(result: Result) -> str:
     return "at the end" if result.has("cycle_count") else f"at {result.cycle_label(-1)}"
 
 
-def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: Choice, scale: Scale) -> float:
+def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: selection.Choice, scale: Scale) -> float:
     """A variable over slow time, a line a combination, with bands of its error; how high they reach."""
     cycles, highest = scale_for(result.counted, result.cycles), 0.0
     for number, (point, label) in enumerate(choice):
@@ -96,7 +88,7 @@ def _draw_over_cycles(result: Result, panel: Axes, name: str, choice: Choice, sc
             )
         look = plot.line_style(number, 101) | {"label": label or "computed"}
         highest = max(highest, plot.add_line(panel, cycles(result.counts(point)), values, error, band=True, **look))
-    panel.set_xlabel(slow_time(result, cycles))
+    panel.set_xlabel(selection.slow_time(result, cycles))
     return highest
 
 
@@ -130,10 +122,10 @@ def _with_error(result: Result, point: Point) -> str:
 # --- over an axis of the study ---
 
 
-def _worn_over(result: Result) -> Course | None:
+def _worn_over(result: Result) -> selection.Course | None:
     """The course of figures of the worn volume; None where there is none, or nothing wears."""
     wears = len(result.cycles) > 1 and float(np.nanmax(result.worn, initial=0.0)) > NO_VOLUME
-    return find_course(result) if wears else None
+    return selection.find_course(result) if wears else None
 
 
 def draw_final(result: Result) -> Drawn:
@@ -161,10 +153,10 @@ def draw_final(result: Result) -> Drawn:
     panel.set_ylabel(scale.label(f"worn volume {_at_the_end(result)}"))
     wrong = show_known(float(errors[number, place]))
     text = f"Largest: {scale.show(float(reached[number, place]), 4)}{wrong} at {course.at(place)}"
-    return figure, labelled(text, choice.labels[number]), crosses, choice.sentence
+    return figure, selection.labelled(text, choice.labels[number]), crosses, choice.sentence
 
 
-def _mark_care(panel: Axes, course: Course, choice: Choice, volumes: FloatArray) -> None:
+def _mark_care(panel: Axes, course: selection.Course, choice: selection.Choice, volumes: FloatArray) -> None:
     """Marks at points to be taken with care. volumes (n_lines, n): their worn volumes, as shown."""
     result = course.result
     sensitive, early = result.ended(Outcome.SENSITIVE), result.has_values & ~result.computed
@@ -189,16 +181,16 @@ def draw_map(result: Result, name: str) -> Drawn:
     figure, panels = plot.panel_grid(choice.labels, 2.7, sharex=True)
     norm = Normalize(0.0, scale(largest).item() or 1.0)
     # half a cell at both ends: nothing is known beyond
-    rows = np.clip(cell_edges(cycles(result.cycles)), cycles(result.cycles[0]), cycles(result.cycles[-1]))
+    rows = np.clip(selection.cell_edges(cycles(result.cycles)), cycles(result.cycles[0]), cycles(result.cycles[-1]))
     for panel, field in zip(panels.flat, fields, strict=True):
         plot.add_map(panel, course.edges, rows, scale(field.T), norm)
     for panel in panels[:, 0]:
-        panel.set_ylabel(slow_time(result, cycles))
+        panel.set_ylabel(selection.slow_time(result, cycles))
     for panel in panels[-1]:
         course.set_axis(panel)
     plot.add_colour_bar(figure, panels, norm, scale.label(name.replace("_", " ")))
     text = f"{scale.show(float(largest), 4)} at {course.at(place)}, {result.cycle_label(count)}"
-    return figure, labelled(f"Largest: {text}", choice.labels[number]), choice.sentence
+    return figure, selection.labelled(f"Largest: {text}", choice.labels[number]), choice.sentence
 
 
 # --- of missions, by block ---

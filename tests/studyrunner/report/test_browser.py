@@ -46,16 +46,9 @@ def browser():
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     # draws in three dimensions without a graphics card, and finds nothing on any network
-    drawn, apart = "--enable-unsafe-swiftshader", "--host-resolver-rules=MAP * ~NOTFOUND"
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-dev-shm-usage",
-        apart,
-        drawn,
-        "--window-size=1400,1000",
-    ):
-        options.add_argument(argument)
+    words = "headless=new no-sandbox disable-dev-shm-usage window-size=1400,1000 enable-unsafe-swiftshader"
+    for argument in (*words.split(), "host-resolver-rules=MAP * ~NOTFOUND"):
+        options.add_argument(f"--{argument}")
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(options=options, service=Service(DRIVER))
     driver.set_script_timeout(PATIENCE)

@@ -142,9 +142,7 @@ def test_the_folder_is_named_after_the_file_and_lies_here(draw, tmp_path, capsys
     [
         ([], "options"),
         (["results/worn.x.nc", "--folder", "x"], "options"),
-        (["nowhere.nc"], "nowhere.nc"),
         (["results"], "results"),
-        (["text.nc"], "text.nc"),
         (["results/worn.x.nc", "-o", "text.nc"], '-o = "text.nc"'),
         (["results/worn.x.nc", "-o", "text.nc/inside"], '-o = "text.nc/inside"'),
     ],
