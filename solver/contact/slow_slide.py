@@ -25,8 +25,8 @@ from solver.model import FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
 PARTS = 32
-"""Parts of a path. Dovetail, 16 pairs that slide for 2.8e5 cycles, `rtol` 1e-2: 18.606, 18.607, 18.607, 18.610, 18.611 mm3 with 512,
-128, 32, 16, 8 parts."""
+"""Parts of a path. Dovetail, 16 pairs that slide for 2.8e5 cycles, `rtol` 1e-2: 18.606, 18.607, 18.607, 18.610, 18.611 mm3
+with 512, 128, 32, 16, 8 parts."""
 
 MOST_PROJECTIONS = 50
 """Most changes of the one or two discs of a projection; two or three are usual."""
@@ -50,7 +50,7 @@ class Path(NamedTuple):
 @njit(cache=True)
 def slide_along(pairs: IntArray, path: Path, out: FloatArray) -> None:
     """Tangential states of some pairs (n,) at the end of a path into out (n_contact, 2), N."""
-    none = np.zeros((0, 8))
+    none = np.zeros((0, 7))
     for pair in pairs:
         first, last, state = path.first[pair], path.last[pair], path.state[pair]
         out[pair, 0], out[pair, 1], _ = _slide(first, last, path.friction[pair], state, none)
@@ -62,7 +62,7 @@ def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: Float
     out (n_contact, 2, 3m). synthesis (m, N): as in `FourierBasis`.
     """
     m, n_samples = synthesis.shape
-    steps = np.empty((PARTS, 8))
+    steps = np.empty((PARTS, 7))
     weights = np.empty((n_samples, 2, 3))
     for pair in pairs:
         first, last, state = path.first[pair], path.last[pair], path.state[pair]
@@ -82,7 +82,7 @@ def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: Float
 def _slide(
     first: FloatArray, last: FloatArray, friction: float, state: FloatArray, steps: FloatArray
 ) -> tuple[float, float, int]:
-    """State at the end of a path (3, N), and the number of projections, which are noted in `steps` (n, 8) where there
+    """State at the end of a path (3, N), and the number of projections, which are noted in `steps` (n, 7) where there
     is room: sample, other sample or -1, fraction of the path, and the unit normals at both; of a single disc in place
     of the second one its radius over the distance before.
     """
@@ -92,7 +92,8 @@ def _slide(
     for n in range(n_samples):
         ends = np.inf
         for force in (first, last):
-            ends = min(ends, friction * force[0, n] - np.sqrt((force[1, n] - state[0]) ** 2 + (force[2, n] - state[1]) ** 2))
+            apart = np.sqrt((force[1, n] - state[0]) ** 2 + (force[2, n] - state[1]) ** 2)
+            ends = min(ends, friction * force[0, n] - apart)
         margin[n] = ends
         reach = max(reach, -4.0 * ends)
     # a margin is concave along a straight path: a state inside at both ends is inside between
@@ -121,7 +122,7 @@ def _follow(
     steps: FloatArray,
 ) -> tuple[float, float, int, float]:
     """As `_slide` with the discs of some samples `near`, and the farthest distance from the start."""
-    x_1, x_2, count, farthest = state[0], state[1], 0, 0.0
+    x_1, x_2, count, farthest, unused = state[0], state[1], 0, 0.0, np.empty(7)
     for part in range(1, PARTS + 1):
         along = part / PARTS
         worst, violated, open_ = -1, 0.0, False
@@ -145,42 +146,25 @@ def _follow(
         if not open_:
             one, other = _nearest(x_1, x_2, discs, near.size, worst)
         if one >= 0:
-            x_1, x_2, count = _project(x_1, x_2, discs, one, other, near, along, steps, count)
-            farthest = max(farthest, np.hypot(x_1 - state[0], x_2 - state[1]))
+            note = steps[count] if count < len(steps) else unused
+            note[0], note[1], note[2] = near[one], near[other] if other >= 0 else -1, along
+            x_1, x_2 = _project(x_1, x_2, discs, one, other, note)
+            count, farthest = count + 1, max(farthest, np.hypot(x_1 - state[0], x_2 - state[1]))
     return x_1, x_2, count, farthest
 
 
 @njit(cache=True)
-def _project(
-    x_1: float,
-    x_2: float,
-    discs: FloatArray,
-    one: int,
-    other: int,
-    near: IntArray,
-    along: float,
-    steps: FloatArray,
-    count: int,
-) -> tuple[float, float, int]:
-    """Projection onto one disc, or the nearest corner of two, noted in `steps`."""
+def _project(x_1: float, x_2: float, discs: FloatArray, one: int, other: int, note: FloatArray) -> tuple[float, float]:
+    """Projection onto one disc, or onto the nearest corner of two; its entries 3 to 6 of `_slide` are noted."""
     c_1, c_2, radius = discs[0, one], discs[1, one], discs[2, one]
-    noted = count < len(steps)
-    if noted:
-        steps[count, 0], steps[count, 1], steps[count, 2] = near[one], -1.0, along
     if other < 0:
         size = np.hypot(x_1 - c_1, x_2 - c_2)
-        u_1, u_2 = (x_1 - c_1) / size, (x_2 - c_2) / size
-        x_1, x_2 = c_1 + radius * u_1, c_2 + radius * u_2
-        if noted:
-            steps[count, 3], steps[count, 4], steps[count, 5] = u_1, u_2, radius / size
-    else:
-        _, x_1, x_2 = _corner(x_1, x_2, discs, one, other, -1)
-        if noted:
-            steps[count, 1] = near[other]
-            steps[count, 3], steps[count, 4] = (x_1 - c_1) / radius, (x_2 - c_2) / radius
-            steps[count, 5] = (x_1 - discs[0, other]) / discs[2, other]
-            steps[count, 6] = (x_2 - discs[1, other]) / discs[2, other]
-    return x_1, x_2, count + 1
+        note[3], note[4], note[5] = (x_1 - c_1) / size, (x_2 - c_2) / size, radius / size
+        return c_1 + radius * note[3], c_2 + radius * note[4]
+    _, x_1, x_2 = _corner(x_1, x_2, discs, one, other, -1)
+    note[3], note[4] = (x_1 - c_1) / radius, (x_2 - c_2) / radius
+    note[5], note[6] = (x_1 - discs[0, other]) / discs[2, other], (x_2 - discs[1, other]) / discs[2, other]
+    return x_1, x_2
 
 
 @njit(cache=True)
@@ -253,7 +237,7 @@ def _nearest(x_1: float, x_2: float, discs: FloatArray, n_discs: int, worst: int
 
 @njit(cache=True)
 def _weigh(steps: FloatArray, friction: float, weights: FloatArray) -> None:
-    """Derivatives (N, 2, 3) of the end of a path by the predicted forces at its end, from its projections (n, 8)."""
+    """Derivatives (N, 2, 3) of the end of a path by the predicted forces at its end, from its projections (n, 7)."""
     weights[:] = 0.0
     later = np.eye(2)
     for count in range(len(steps) - 1, -1, -1):

@@ -107,23 +107,22 @@ def needs_new_choice(wearing: WearingJoint, state: WearState) -> bool:
 
 def choose_anew(wearing: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    return _resolved(wearing, state, refine(_resolved_state(wearing, state), wearing.run))
+    return at_level_above(wearing, state, refine(_resolved(wearing, state), wearing.run))
 
 
-def at_level_above(wearing: WearingJoint, state: WearState) -> WearState | Failure:
-    return _resolved(wearing, state, _resolved_state(wearing, state))
-
-
-def _resolved_state(wearing, state):
-    return replace(ResolvedState(*wearing.case_and_joint(state), state.point), estimate=state.estimate, accurate=state.accurate)
-
-
-def _resolved(wearing, state, refined):
-    refined = with_level_above(refined, wearing.run)
-    resolution, point = refined.case.resolution, refined.point
+def at_level_above(wearing: WearingJoint, state: WearState, here: ResolvedState | None = None) -> WearState | Failure:
+    """The state with one level of harmonics more than suffices, so that the reference solution may have those that do;
+    here: with those, where they are not those of the state.
+    """
+    here = with_level_above(here or _resolved(wearing, state), wearing.run)
+    resolution, point = here.case.resolution, here.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
-    state = replace(state, estimate=refined.estimate, accurate=refined.accurate)
+    state = replace(state, estimate=here.estimate, accurate=here.accurate)
     return wearing.at_followed(wearing.with_rates(state))
+
+
+def _resolved(wearing: WearingJoint, state: WearState) -> ResolvedState:
+    return ResolvedState(*wearing.case_and_joint(state), state.point, state.estimate, state.accurate)
 
 
 def vibrates_otherwise(state: WearState) -> bool:

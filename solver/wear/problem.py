@@ -2,8 +2,9 @@
 
 The difference of a history to its reference solution, pair by pair, is taken for the error. The reference solution
 starts from another sweep, with a third of the nodes (`solver.loading_history`), and is coarser: twice the tolerance of
-the steps, a quarter of their parts, the next lower harmonics and samples. Where pairs stick again, a resonance passes
-or a branch ends, errors grow, and this difference with them; a sum of local errors does not.
+the steps, the next lower harmonics and samples. These suffice for its states, as the history has one level more: else
+their error is what the difference shows. Where pairs stick again, a resonance passes or a branch ends, errors grow, and
+this difference with them; a sum of local errors does not.
 
 A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
 with the same steps errs as they do: dovetail, 16 pairs, 212.5 Hz, where a pair only just slips: 1.89 mm3 with implicit
@@ -26,7 +27,15 @@ from solver.outcome import Outcome, in_digits
 from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, ROUND_OFF, Resolution, Scheme, SolverSettings, ToTheEnd
 from solver.structure.joint import Case
-from solver.wear.check import at_level_above, full_check, is_final, report_only, unstable_at_end, vibrates_otherwise, wears_without_end
+from solver.wear.check import (
+    at_level_above,
+    full_check,
+    is_final,
+    report_only,
+    unstable_at_end,
+    vibrates_otherwise,
+    wears_without_end,
+)
 from solver.wear.jump import free_slide, jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import (
@@ -98,7 +107,7 @@ class WearProblem(WearingJoint):
         """As in SlowProblem: the next state is checked and stored."""
         request, local = self.request, 0.0
         if state is None:
-            end = at_level_above(self, self.unworn_state()) if self.guide is None else self.at_followed(self.unworn_state_of_reference())
+            end = self._first_state()
         elif self._is_complete(state, course):
             return unstable_at_end(self, state) if self.stable_end else None
         elif (failure := self._gives_up(state, course)) is not None:
@@ -121,6 +130,12 @@ class WearProblem(WearingJoint):
         # local: sum of the local errors of the steps so far, m3
         values = report | {"local": after.error + local}
         return after, course.after(Node(after.cycle, after.depth, after.rate, values))
+
+    def _first_state(self) -> WearState | Failure:
+        """The unworn state, of a history with the harmonics of its later states."""
+        if self.guide is None:
+            return at_level_above(self, self.unworn_state())
+        return self.at_followed(self.unworn_state_of_reference())
 
     def _is_complete(self, state: WearState, course: Course) -> bool:
         """Whether a history has come to its last count, its target, or its final state."""
