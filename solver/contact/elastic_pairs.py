@@ -153,7 +153,8 @@ def march_tangent(
 ) -> None:
     """Derivatives of the results of `march_period` of some pairs (n,), with the periodicity, into `out`.
 
-    starts (n_contact, 2, 3m): of the start. by_column_t: the synthesis as `by_columns` gives it. analysis_h (m, N): contiguous transpose of the analysis.
+    starts (n_contact, 2, 3m): of the start. by_column_t: the synthesis as `by_columns` gives it. analysis_h (m, N):
+    contiguous transpose of the analysis.
     """
     m, n_samples = analysis_h.shape
     w = 3 * m + 2

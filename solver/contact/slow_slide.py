@@ -7,9 +7,10 @@ next, a disc that reaches x takes it along, along its normal: the sweeping proce
 
     x_k = argmin |x - x_(k-1)|,   x in C(k / n),
 
-onto one disc or onto a corner of two. Where C is empty, the pair slips or opens in each period, and no place is at rest:
-C is a point when the pair comes to stick again, so that it does not matter where x was before. The derivative by the predicted force at the end of the path is the product of those of the
-projections, from the last to the first. A corner does not depend on the place before.
+onto one disc or onto a corner of two. Where C is empty, the pair slips or opens in each period, and no place is at
+rest: C is a point when the pair comes to stick again, so that it does not matter where x was before. The derivative by
+the predicted force at the end of the path is the product of those of the projections, from the last to the first. A
+corner does not depend on the place before.
 
 Floats and arrays only.
 """
@@ -25,8 +26,8 @@ from solver.model import FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
 PARTS = 32
-"""Parts of a path. Dovetail, 16 pairs that slide for 2.8e5 cycles, `rtol` 1e-2: 18.606, 18.607, 18.607, 18.610, 18.611 mm3
-with 512, 128, 32, 16, 8 parts."""
+"""Parts of a path. Dovetail, 16 pairs that slide for 2.8e5 cycles, `rtol` 1e-2: 18.606, 18.607, 18.607, 18.610,
+18.611 mm3 with 512, 128, 32, 16, 8 parts."""
 
 MOST_PROJECTIONS = 50
 """Most changes of the one or two discs of a projection; two or three are usual."""
