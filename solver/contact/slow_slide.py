@@ -8,9 +8,8 @@ next, a disc that reaches x takes it along, along its normal: the sweeping proce
     x_k = argmin |x - x_(k-1)|,   x in C(k / n),
 
 onto one disc or onto a corner of two. Where C is empty, the pair slips or opens in each period, and no place is at
-rest: C is a point when the pair comes to stick again, so that it does not matter where x was before. The derivative by
-the predicted force at the end of the path is the product of those of the projections, from the last to the first. A
-corner does not depend on the place before.
+rest. When it comes to stick again, C begins as the point at which two discs touch, wherever x was before. The derivative
+by the predicted force at the end of the path is the product of those of the projections, from the last to the first.
 
 Floats and arrays only.
 """
@@ -32,9 +31,19 @@ PARTS = 32
 MOST_PROJECTIONS = 50
 """Most changes of the one or two discs of a projection; two or three are usual."""
 
+HALVINGS = 40
+"""Halvings of the part within which the discs get a common point: their common part is then as long as 1e-6 radii."""
+
 INSIDE = 1e-10
 """Distance of a place from the border of its discs over their radius: the march through the period then finds that the
 pair sticks. Well below the tolerance of the residual."""
+
+FLATTEST_CORNER = 1e-6
+"""Least sine of the angle between two borders of which a derivative of their corner is made."""
+
+NOTES = 18
+"""Entries of a noted step: sample, other sample or -1, the derivatives (2, 3) of the place by the predicted forces at
+both, and (2, 2) by the place before, row by row."""
 
 
 class Path(NamedTuple):
@@ -48,10 +57,20 @@ class Path(NamedTuple):
     state: FloatArray
 
 
+class Way(NamedTuple):
+    """Path of one pair. near (n,): samples whose discs are looked at; discs (3, n): their centres and radii, N."""
+
+    first: FloatArray
+    last: FloatArray
+    friction: float
+    near: IntArray
+    discs: FloatArray
+
+
 @njit(cache=True)
 def slide_along(pairs: IntArray, path: Path, out: FloatArray) -> None:
     """Tangential states of some pairs (n,) at the end of a path into out (n_contact, 2), N."""
-    none = np.zeros((0, 7))
+    none = np.zeros((0, NOTES))
     for pair in pairs:
         first, last, state = path.first[pair], path.last[pair], path.state[pair]
         out[pair, 0], out[pair, 1], _ = _slide(first, last, path.friction[pair], state, none)
@@ -63,32 +82,48 @@ def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: Float
     out (n_contact, 2, 3m). synthesis (m, N): as in `FourierBasis`.
     """
     m, n_samples = synthesis.shape
-    steps = np.empty((PARTS, 7))
-    weights = np.empty((n_samples, 2, 3))
+    notes, weights, later = np.empty((2 * PARTS + 2, NOTES)), np.empty((n_samples, 6)), np.empty(4)
     for pair in pairs:
         first, last, state = path.first[pair], path.last[pair], path.state[pair]
-        count = _slide(first, last, path.friction[pair], state, steps)[2]
-        if count:
-            _weigh(steps[:count], path.friction[pair], weights)
-            for n in range(n_samples):
-                for i in range(2):
-                    for component in range(3):
-                        weight = weights[n, i, component]
-                        if weight != 0.0:
-                            for k in range(m):
-                                out[pair, i, component * m + k] += weight * synthesis[k, n]
+        count = _slide(first, last, path.friction[pair], state, notes)[2]
+        weights[:] = 0.0
+        later[0] = later[3] = 1.0
+        later[1] = later[2] = 0.0
+        # from the last step to the first
+        while count > 0 and np.abs(later).max() > ROUND_OFF:
+            count -= 1
+            _weigh(notes[count], later, weights)
+        for n in range(n_samples):
+            for entry in range(6):
+                weight = weights[n, entry]
+                if weight != 0.0:
+                    for k in range(m):
+                        out[pair, entry // 3, entry % 3 * m + k] += weight * synthesis[k, n]
+
+
+@njit(cache=True)
+def _weigh(note: FloatArray, later: FloatArray, weights: FloatArray) -> None:
+    """Add the derivatives of the end of a path by what a step depends on to `weights` (N, 6); later (2, 2): derivative
+    of the end by the place after the step, then by that before it, row by row.
+    """
+    for row in range(2):
+        one, other = later[2 * row], later[2 * row + 1]
+        for place in range(2):
+            sample, start = int(note[place]), 2 + 6 * place
+            if sample >= 0:
+                for k in range(3):
+                    weights[sample, 3 * row + k] += one * note[start + k] + other * note[start + 3 + k]
+        for k in range(2):
+            later[2 * row + k] = one * note[14 + k] + other * note[16 + k]
 
 
 @njit(cache=True)
 def _slide(
-    first: FloatArray, last: FloatArray, friction: float, state: FloatArray, steps: FloatArray
+    first: FloatArray, last: FloatArray, friction: float, state: FloatArray, notes: FloatArray
 ) -> tuple[float, float, int]:
-    """State at the end of a path (3, N), and the number of projections, which are noted in `steps` (n, 7) where there
-    is room: sample, other sample or -1, fraction of the path, and the unit normals at both; of a single disc in place
-    of the second one its radius over the distance before.
-    """
+    """State at the end of a path (3, N), and the number of its steps, which are noted (n, NOTES) where there is room."""
     n_samples = first.shape[1]
-    discs, near, margin = np.empty((3, n_samples)), np.empty(n_samples, np.int64), np.empty(n_samples)
+    near, margin = np.empty(n_samples, np.int64), np.empty(n_samples)
     reach = 0.0
     for n in range(n_samples):
         ends = np.inf
@@ -106,66 +141,95 @@ def _slide(
             if margin[n] <= reach:
                 near[n_near] = n
                 n_near += 1
-        x_1, x_2, count, farthest = _follow(first, last, friction, state, near[:n_near], discs, steps)
+        way = Way(first, last, friction, near[:n_near], np.empty((3, n_near)))
+        x_1, x_2, count, farthest = _follow(way, state, notes)
         if farthest <= reach:
             return x_1, x_2, count
         reach = np.inf
 
 
 @njit(cache=True)
-def _follow(
-    first: FloatArray,
-    last: FloatArray,
-    friction: float,
-    state: FloatArray,
-    near: IntArray,
-    discs: FloatArray,
-    steps: FloatArray,
-) -> tuple[float, float, int, float]:
-    """As `_slide` with the discs of some samples `near`, and the farthest distance from the start."""
-    x_1, x_2, count, farthest, unused = state[0], state[1], 0, 0.0, np.empty(7)
-    for part in range(1, PARTS + 1):
+def _follow(way: Way, state: FloatArray, notes: FloatArray) -> tuple[float, float, int, float]:
+    """As `_slide`, with the discs of some samples, and the farthest distance from the start."""
+    x_1, x_2, count, farthest, slips = state[0], state[1], 0, 0.0, False
+    unused = np.empty(NOTES)
+    for part in range(PARTS + 1):
         along = part / PARTS
-        worst, violated, open_ = -1, 0.0, False
-        for place in range(near.size):
-            n = near[place]
-            normal = first[0, n] + along * (last[0, n] - first[0, n])
-            radius = (1.0 - INSIDE) * friction * normal
-            c_1 = first[1, n] + along * (last[1, n] - first[1, n])
-            c_2 = first[2, n] + along * (last[2, n] - first[2, n])
-            discs[0, place], discs[1, place], discs[2, place] = c_1, c_2, radius
-            apart = (x_1 - c_1) ** 2 + (x_2 - c_2) ** 2
-            if radius <= 0.0:
-                open_ = True
-            elif apart > radius * radius:
-                outside = np.sqrt(apart) - radius
-                if outside > violated:
-                    worst, violated = place, outside
-        if worst < 0 and not open_:
+        common, one, other = _nearest(way, along, x_1, x_2)
+        if not common:
+            slips = True
             continue
-        one, other = -1, -1
-        if not open_:
-            one, other = _nearest(x_1, x_2, discs, near.size, worst)
+        if slips:
+            slips, begin = False, _first_common(way, along - 1.0 / PARTS, along, x_1, x_2)
+            x_1, x_2 = _meet(way, begin, x_1, x_2, notes[count] if count < len(notes) else unused)
+            count, farthest = count + 1, max(farthest, np.hypot(x_1 - state[0], x_2 - state[1]))
+            common, one, other = _nearest(way, along, x_1, x_2)
         if one >= 0:
-            note = steps[count] if count < len(steps) else unused
-            note[0], note[1], note[2] = near[one], near[other] if other >= 0 else -1, along
-            x_1, x_2 = _project(x_1, x_2, discs, one, other, note)
+            x_1, x_2 = _project(way, along, x_1, x_2, one, other, notes[count] if count < len(notes) else unused)
             count, farthest = count + 1, max(farthest, np.hypot(x_1 - state[0], x_2 - state[1]))
     return x_1, x_2, count, farthest
 
 
 @njit(cache=True)
-def _project(x_1: float, x_2: float, discs: FloatArray, one: int, other: int, note: FloatArray) -> tuple[float, float]:
-    """Projection onto one disc, or onto the nearest corner of two; its entries 3 to 6 of `_slide` are noted."""
-    c_1, c_2, radius = discs[0, one], discs[1, one], discs[2, one]
-    if other < 0:
-        size = np.hypot(x_1 - c_1, x_2 - c_2)
-        note[3], note[4], note[5] = (x_1 - c_1) / size, (x_2 - c_2) / size, radius / size
-        return c_1 + radius * note[3], c_2 + radius * note[4]
-    _, x_1, x_2 = _corner(x_1, x_2, discs, one, other, -1)
-    note[3], note[4] = (x_1 - c_1) / radius, (x_2 - c_2) / radius
-    note[5], note[6] = (x_1 - discs[0, other]) / discs[2, other], (x_2 - discs[1, other]) / discs[2, other]
-    return x_1, x_2
+def _first_common(way: Way, low: float, high: float, x_1: float, x_2: float) -> float:
+    """Fraction of the path, between one without and one with a common point of all discs, at which there is one."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if _nearest(way, middle, x_1, x_2)[0]:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@njit(cache=True)
+def _nearest(way: Way, along: float, x_1: float, x_2: float) -> tuple[bool, int, int]:
+    """Whether all discs have a common point at a fraction of the path, and the disc, or the two, on whose border the
+    one nearest to x lies: -1 where x lies within all.
+
+    Each round takes in the disc that the place found so far violates most; the distance to x grows from round to round.
+    """
+    one, other, new, violated, discs = -1, -1, -1, 0.0, way.discs
+    for place in range(way.near.size):
+        n = way.near[place]
+        normal = way.first[0, n] + along * (way.last[0, n] - way.first[0, n])
+        if normal <= 0.0:
+            return False, -1, -1
+        discs[0, place] = way.first[1, n] + along * (way.last[1, n] - way.first[1, n])
+        discs[1, place] = way.first[2, n] + along * (way.last[2, n] - way.first[2, n])
+        radius = discs[2, place] = (1.0 - INSIDE) * way.friction * normal
+        apart = (x_1 - discs[0, place]) ** 2 + (x_2 - discs[1, place]) ** 2
+        if apart > radius * radius and np.sqrt(apart) - radius > violated:
+            new, violated = place, np.sqrt(apart) - radius
+    for _ in range(MOST_PROJECTIONS):
+        if new < 0:
+            return True, one, other
+        y_1, y_2 = x_1, x_2
+        size = np.hypot(x_1 - discs[0, new], x_2 - discs[1, new])
+        alone = size > discs[2, new]
+        if alone:
+            y_1 = discs[0, new] + discs[2, new] / size * (x_1 - discs[0, new])
+            y_2 = discs[1, new] + discs[2, new] / size * (x_2 - discs[1, new])
+            for place in (one, other):
+                alone = alone and (place < 0 or _outside(y_1, y_2, discs, place) == 0.0)
+        if alone:
+            one, other = new, -1
+        else:
+            best, partner = np.inf, -1
+            for place, third in ((one, other), (other, one)):
+                if place >= 0:
+                    distance, z_1, z_2 = _corner(x_1, x_2, discs, new, place, third)
+                    if distance < best:
+                        best, partner, y_1, y_2 = distance, place, z_1, z_2
+            if partner < 0:
+                return False, -1, -1
+            one, other = new, partner
+        new, violated = -1, 0.0
+        for place in range(way.near.size):
+            outside = _outside(y_1, y_2, discs, place)
+            if outside > violated and place != one and place != other:
+                new, violated = place, outside
+    return False, -1, -1
 
 
 @njit(cache=True)
@@ -199,81 +263,90 @@ def _corner(x_1: float, x_2: float, discs: FloatArray, one: int, other: int, thi
 
 
 @njit(cache=True)
-def _nearest(x_1: float, x_2: float, discs: FloatArray, n_discs: int, worst: int) -> tuple[int, int]:
-    """The disc, or the two, whose border is nearest to x within all discs; (-1, -1) where they have no common point.
-
-    Each round takes in the disc that the place found so far violates most; the distance to x grows from round to round.
-    """
-    one, other, new = -1, -1, worst
-    for _ in range(MOST_PROJECTIONS):
-        y_1, y_2 = x_1, x_2
-        size = np.hypot(x_1 - discs[0, new], x_2 - discs[1, new])
-        alone = size > discs[2, new]
-        if alone:
-            y_1 = discs[0, new] + discs[2, new] / size * (x_1 - discs[0, new])
-            y_2 = discs[1, new] + discs[2, new] / size * (x_2 - discs[1, new])
-            for place in (one, other):
-                alone = alone and (place < 0 or _outside(y_1, y_2, discs, place) == 0.0)
-        if alone:
-            one, other = new, -1
-        else:
-            best, partner = np.inf, -1
-            for place, third in ((one, other), (other, one)):
-                if place >= 0:
-                    distance, z_1, z_2 = _corner(x_1, x_2, discs, new, place, third)
-                    if distance < best:
-                        best, partner, y_1, y_2 = distance, place, z_1, z_2
-            if partner < 0:
-                return -1, -1
-            one, other = new, partner
-        new, violated = -1, 0.0
-        for place in range(n_discs):
-            outside = _outside(y_1, y_2, discs, place)
-            if outside > violated and place != one and place != other:
-                new, violated = place, outside
-        if new < 0:
-            return one, other
-    return -1, -1
-
-
-@njit(cache=True)
-def _weigh(steps: FloatArray, friction: float, weights: FloatArray) -> None:
-    """Derivatives (N, 2, 3) of the end of a path by the predicted forces at its end, from its projections (n, 7)."""
-    weights[:] = 0.0
-    later = np.eye(2)
-    for count in range(len(steps) - 1, -1, -1):
-        one, other, along = int(steps[count, 0]), int(steps[count, 1]), steps[count, 2]
-        u_1, u_2 = steps[count, 3], steps[count, 4]
-        if other >= 0:
-            v_1, v_2 = steps[count, 5], steps[count, 6]
-            area = u_1 * v_2 - u_2 * v_1
-            _weigh_normal(weights[one], later, (v_2 / area, -v_1 / area), (u_1, u_2), along, friction)
-            _weigh_normal(weights[other], later, (-u_2 / area, u_1 / area), (v_1, v_2), along, friction)
-            return
-        _weigh_normal(weights[one], later, (u_1, u_2), (u_1, u_2), along, friction)
+def _project(
+    way: Way, along: float, x_1: float, x_2: float, one: int, other: int, note: FloatArray
+) -> tuple[float, float]:
+    """Projection onto one disc, or onto the nearest corner of two, as `_nearest` has found them; and its note."""
+    discs, grown = way.discs, (1.0 - INSIDE) * way.friction
+    c_1, c_2, radius = discs[0, one], discs[1, one], discs[2, one]
+    note[:] = 0.0
+    note[0], note[1] = way.near[one], -1.0
+    if other < 0:
+        size = np.hypot(x_1 - c_1, x_2 - c_2)
+        u_1, u_2, ratio = (x_1 - c_1) / size, (x_2 - c_2) / size, radius / size
         # across the normal the place before counts with the ratio, the centre with the rest
-        ratio = steps[count, 5]
-        for i in range(2):
-            across = later[i, 1] * u_1 - later[i, 0] * u_2
-            weights[one, i, 1] -= along * (1.0 - ratio) * across * u_2
-            weights[one, i, 2] += along * (1.0 - ratio) * across * u_1
-            later[i, 0], later[i, 1] = -ratio * across * u_2, ratio * across * u_1
-        if np.abs(later).max() < ROUND_OFF:
-            return
+        note[14], note[15], note[16], note[17] = (
+            ratio * u_2 * u_2,
+            -ratio * u_1 * u_2,
+            -ratio * u_1 * u_2,
+            ratio * u_1 * u_1,
+        )
+        note[2], note[3], note[4] = along * grown * u_1, along * (1.0 - note[14]), -along * note[15]
+        note[5], note[6], note[7] = along * grown * u_2, -along * note[16], along * (1.0 - note[17])
+        return c_1 + radius * u_1, c_2 + radius * u_2
+    _, x_1, x_2 = _corner(x_1, x_2, discs, one, other, -1)
+    note[1] = way.near[other]
+    u_1, u_2 = (x_1 - c_1) / radius, (x_2 - c_2) / radius
+    v_1, v_2 = (x_1 - discs[0, other]) / discs[2, other], (x_2 - discs[1, other]) / discs[2, other]
+    # discs that only just touch have a corner that moves at any speed
+    area = u_1 * v_2 - u_2 * v_1
+    area = np.copysign(max(abs(area), FLATTEST_CORNER), area)
+    for place, moved, normal in ((2, (v_2, -v_1), (u_1, u_2)), (8, (-u_2, u_1), (v_1, v_2))):
+        for row in range(2):
+            push, start = along * moved[row] / area, place + 3 * row
+            note[start], note[start + 1], note[start + 2] = push * grown, push * normal[0], push * normal[1]
+    return x_1, x_2
 
 
 @njit(cache=True)
-def _weigh_normal(
-    weight: FloatArray,
-    later: FloatArray,
-    moved: tuple[float, float],
-    normal: tuple[float, float],
-    along: float,
-    friction: float,
-) -> None:
-    """Add to the weight (2, 3) of a sample: a disc moves the place by `moved` for each unit along its normal."""
-    for i in range(2):
-        push = along * (later[i, 0] * moved[0] + later[i, 1] * moved[1])
-        weight[i, 0] += push * friction * (1.0 - INSIDE)
-        weight[i, 1] += push * normal[0]
-        weight[i, 2] += push * normal[1]
+def _meet(way: Way, along: float, x_1: float, x_2: float, note: FloatArray) -> tuple[float, float]:
+    """The point at which two discs come to touch, at a fraction of the path at which all have a very small common part,
+    and its note: the fraction, too, depends on the forces at the end.
+    """
+    _, one, other = _nearest(way, along, x_1, x_2)
+    discs, grown = way.discs, (1.0 - INSIDE) * way.friction
+    if one >= 0:
+        x_1, x_2 = _project(way, along, x_1, x_2, one, other, note)
+    one = other = -1
+    least = np.inf
+    for place in range(way.near.size):
+        room = discs[2, place] - np.hypot(x_1 - discs[0, place], x_2 - discs[1, place])
+        if room < least:
+            one, least = place, room
+    least = np.inf
+    for place in range(way.near.size):
+        toward = (x_1 - discs[0, place]) * (x_1 - discs[0, one]) + (x_2 - discs[1, place]) * (x_2 - discs[1, one])
+        room = discs[2, place] - np.hypot(x_1 - discs[0, place], x_2 - discs[1, place])
+        if toward < 0.0 and room < least:
+            other, least = place, room
+    note[:] = 0.0
+    note[0], note[1] = way.near[one], -1.0
+    if other < 0:
+        # a pair that was open, or three discs: the place goes with the first one
+        note[3] = note[7] = along
+        return x_1, x_2
+    note[1] = way.near[other]
+    between = np.hypot(discs[0, other] - discs[0, one], discs[1, other] - discs[1, one])
+    n = (discs[0, other] - discs[0, one]) / between, (discs[1, other] - discs[1, one]) / between
+    share, across = discs[2, one] / between, (-n[1], n[0])
+    # the gap of both discs closes at a rate; the derivatives of the gap are -grown, -n and -grown, n
+    i, j = way.near[one], way.near[other]
+    gap, speed_1, speed_2 = 0.0, 0.0, 0.0
+    for row in range(2):
+        # the point is that of the first disc along n; across, both centres share it
+        for k in range(2):
+            turned = share * across[row] * across[k]
+            note[3 + 3 * row + k], note[9 + 3 * row + k] = (1.0 if row == k else 0.0) - turned, turned
+        note[2 + 3 * row] = grown * n[row]
+    for k in range(3):
+        one_moves, other_moves = way.last[k, i] - way.first[k, i], way.last[k, j] - way.first[k, j]
+        gap += -grown * (one_moves + other_moves) if k == 0 else n[k - 1] * (other_moves - one_moves)
+        speed_1 += note[2 + k] * one_moves + note[8 + k] * other_moves
+        speed_2 += note[5 + k] * one_moves + note[11 + k] * other_moves
+    for k in range(3):
+        by_one, by_other = (-grown, -grown) if k == 0 else (-n[k - 1], n[k - 1])
+        for row in range(2):
+            speed = (speed_1 if row == 0 else speed_2) / gap if gap < 0.0 else 0.0
+            note[2 + 3 * row + k] = along * (note[2 + 3 * row + k] - speed * by_one)
+            note[8 + 3 * row + k] = along * (note[8 + 3 * row + k] - speed * by_other)
+    return discs[0, one] + discs[2, one] * n[0], discs[1, one] + discs[2, one] * n[1]
