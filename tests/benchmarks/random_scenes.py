@@ -115,8 +115,10 @@ def main() -> None:
         quantiles = Table("quantiles", "0.5", "0.9", "0.99", "1.0")
         for name in dict.fromkeys(name for record in records for name in record):
             values = [record[name] for record in records if isinstance(record.get(name), int | float)]
-            if values and not isinstance(values[0], bool):
-                quantiles.row(name, *np.quantile(values, (0.5, 0.9, 0.99, 1.0)).tolist())
+            known = np.array([value for value in values if not (isinstance(value, bool) or np.isnan(value))])
+            if known.size:
+                # of those with a value; one of the values, as half way to an error that is not known, inf, is no number
+                quantiles.row(name, *np.quantile(known, (0.5, 0.9, 0.99, 1.0), method="higher").tolist())
 
 
 if __name__ == "__main__":
