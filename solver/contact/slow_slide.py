@@ -8,8 +8,9 @@ next, a disc that reaches x takes it along, along its normal: the sweeping proce
     x_k = argmin |x - x_(k-1)|,   x in C(k / n),
 
 onto one disc or onto a corner of two. Where C is empty, the pair slips or opens in each period, and no place is at
-rest. When it comes to stick again, C begins as the point at which two discs touch, wherever x was before. The derivative
-by the predicted force at the end of the path is the product of those of the projections, from the last to the first.
+rest. When it comes to stick again, C begins as the point at which two discs touch, wherever x was before. The
+derivative by the predicted force at the end of the path is the product of those of the projections, from the last to
+the first.
 
 Floats and arrays only.
 """
@@ -121,7 +122,7 @@ def _weigh(note: FloatArray, later: FloatArray, weights: FloatArray) -> None:
 def _slide(
     first: FloatArray, last: FloatArray, friction: float, state: FloatArray, notes: FloatArray
 ) -> tuple[float, float, int]:
-    """State at the end of a path (3, N), and the number of its steps, which are noted (n, NOTES) where there is room."""
+    """State at the end of a path (3, N), and the number of its steps, noted (n, NOTES) where there is room."""
     n_samples = first.shape[1]
     near, margin = np.empty(n_samples, np.int64), np.empty(n_samples)
     reach = 0.0

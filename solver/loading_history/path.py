@@ -277,7 +277,7 @@ class LoadingPath(Path[State]):
     def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:
         """As in Path."""
         found = refine(ResolvedState(self.case, self.joint_of(state), state), run, node=True)
-        found = replace(with_level_above(found, run, node=True), estimate=found.estimate)
+        found = with_level_above(found, run, node=True)
         return replace(self, case=found.case), found.point, found.estimate
 
     def describe(self, state: State) -> str:

@@ -19,6 +19,7 @@ from dataclasses import astuple, replace
 import numpy as np
 
 from solver.accuracy.resolved_state import fewer, shifted
+from solver.contact.coulomb import STICK
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray, ReducedModel
@@ -207,8 +208,11 @@ class WearProblem(WearingJoint):
         return end if self.run.is_stable(self.joint_of(end), end.at) else None
 
     def held_state(self, state: WearState) -> WearState:
-        """The state with a hold of its mean position where the joint slides as a whole: else round-off moves it."""
-        hold = None if state.hold is not None else free_slide(self.joint_of(state), state.at)
+        """The state with a hold of its mean position where the joint slides as a whole in each period: else round-off
+        moves it. Where pairs stick in the period and slide slowly, this is a rescue.
+        """
+        sticks = (state.at.status_t == STICK).all(axis=1).any()
+        hold = None if state.hold is not None or sticks else free_slide(self.joint_of(state), state.at)
         return state if hold is None else replace(state, hold=hold, held_from=state.cycle)
 
     def ratio(self, state: WearState, end: WearState, length: float) -> float:

@@ -73,9 +73,9 @@ def failing(monkeypatch, fails):
     """Attempts at steps, of which some fail: schemes and lengths of all."""
     own, tried = control.attempt_step, list[tuple[str, float]]()
 
-    def attempt(work, state, length, scheme, parts):
+    def attempt(work, state, length, scheme):
         tried.append((scheme, length))
-        return None if fails(tried) else own(work, state, length, scheme, parts)
+        return None if fails(tried) else own(work, state, length, scheme)
 
     monkeypatch.setattr(control, "attempt_step", attempt)
     return tried
