@@ -3,8 +3,8 @@
 Where a branch folds, the vibration goes on in a state of another branch. Where the joint begins to slide as a whole,
 its mean position gets a soft hold in the direction without stiffness.
 
-Only friction holds a root along a prismatic slot. Where every pair slips at some time, or slides slowly, nothing determines
-the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the
+Only friction holds a root along a prismatic slot. Where every pair slips at some time, or slides slowly, nothing
+determines the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the
 slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Motion and wear change by g / F at most where a soft
 spring holds the mean position. Where g / F is no longer negligible there is no periodic state: ADRIFT.
 """
@@ -75,7 +75,8 @@ def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray
 
 def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | None:
     """Hold of the mean position of a state; None unless every pair slips at some time or has slid, or is known to drift
-    although it sticks, and the structure can slide in one direction. Masses on rigid ground have their own hold (`Penalty.mean`).
+    although it sticks, and the structure can slide in one direction. Masses on rigid ground have a hold of their own
+    (`Penalty.mean`).
     """
     if (at.stuck.any() and not drifts) or joint.law.rate_dependent:
         return None

@@ -49,14 +49,14 @@ usual = lru_cache(worn)
 
 @pytest.mark.slow
 def test_the_error_holds_where_pairs_slide_for_long_in_one_direction():
-    """The steps make the error: 80.05 mm3 with a sixteenth of their tolerance, 80.22 with a tenth."""
+    """80.05 mm3 with many short steps of one slide each: the history of such a step was 0.8 to 2.4 % off."""
     mu, pressure, frequency = 0.33563914916888354, 1.523108745024015e-11, 212.365293782595
     model, cycles, settings = dovetail(21), np.linspace(0.0, 464919.9621570562, 41), SolverSettings()
     (found,) = branch_states(model, mu, 0.7689399931298951, [2.0 * np.pi * frequency], settings, "ramp")
     history = march_wear(model, mu, found, pressure, 1000.0, "adaptive", cycles, settings)
     true = abs(float(history.worn_volume[-1]) - 80.05e-9)
-    assert 0.005 * 80.05e-9 < true < 0.04 * 80.05e-9
-    assert history.error_estimate * history.worn_volume[-1] > 0.5 * true
+    assert true < 0.002 * 80.05e-9
+    assert 0.5 * true < history.error_estimate * history.worn_volume[-1] < settings.rtol * 80.05e-9
 
 
 @pytest.mark.slow
