@@ -4,9 +4,9 @@ Where a branch folds, the vibration goes on in a state of another branch. Where 
 its mean position gets a soft hold in the direction without stiffness.
 
 Only friction holds a root along a prismatic slot. Where every pair slips at some time, or slides slowly, nothing
-determines the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean
-force g along the slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Motion and wear change by g / F at most where a soft
-spring holds the mean position. Where g / F is no longer negligible there is no periodic state: ADRIFT.
+determines the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force
+g along the slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Motion and wear change by g / F at most
+where a soft spring holds the mean position. Where g / F is no longer negligible there is no periodic state: ADRIFT.
 """
 
 from __future__ import annotations
