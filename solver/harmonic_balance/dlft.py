@@ -13,7 +13,7 @@ The wear rate of a pair depends on p of this pair alone, so that W is eliminated
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -79,6 +79,8 @@ class Balance:
 
     def linearise(self, at: Evaluation) -> Linearisation:
         """Exact derivative of the residual, Eqs. (16)-(18), including wear and the periodicity of friction."""
+        if self.first is None:
+            at = replace(at, slid=np.zeros_like(at.slid))
         force_tangent, slip_work_tangent = self.joint.law.tangent(at, self.history, self.first)
         growth_tangent = self.wearing.growth_tangent(
             self.wear_gain, worn_by(at), slip_work_tangent, force_tangent[:, 0, :]

@@ -167,6 +167,7 @@ class WearProblem(WearingJoint):
 
     def step(self, state: WearState) -> WearState | Failure:
         """The state after one step, with the largest length of the next one; or why there is none."""
+        state = self.held_state(state)
         length, shortest, steps = state.length, self._shortest(state), self.steps
         if isinstance(steps, Given):
             length = steps.length
@@ -202,7 +203,7 @@ class WearProblem(WearingJoint):
         be unstable at constant frequency.
         """
         scheme = scheme or self.steps.scheme
-        end = attempt_step(self, self.held_state(state), length, scheme)
+        end = attempt_step(self, state, length, scheme)
         if end is None or self.follow is not None or (scheme == "adaptive" and not vibrates_otherwise(end)):
             return end
         return end if self.run.is_stable(self.joint_of(end), end.at) else None
@@ -211,8 +212,12 @@ class WearProblem(WearingJoint):
         """The state with a hold of its mean position where the joint slides as a whole in each period: else round-off
         moves it. Where pairs stick in the period and slide slowly, this is a rescue.
         """
+        joint = self.joint_of(state)
+        if state.hold is not None:
+            # without force at the start of each step: the joint may have moved
+            return replace(state, hold=state.hold.moved_to(joint.to_relative(state.at.displacement_h)[:, 0]))
         sticks = (state.at.status_t == STICK).all(axis=1).any()
-        hold = None if state.hold is not None or sticks else free_slide(self.joint_of(state), state.at)
+        hold = None if sticks else free_slide(joint, state.at)
         return state if hold is None else replace(state, hold=hold, held_from=state.cycle)
 
     def ratio(self, state: WearState, end: WearState, length: float) -> float:
@@ -251,7 +256,7 @@ class WearProblem(WearingJoint):
             length = 2.0**doubling * shortest
             if state.cycle + length > self.limit:
                 break
-            end = attempt_step(self, self.held_state(state), length, "adaptive")
+            end = attempt_step(self, state, length, "adaptive")
             if end is not None and vibration_change(state.at, end.at) < SMOOTH_CHANGE:
                 return end
         self.run = before

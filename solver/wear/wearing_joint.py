@@ -202,7 +202,8 @@ class WearingJoint:
         last = self._stored
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
             case = replace(self.case, hold=state.hold).at(state.resolution)
-            self.run = self.run.fresh()
+            if last is None or state.resolution != last[0].resolution or last[0].hold is None:
+                self.run = self.run.fresh()
         elif state.omega != last[1].omega:
             case = last[0]
         else:
