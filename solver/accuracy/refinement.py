@@ -57,10 +57,11 @@ NODE_UNKNOWNS = 2800
 """Most unknowns of a node of a sweep, those of the dovetail of 48 pairs with nine harmonics. Also of a small joint:
 impacts couple all harmonics, and no preconditioner helps."""
 
-LEVEL_ABOVE_OF_NODE = 13
-"""Highest harmonic of a node by the level more than suffices. Dovetail, 48 pairs, 212.5 Hz, where a pair comes to rest
-or goes on slipping by a hair: 0.094 mm3 with 5 harmonics, 0.071 with 9 and more; 45 % are told. With 27 the sweep of an
-underplatform damper, all pairs of which slip and open, is lost."""
+HIGHEST_ABOVE = {True: 13, False: 19}
+"""Highest harmonic by the level more than suffices: of a node of a sweep, and of a history, where more take much longer.
+Dovetail, 48 pairs, 212.5 Hz, where a pair comes to rest or goes on slipping by a hair: 0.094 mm3 with nodes of 5
+harmonics, 0.071 with 9 and more; 45 % are told. With 27 the sweep of an underplatform damper, all pairs of which slip
+and open, is lost."""
 
 MOST_OF_NODE = 39
 """Highest harmonic of a node of a sweep: the point itself takes what it needs. With 235, the sweep of one friction
@@ -98,10 +99,10 @@ def refine(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedStat
 def with_level_above(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedState:
     """The state with one more level of automatic harmonics, and its estimated error; the same where it is not found.
 
-    node: as in `refine`: up to `LEVEL_ABOVE_OF_NODE`, and with the error of fewer harmonics.
+    Up to `HIGHEST_ABOVE`. node: as in `refine`; with the error of fewer harmonics.
     """
     above, settings = shifted(here.case.resolution, 1), here.case.settings
-    if node and above.highest > LEVEL_ABOVE_OF_NODE:
+    if above.highest > HIGHEST_ABOVE[node]:
         return here
     search = _Search(run, run.budget.iterations, node)
     if settings.harmonics != "auto" or nothing_happens(here.point.evaluation) or not search.allows(here, above):

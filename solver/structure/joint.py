@@ -87,10 +87,6 @@ class Hold:
     stiffness: float
     position: float
 
-    def moved_to(self, motion: FloatArray) -> Hold:
-        """The spring without force at mean relative displacements (n_rel,), m."""
-        return replace(self, position=float(self.direction @ motion))
-
     def force(self, motion: FloatArray) -> float:
         """Force of the spring, N, at mean relative displacements (n_rel,), m."""
         return self.stiffness * (float(self.direction @ motion) - self.position)

@@ -19,7 +19,6 @@ from dataclasses import astuple, replace
 import numpy as np
 
 from solver.accuracy.resolved_state import fewer, shifted
-from solver.contact.coulomb import STICK
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray, ReducedModel
@@ -37,7 +36,7 @@ from solver.wear.check import (
     vibrates_otherwise,
     wears_without_end,
 )
-from solver.wear.jump import free_slide, jump
+from solver.wear.jump import jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import (
     allowed_error,
@@ -167,7 +166,6 @@ class WearProblem(WearingJoint):
 
     def step(self, state: WearState) -> WearState | Failure:
         """The state after one step, with the largest length of the next one; or why there is none."""
-        state = self.held_state(state)
         length, shortest, steps = state.length, self._shortest(state), self.steps
         if isinstance(steps, Given):
             length = steps.length
@@ -190,8 +188,8 @@ class WearProblem(WearingJoint):
         end, follow = replace(taken[0], length=taken[1]), self.follow
         if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
             return self.lost(end)
-        failure = too_long(self, state, end.depth, end.cycle - state.cycle) if self.guide is None else None
-        return failure or end
+        given = self.guide is None and isinstance(steps, Given)
+        return (too_long(self, state, end.depth, end.cycle - state.cycle) if given else None) or end
 
     def _shortest(self, state: WearState) -> float:
         """Shortest adaptive step, cycles: the accuracy to which the end of a branch is located."""
@@ -200,25 +198,16 @@ class WearProblem(WearingJoint):
     def attempt(self, state: WearState, length: float, scheme: Scheme | None = None) -> WearState | None:
         """As in SteppedProblem. scheme: another one than that of the steps. A step ends in a stable state, which is
         tested after each Euler step, and where the vibration has changed since the last test; a followed resonance may
-        be unstable at constant frequency.
+        be unstable at constant frequency. An adaptive step that is `too_long` becomes shorter.
         """
         scheme = scheme or self.steps.scheme
         end = attempt_step(self, state, length, scheme)
+        adapts = isinstance(self.steps, Adaptive) and self.guide is None
+        if end is not None and adapts and too_long(self, state, end.depth, length) is not None:
+            return None
         if end is None or self.follow is not None or (scheme == "adaptive" and not vibrates_otherwise(end)):
             return end
         return end if self.run.is_stable(self.joint_of(end), end.at) else None
-
-    def held_state(self, state: WearState) -> WearState:
-        """The state with a hold of its mean position where the joint slides as a whole in each period: else round-off
-        moves it. Where pairs stick in the period and slide slowly, this is a rescue.
-        """
-        joint = self.joint_of(state)
-        if state.hold is not None:
-            # without force at the start of each step: the joint may have moved
-            return replace(state, hold=state.hold.moved_to(joint.to_relative(state.at.displacement_h)[:, 0]))
-        sticks = (state.at.status_t == STICK).all(axis=1).any()
-        hold = None if sticks else free_slide(joint, state.at)
-        return state if hold is None else replace(state, hold=hold, held_from=state.cycle)
 
     def ratio(self, state: WearState, end: WearState, length: float) -> float:
         """As in SteppedProblem: an Euler step counts whatever its error, the shortest adaptive step where the vibration

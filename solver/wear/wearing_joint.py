@@ -202,8 +202,7 @@ class WearingJoint:
         last = self._stored
         if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
             case = replace(self.case, hold=state.hold).at(state.resolution)
-            if last is None or state.resolution != last[0].resolution or last[0].hold is None:
-                self.run = self.run.fresh()
+            self.run = self.run.fresh()
         elif state.omega != last[1].omega:
             case = last[0]
         else:
