@@ -79,7 +79,7 @@ class Balance:
 
     def linearise(self, at: Evaluation) -> Linearisation:
         """Exact derivative of the residual, Eqs. (16)-(18), including wear and the periodicity of friction."""
-        if self.first is None:
+        if self.first is None and at.slid.any():
             at = replace(at, slid=np.zeros_like(at.slid))
         force_tangent, slip_work_tangent = self.joint.law.tangent(at, self.history, self.first)
         growth_tangent = self.wearing.growth_tangent(
