@@ -59,7 +59,7 @@ impacts couple all harmonics, and no preconditioner helps."""
 
 HIGHEST_ABOVE = {True: 13, False: 19}
 """Highest harmonic by the level more than suffices: of a node of a sweep, and of a history; with more histories take
-much longer. Dovetail, 48 pairs, 212.5 Hz, where a pair comes to rest or goes on slipping by a hair: 0.094 mm3 with nodes
+much longer. Dovetail, 48 pairs, 212.5 Hz, where a pair comes to rest or slips on by a hair: 0.094 mm3 with nodes
 of 5 harmonics, 0.071 with 9 and more; 45 % are told. With 27 the sweep of an underplatform damper, all pairs of which
 slip and open, is lost."""
 
