@@ -97,7 +97,8 @@ def refine(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedStat
 
 
 def with_level_above(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedState:
-    """The state with one more level of automatic harmonics, and its estimated error; the same where it is not found.
+    """The state with one more level of automatic harmonics, and its estimated error; the same where it is not found, or
+    its error is not known to be smaller.
 
     Up to `HIGHEST_ABOVE`. node: as in `refine`; with the error of fewer harmonics.
     """
@@ -110,7 +111,9 @@ def with_level_above(here: ResolvedState, run: Run, *, node: bool = False) -> Re
     found = here.solve_at(above, run)
     if found is None:
         return here
-    return replace(found, estimate=here.estimate if node else search.estimate(found), accurate=here.accurate)
+    estimate = here.estimate if node else search.estimate(found)
+    better = node or estimate.largest < here.estimate.largest
+    return replace(found, estimate=estimate, accurate=here.accurate) if better else here
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from solver.settings import NEGLIGIBLE, Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.jump import creeps, free_slide
 from solver.wear.slow_time import Course
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.wearing_joint import Adaptive, WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
 """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
@@ -112,9 +112,11 @@ def choose_anew(wearing: WearingJoint, state: WearState) -> WearState | Failure:
 
 def at_level_above(wearing: WearingJoint, state: WearState, here: ResolvedState | None = None) -> WearState | Failure:
     """The state with one level of harmonics more than suffices, so that the reference solution may have those that do;
-    here: with those, where they are not those of the state.
+    here: with those, where they are not those of the state. Given steps have no reference solution of their own.
     """
-    here = with_level_above(here or _resolved(wearing, state), wearing.run)
+    here = here or _resolved(wearing, state)
+    if isinstance(wearing.request.steps, Adaptive):
+        here = with_level_above(here, wearing.run)
     resolution, point = here.case.resolution, here.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
     state = replace(state, estimate=here.estimate, accurate=here.accurate)
