@@ -112,10 +112,11 @@ def choose_anew(wearing: WearingJoint, state: WearState) -> WearState | Failure:
 
 def at_level_above(wearing: WearingJoint, state: WearState, here: ResolvedState | None = None) -> WearState | Failure:
     """The state with one level of harmonics more than suffices, so that the reference solution may have those that do;
-    here: with those, where they are not those of the state. Given steps have no reference solution of their own.
+    here: with those, where they are not those of the state. A history with given steps has no reference solution of
+    its own, and one without wear none at all.
     """
     here = here or _resolved(wearing, state)
-    if isinstance(wearing.request.steps, Adaptive):
+    if isinstance(wearing.request.steps, Adaptive) and state.wears and wearing.request.end > 0.0:
         here = with_level_above(here, wearing.run)
     resolution, point = here.case.resolution, here.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
