@@ -88,7 +88,7 @@ def test_the_derivative_is_that_of_differences():
         path = Path(*((part @ BASIS.synthesis)[None] for part in (first, last)), np.array([FRICTION]), state[None])
         exact = np.zeros((1, 2, 3 * first.shape[1]))
         slide_tangent(np.array([0]), path, BASIS.synthesis, exact)
-        for index in np.random.default_rng(0).integers(exact.shape[2], size=3):
+        for index in np.random.default_rng(0).integers(exact.shape[2], size=8):
             change = np.zeros_like(last)
             change.flat[index] = 1e-6
             sides = [slid(path.first[0], (last + sign * change) @ BASIS.synthesis, state) for sign in (1.0, -1.0)]
@@ -96,8 +96,8 @@ def test_the_derivative_is_that_of_differences():
                 error = np.abs((sides[0] - sides[1]) / 2e-6 - exact[0, :, index]).max()
                 agreed, others = agreed + (error < 1e-4), others + (error >= 1e-4)
     # a difference may go over a corner of the path
-    assert agreed >= 20
-    assert others <= 0.1 * agreed
+    assert agreed >= 50
+    assert others <= 0.02 * agreed
 
 
 @pytest.mark.slow
