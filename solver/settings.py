@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from solver.packing import packable
@@ -35,9 +35,13 @@ FINE_SAMPLES = 2048
 """Points of a period in the search for a missed event and for the largest response: a sine can exceed a limit between
 them by 1e-6 only, and a peak of harmonic 20 is found to 0.05 %."""
 
-ROUGH_SHARE = 1e-3
-"""Largest residual of a state that is no result, over rtol. With a tenth and ten times this value the motion of the
-dovetail is equal to 1e-4; with the tolerance of a result nodes take 1.4 times the iterations."""
+ROUGH_SHARE = 1e-4
+"""Largest residual of a state that is no result, over rtol. Dovetail, 16 pairs, 212.42 Hz: with ten times this value
+sweeps in fine steps come to motions that differ by 0.8 %, with this one they agree within 2e-5."""
+
+STEP_SHARE = 1e-3
+"""Largest residual of a state of an adaptive history, over rtol. Steps err by 100 times as much. Dovetail, 16 and 48
+pairs: volumes equal to 2e-4, and 0.7 times the iterations of states with a residual of 1e-8."""
 
 Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
@@ -139,8 +143,13 @@ class SolverSettings:
 
     @property
     def rough_tolerance(self) -> float:
-        """Tolerance of a state that is no result: on the way of a sweep, in a comparison, of a reference solution."""
+        """Tolerance of a state that is no result: on the way of a sweep, or in a comparison."""
         return max(self.tolerance, ROUGH_SHARE * self.rtol)
+
+    @property
+    def of_steps(self) -> SolverSettings:
+        """The settings of the states of an adaptive history, whose tolerance follows from the error of its steps."""
+        return replace(self, tolerance=max(self.tolerance, STEP_SHARE * self.rtol))
 
 
 @packable

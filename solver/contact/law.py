@@ -216,18 +216,6 @@ class ContactLaw:
         """The history (n_contact, 2), m, with which the periods of a state begin after the way from another history."""
         return np.where(at.slid[:, None], at.start / self.state_stiffness[:, None], history)
 
-    def history_at_rest(self, at: Marched, history: FloatArray) -> FloatArray:
-        """The history for a next state in which pairs that slip now may stick: the middle of their slip in closed
-        samples, at which a range of slip that shrinks ends. Behind the resonance of the dovetail the motion after a
-        sweep is 0.5 % wrong with the middle, and 2.3 % with `final_history`.
-        """
-        slips = (at.status_t == SLIP).any(axis=1) & ~self.penalty.inertial
-        closed, slip = (at.status_t[slips] != SEPARATED)[:, None, :], at.state_t[slips, :, 1:]
-        low, high = np.where(closed, slip, np.inf).min(axis=2), np.where(closed, slip, -np.inf).max(axis=2)
-        middle = history.copy()
-        middle[slips] = 0.5 * (low + high) / self.penalty.tangential[slips, None]
-        return middle
-
     def history_from(self, other: Penalty, history: FloatArray, mean: FloatArray, last: FloatArray) -> FloatArray:
         """The history of a state with another penalty.
 

@@ -17,9 +17,6 @@ from solver.structure.condensation import SingularStructureError, build_structur
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
 from solver.structure.joint import Case, Joint
 
-BalanceAt = Callable[[float, FloatArray], Balance]
-"""The balance at a value of a parameter for a tangential history (n_contact, 2), m."""
-
 
 @packable
 @dataclass(frozen=True)
@@ -41,6 +38,10 @@ class Failure(Ended):
 
     outcome: Outcome
     message: str
+
+
+BalanceAt = Callable[[float, State], Balance]
+"""The balance at a value of a parameter, to which a joint comes from a state before."""
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:

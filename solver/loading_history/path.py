@@ -176,9 +176,9 @@ class LoadingPath(Path[State]):
         """As in Path."""
         return self.joint_at(state.parameter)
 
-    def balance_at(self, parameter: float, history: FloatArray) -> Balance:
-        """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
-        return Balance(self.joint_at(parameter), history)
+    def balance_at(self, parameter: float, before: State) -> Balance:
+        """Unworn balance at a value of the parameter, to which the joint comes slowly from a state before."""
+        return Balance(self.joint_at(parameter), before.history, first=before.evaluation.predicted_t)
 
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""
@@ -193,21 +193,22 @@ class LoadingPath(Path[State]):
         for place, state in enumerate(states):
             others = np.delete(at, place)
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
-        history = self.joint_at(target).law.history_at_rest(start.evaluation, start.history)
-        return self.near(replace(start, parameter=target), begin, history, run)
+        return self._stable(self.balance_at(target, start), begin, target, run)
 
     def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:
         """As in Path."""
-        balance = self.balance_at(state.parameter, history)
-        found = run.state(balance, predicted_h, state.parameter, NEAR_ITERATIONS)
+        return self._stable(Balance(self.joint_of(state), history), predicted_h, state.parameter, run)
+
+    def _stable(self, balance: Balance, predicted_h: FloatArray, parameter: float, run: Run) -> State | None:
+        """Stable state of a balance near a predicted force (n_rel, m), N; None where not found."""
+        found = run.state(balance, predicted_h, parameter, NEAR_ITERATIONS)
         return found if found is not None and run.is_stable(balance.joint, found.evaluation) else None
 
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Failure:
         """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the
         machine; both in turns until the target.
         """
-        state = replace(start, history=self.joint_of(start).law.history_at_rest(start.evaluation, start.history))
-        fine, folds = FREE_STEP * (target if self.omega is None else 1.0), list[float]()
+        state, fine, folds = start, FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
             if arrived and run.is_stable(self.joint_of(end), end.evaluation):

@@ -260,6 +260,7 @@ class FrequencySweep:
             fold_frequency=float(fold),
             unjudged="" if unstable is None else unstable.message,
             reference=None if reference is None else periodic_state(joint, reference),
+            by_resolution=found.estimate,
         )
 
 
@@ -305,8 +306,8 @@ def _resonance_between(
         return None
     part = 0.0 if step.folds else one / (one - other)
     joint = path.case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
-    balance = Balance(joint, joint.law.history_at_rest(here.evaluation, here.history))
-    before = here.evaluation.predicted_h
+    before, first = here.evaluation.predicted_h, here.evaluation.predicted_t
+    balance = Balance(joint, here.history, first=first)
     run = Run(sweeps.settings.tolerance, Budget(deadline=sweeps.run.budget.deadline))
     start = before + part * (ahead.evaluation.predicted_h - before)
     found = solve_at_lag(path.case, balance, start, 0.5 * math.pi, run)

@@ -4,19 +4,20 @@ Friction gives a joint a family of periodic states. The tangential displacements
 and these depend on all vibration before. So a sweep has nodes of its own, whose distance depends only on the change of
 the vibration. A state between two nodes is solved from the node before and leaves the sweep unchanged.
 
-The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
-slip, up to one step too early. A reference sweep has a node in the middle of every third step, as with common nodes
-both might keep one history too early, and harmonics one level lower where these are automatic. The difference of both
-is at least half the error of the finer one. The reference begins where pairs slip or open, and anew behind a fold and
-where each pair slips or opens within the period: such a state follows from its parameter alone.
+The error of a sweep comes from its steps: from node to node the predicted force goes along a straight line, and pairs
+slide as it says (`solver.contact.slow_slide`). A reference sweep has a node in the middle of every second step, and
+harmonics one level lower where these are automatic. The reference begins where pairs slip or open, and anew behind a
+fold and where each pair slips or opens within the period: such a state follows from its parameter alone.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic
+
+import numpy as np
 
 from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
@@ -43,9 +44,12 @@ NODE_ITERATIONS = 5 * SWEEP_ITERATIONS // 16
 ITERATIONS_PER_SAVE = 100
 """Newton iterations after which a sweep is saved at its next node: 1 s of 48 pairs, 17 s of 336."""
 
-STEPS_OF_REFERENCE = 3
-"""Steps of a sweep in one step of its reference. With two, the difference of both may be a quarter of the error
-(dovetail of 16 pairs, 213.25 Hz, nine harmonics)."""
+STEPS_OF_REFERENCE = 2
+"""Steps of a sweep in one step of its reference: the errors of both are of second order in the step, and their
+difference is three times the smaller one."""
+
+PARTS_TO_POINT = (1, 4)
+"""Parts of the way from the last node of a reference sweep to a point: more where the point is not found at once."""
 
 
 @packable
@@ -119,9 +123,13 @@ class Sweep(Generic[S]):
         """A state of a path with the tangential history that the reference sweep leaves; None where there is none."""
         if self.here is None or self.reference is None:
             return None
-        of, node = self.path.at(self.reference.resolution), self.reference.states[-1]
-        at = replace(node.evaluation, history=of.joint_of(node).law.history_at_rest(node.evaluation, node.history))
-        history = carried_history(of.case, path.joint_of(state), at)
+        of, begin = self.path.at(self.reference.resolution), self.reference.states[-1].parameter
+        # over states in between where the last part is too long
+        ways = (np.linspace(begin, state.parameter, n + 1)[1:].tolist() for n in PARTS_TO_POINT)
+        led = next(filter(None, (_through(of, self.reference.states, way, run.fresh()) for way in ways)), None)
+        if led is None:
+            return None
+        history = carried_history(of.case, path.joint_of(state), replace(led[-1].evaluation, history=led[-1].history))
         own, fresh, here, done, part = state.evaluation.history, run.fresh(), state, 0.0, 1.0
         # over states in between where the whole difference is too much at once
         while done < 1.0 and part >= SHORTEST_STEP:
@@ -238,9 +246,7 @@ class Sweep(Generic[S]):
             moved = self.path.at(nodes.resolution).move(states[-1], path, self.run)
             states = () if moved is None else (moved,)
         run = self._reference_run.with_tolerance(path.case.settings.rough_tolerance)
-        for target in targets:
-            found = path.solve(states, target, run) if states else None
-            states = () if found is None else (*states, found)[-LAST_NODES:]
+        states = _through(path, states, targets, run)
         return ReferenceNodes(path.case.resolution, states) if states else None
 
     def _choose_resolution(self) -> float:
@@ -260,3 +266,11 @@ class Sweep(Generic[S]):
         others = {"resolution": self.path.case.resolution, "iterations": self.budget.iterations}
         self.load(in_rows({name: vars(self)[name] for name in _SAVED} | others))
         self.save()
+
+
+def _through(path: Path[S], states: tuple[S, ...], targets: Sequence[float], run: Run) -> tuple[S, ...]:
+    """The last states of a path that goes on from some over some targets; none where one of these is not found."""
+    for target in targets:
+        found = path.solve(states, target, run) if states else None
+        states = () if found is None else (*states, found)[-LAST_NODES:]
+    return states

@@ -269,4 +269,4 @@ def _judged(mission: MissionRequest, state: MissionState, history: MissionHistor
         name, rate = mission.called(int(place)), history.sweep_rate[place]
         passes = f"passes at {rate:.2g} (zeta f)^2" if np.isfinite(rate) else "has no damping where the joint sticks"
         passages.append(f"{name} {passes}: it may wear otherwise than its steady states (see the error)")
-    return verdict(history.error_estimate, uncertain, about_state, cut_off, about_hold, *passages)
+    return verdict(history.error_estimate, rtol, uncertain, about_state, cut_off, about_hold, *passages)

@@ -103,13 +103,14 @@ class NonlinearMode(Path[ModeState]):
         history: FloatArray,
         run: Run,
         most: int = MOST_ITERATIONS,
+        first: FloatArray | None = None,
     ) -> ModeState | None:
         """The mode at an amplitude a, m sqrt(kg); None where Newton's method fails.
 
-        start: first predicted force (n_rel, 2H+1), N, and values (3,). history (n_contact, 2): tangential history, m.
+        start: first predicted force (n_rel, 2H+1), N, and values (3,). history, first: as in `Balance`.
         most: iterations.
         """
-        found = run.solve_bordered(_AtAmplitude(self, amplitude, history), *start, most)
+        found = run.solve_bordered(_AtAmplitude(self, amplitude, history, first), *start, most)
         # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states; below
         # frequency 0 there is the mode once more, backwards
         if found is None or abs(found.values[1]) > 1.0 or found.values[0] <= 0.0:
@@ -127,7 +128,7 @@ class NonlinearMode(Path[ModeState]):
         Nodes, too, are solved to the tolerance of results: otherwise the dovetail comes to another branch.
         """
         here, run = states[-1], run.with_tolerance(self.case.settings.tolerance)
-        history = self.joint_of(here).law.history_at_rest(here.evaluation, here.history)
+        history, first = here.history, here.evaluation.predicted_t
         last = here.evaluation.predicted_h
         growth = target / here.parameter
         grown = np.concatenate([last[:, :1], growth * last[:, 1:]], axis=1)
@@ -136,7 +137,7 @@ class NonlinearMode(Path[ModeState]):
             ratio = (target - here.parameter) / (here.parameter - states[-2].parameter)
             change = last - states[-2].evaluation.predicted_h
             starts.insert(0, (last + ratio * change, here.values + ratio * (here.values - states[-2].values)))
-        found = (self.find(target, start, history, run, NEAR_ITERATIONS) for start in starts)
+        found = (self.find(target, start, history, run, NEAR_ITERATIONS, first) for start in starts)
         return next((state for state in found if state is not None), None)
 
     def change(self, before: ModeState, after: ModeState) -> float:
@@ -208,9 +209,10 @@ class _AtAmplitude:
     mode: NonlinearMode
     amplitude: float
     history: FloatArray
+    first: FloatArray | None
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        balance = Balance(self.mode.joint_with(values), self.history)
+        balance = Balance(self.mode.joint_with(values), self.history, first=self.first)
         at = balance.evaluate(predicted_h)
         shape = _shape(balance.joint, at.displacement_h, float(values[2]))
         real, imaginary, square = self._products(shape, shape)

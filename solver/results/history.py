@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from solver.accuracy.resolved_state import Estimate
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray
 from solver.outcome import SENSITIVE_ERROR, Ended, Outcome, in_digits, known_to
 from solver.packing import packable
@@ -53,6 +54,7 @@ class StartState(Ended):
     message: why there is no state, or what is above rtol; or how far a sweep came.
     unjudged: why it is not known whether the state is stable, else "".
     reference: state of the reference sweep, solved with the resolution of the state; None where there is none.
+    by_resolution: the errors by harmonics and samples alone; None where these are all.
     """
 
     outcome: Outcome
@@ -68,6 +70,7 @@ class StartState(Ended):
     message: str = ""
     unjudged: str = ""
     reference: PeriodicState | None = None
+    by_resolution: Estimate | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -96,6 +99,7 @@ class WearHistory(Ended, Presented):
     - inaccurate_from, inaccurate_in, inaccurate_error: count from which on the error of a state is above rtol, inf if
       never; name of the result, and its largest error from there on.
     - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
+    - adaptive: whether its steps were chosen to keep rtol.
     - unjudged: why it is not known whether the first or the last vibration is stable; "" where both are.
     - step_limit: largest stable explicit step at the first state that wears, cycles; or inf.
     - newton_iterations, run_time, CPU seconds: both with those of the start state. branch, fold_frequency: of it.
@@ -148,6 +152,7 @@ class WearHistory(Ended, Presented):
     inaccurate_in: str = ""
     inaccurate_error: float = 0.0
     held_from: float = math.inf
+    adaptive: bool = False
     unjudged: str = ""
 
 
@@ -176,21 +181,25 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
             f"from cycle {in_digits(history.held_from / slower)} on every pair slips and only friction holds the joint"
             f" in one direction: its mean position is held there, by at most {HELD_FORCE:g} of the friction"
         )
-    outcome, message = verdict(error, uncertain, inaccurate, cut_off, held, history.unjudged)
+    most = rtol if history.adaptive else math.inf
+    outcome, message = verdict(error, most, uncertain, inaccurate, cut_off, held, history.unjudged)
     return Outcome.INACCURATE if history.unjudged and outcome is Outcome.CONVERGED else outcome, message
 
 
-def verdict(error: float, uncertain: str, inaccurate: str, cut_off: str, *notes: str) -> tuple[Outcome, str]:
+def verdict(
+    error: float, most: float, uncertain: str, inaccurate: str, cut_off: str, *notes: str
+) -> tuple[Outcome, str]:
     """Outcome of a complete history of wear or of missions, and its sentence.
 
-    error: of the last worn volume, relative; uncertain: sentence in case it is too large or not known. The other
-    sentences are "" where there is nothing to say: about states above rtol, about a contact that is cut off, additions.
+    error: of the last worn volume, relative; most: the one at which the steps aim, inf for given steps. uncertain:
+    sentence in case the error is larger or not known. The other sentences are "" where there is nothing to say: about
+    states above rtol, about a contact that is cut off, additions.
     """
     if cut_off:
         return Outcome.CONTACT_CUT_OFF, cut_off
     if SENSITIVE_ERROR < error < math.inf:
         return Outcome.SENSITIVE, "; ".join(filter(None, (uncertain, *notes)))
-    reasons = (uncertain if math.isinf(error) else "", inaccurate)
+    reasons = (uncertain if error > most or math.isinf(error) else "", inaccurate)
     outcome = Outcome.INACCURATE if any(reasons) else Outcome.CONVERGED
     return outcome, "; ".join(filter(None, (*reasons, *notes)))
 

@@ -108,12 +108,9 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
 
     depth, volume = values["wear_depth"], values["wear_depth"] @ area
     error = largest(lambda both: _apart(both, "wear_depth") @ area)
-    # the error of the start state remains, even where later states agree by chance: its rates, pair by pair
-    rate, other = (rates[0] * area for rates in (values["depth_rate"], outputs.other("depth_rate")))
-    known = rate.sum() > 0.0 and np.isfinite(other).all()
-    at_start = max(np.abs(rate - other).sum() / rate.sum() if known else 0.0, values["wear_rate_error"][0])
-    # start state and steps have nothing to do with each other: the worst case is their sum
-    error = np.maximum(error, absolute(at_start, volume) + values["local"])
+    # the error of the start state remains, even where later states agree by chance; start state and steps have nothing
+    # to do with each other: the worst case is their sum
+    error = np.maximum(error, absolute(values["wear_rate_error"][0], volume) + values["local"])
     # a pair that agrees with the reference solution better than the volume does so by chance (dovetail, 211.25 Hz: else
     # 5 of 24 deep pairs are outside of their errors, by seven times); the error of the volume is smaller than that of
     # its independent pairs by the root of the number of equal pairs that would share the volume

@@ -127,6 +127,7 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
         reference_volume=both.other("wear_depth") @ area,
         error_estimate=last_error(counts, error.worn_volume, values["wear_rate"], last_cycle),
         last_cycle=last_cycle,
+        adaptive=isinstance(request.steps, Adaptive),
         branch=start.branch,
         fold_frequency=start.fold_frequency,
         cycles_to_target=target,

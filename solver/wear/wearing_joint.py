@@ -15,12 +15,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.accuracy.resolved_state import NOTHING, Estimate, left_out
+from solver.accuracy.resolved_state import NOTHING, UNKNOWN, Estimate, left_out
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
-from solver.harmonic_balance.state import Failure, State, final_history
+from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
 from solver.model import FloatArray
 from solver.newton.run import MOST_ITERATIONS, Run
 from solver.outcome import Outcome, in_digits
@@ -189,6 +189,8 @@ class WearingJoint:
 
     def __init__(self, case: Case, start: StartState, request: WearRequest) -> None:
         assert start.state is not None
+        if isinstance(request.steps, Adaptive):
+            case = replace(case, settings=case.settings.of_steps)
         self.case, self.start, self.request, self.follow = case, start, request, request.follow
         self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude
         self.area = case.model.contact.area
@@ -233,7 +235,7 @@ class WearingJoint:
             State(at, final_history(balance, at)),
             start.resolution,
             left_out(start.resolution.orders, at),
-            Estimate(start.response_error, start.wear_rate_error),
+            start.by_resolution or Estimate(start.response_error, start.wear_rate_error),
             accurate=start.outcome is Outcome.CONVERGED,
             rate=nothing,
             rates=nothing,
@@ -243,22 +245,18 @@ class WearingJoint:
         )
         return self.with_rates(state)
 
-    def unworn_state_of_reference(self) -> WearState:
-        """The unworn state of the reference solution.
-
-        The state of the reference sweep has another tangential history, which may decide whether a pair goes on
-        slipping while the joint wears. So the state is solved with twice the difference (dovetail, 212.5 Hz: 0.082 or
-        0.106 mm3; both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep
-        is taken.
+    def sweep_error(self) -> Estimate:
+        """Errors of the start state by its sweep: the differences of vibration and wear rates, pair by pair, to the
+        state of the reference sweep; unknown where a reference sweep was lost.
         """
-        own, reference = self.unworn, self.start.reference
-        state = self.unworn_state(reference)
+        start, reference = self.start, self.start.reference
         if reference is None:
-            return state
-        history = own.start_history + 2.0 * (reference.start_history - own.start_history)
-        balance = replace(self.balance_of(state), history=history)
-        point = self.run.state(balance, state.at.predicted_h, most=NEAR_ITERATIONS)
-        return state if point is None else self.with_rates(replace(state, point=point))
+            lost = start.by_resolution is not None and math.isinf(start.wear_rate_error)
+            return UNKNOWN if lost else NOTHING
+        own, other = self.unworn_state(), self.unworn_state(reference)
+        whole = float(own.rates[-1])
+        rate = float(np.abs(own.rates - other.rates)[:-1].sum()) / whole if whole > 0.0 else 0.0
+        return Estimate(vibration_change(own.at, other.at), rate)
 
     def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, Eqs. (7), (21), (25)."""
