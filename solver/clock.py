@@ -1,7 +1,5 @@
 """CPU time of a computation, without the time in which kernels are compiled or loaded from the cache."""
 
-from __future__ import annotations
-
 import threading
 import time
 

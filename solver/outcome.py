@@ -3,8 +3,6 @@
 How well its result is known: an error that is not known is inf.
 """
 
-from __future__ import annotations
-
 import math
 import traceback
 from enum import IntEnum

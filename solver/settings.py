@@ -1,7 +1,5 @@
 """Numerical settings of the solver, all with defaults."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal, get_args

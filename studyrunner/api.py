@@ -1,7 +1,5 @@
 """Studies in Python: read one, run it in this process, open a result. For use as `studyrunner.run_study` and so on."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path

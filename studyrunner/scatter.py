@@ -3,8 +3,6 @@
 By hand: a column of `scipy.stats.qmc` depends on the number of columns; its plain Sobol' sequence is used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
@@ -204,7 +202,7 @@ def flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def draw(
-    section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ContactInterface | None = None
+    section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: "ContactInterface | None" = None
 ) -> dict[str, Array]:
     """What the samples draw of each input that is the same for all pairs, (samples,) or (n_values, samples) of an axis;
     with pairs of each input that belongs to them, (samples, n_pairs). Without width the study's own values, exactly.
@@ -239,7 +237,7 @@ def draw(
     return found
 
 
-def _field(name: str, length: float, pairs: ContactInterface) -> Array:
+def _field(name: str, length: float, pairs: "ContactInterface") -> Array:
     """Factor L (n_pairs, n_pairs) of a Gaussian field L z of unit variance, z independent.
 
     Correlation exp(-(r / length)^2 / 2) of two pairs of a surface at the distance r; surfaces are independent.

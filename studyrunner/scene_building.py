@@ -4,8 +4,6 @@ They are stored in the file of the run. A task brings the model to a rank that d
 ranks map (`write_mapped`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
@@ -55,7 +53,7 @@ def hold_models(cache: ModelCache[Models], scenes: tuple[int, ...], models: Mode
 class SceneModels:
     """Rank 0: which rank has which models (`ModelCache`), and the files of models in use."""
 
-    def __init__(self, read: Callable[[int], ReducedModel], beside: Path) -> None:
+    def __init__(self, read: Callable[[int], "ReducedModel"], beside: Path) -> None:
         """read: the model of a scene. beside: the file that the files of models stand beside."""
         self._read = read
         self._beside = beside
@@ -76,7 +74,7 @@ class SceneModels:
             self._files.pop(number).path.unlink(missing_ok=True)
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
-    def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
+    def _hand(self, rank: int, number: int) -> "ReducedModel | MappedFile":
         if rank in self._blind:
             return self._read(number)
         if number not in self._files:
@@ -182,7 +180,7 @@ class _Building(TaskHandler):
     def tick(self, running: object) -> None:  # noqa: ARG002
         self._store.tick()
 
-    def read(self, number: int) -> ReducedModel:
+    def read(self, number: int) -> "ReducedModel":
         """The model of a scene. Raises RuntimeError where it is no longer there."""
         packed = self.found[number].model
         key, model = self._keys[number], None if packed is None else unpack_model(packed)

@@ -1,7 +1,5 @@
 """The tasks of a study while they are done: by any rank its own, and on rank 0 the state of all of them."""
 
-from __future__ import annotations
-
 from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -43,7 +41,7 @@ def evaluator() -> Run:
     return evaluate
 
 
-def _compute(task: Task, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[Result]:
+def _compute(task: Task, models: Mapping[int, "ReducedModel"], keep: Keep) -> Iterator[Result]:
     """All results of a task, failed ones in place of those that it does not give."""
     left, last, is_limited = dict.fromkeys(task.places), task.resume, False
 

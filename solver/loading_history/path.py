@@ -7,8 +7,6 @@ joint least, so that no sweep begins at a resonance. It depends on the scene and
 a study.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace

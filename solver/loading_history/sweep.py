@@ -11,8 +11,6 @@ is at least half the error of the finer one. The reference begins where pairs sl
 where each pair slips or opens within the period: such a state follows from its parameter alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """One mission history: the problem over the slow time, comparison with the reference solution, outcome."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -8,8 +8,6 @@ the drive Q of the modal model (`modal_model`), and with the further equations
 the spring on the modal coordinate has no force, which also fixes the phase; and the amplitude a is given.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self, cast
@@ -177,7 +175,7 @@ class ResolvedMode(ResolvedState):
 
     mode: NonlinearMode
 
-    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedMode | None:  # noqa: ARG002
+    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> "ResolvedMode | None":  # noqa: ARG002
         """As in ResolvedState."""
         other = self.mode.at(resolution)
         found = self.mode.move(cast("ModeState", self.point), other, run)
@@ -190,7 +188,7 @@ class ResolvedMode(ResolvedState):
         found = self.solve_at(shifted(self.case.resolution, 2), run)
         return ([], False) if found is None else ([found], True)
 
-    def at_rest(self, _: Run) -> ResolvedMode:
+    def at_rest(self, _: Run) -> Self:
         """As in ResolvedState: the mode itself says where its masses rest."""
         return self
 

@@ -4,8 +4,6 @@ The errors of frequency and damping are, as those of a start state, the change w
 safety factor, and the change with the tangential history that the reference sweep leaves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ into those of the pairs (r) and all others (i),
     Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = f_r - A_ri A_ii^-1 f_i.                                         (8)
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass

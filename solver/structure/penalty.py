@@ -9,8 +9,6 @@ with the stiffness Z_n of the structure and the penalty E_n. So E_n has to be ne
   mass dominates in the harmonics that are left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

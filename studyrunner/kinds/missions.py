@@ -1,7 +1,5 @@
 """Mission histories: tasks and their computation."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -34,7 +32,7 @@ class PlannedBlock:
     cycles: float
     begin: Begin
 
-    def as_block(self, model: ReducedModel) -> Block:
+    def as_block(self, model: "ReducedModel") -> Block:
         """The block as the solver takes it. model: of the joint."""
         cycles, friction = None if isinstance(self.frequency, Passage) else self.cycles, self.joint.friction_coefficient
         return Block(model, self.frequency, self.excitation_amplitude, friction, cycles, self.begin, self.name)
@@ -61,7 +59,7 @@ class Mission(tasks.Task):
         wear = (self.wear_coefficient, self.law, self.first, self.settings)
         return (tasks.digest("mission", blocks, wear, self.missions, self.until, identity.record),)
 
-    def compute(self, models: Mapping[int, ReducedModel], keep: tasks.Keep) -> Iterator[tasks.PointResult]:
+    def compute(self, models: Mapping[int, "ReducedModel"], keep: tasks.Keep) -> Iterator[tasks.PointResult]:
         """The history."""
         # numba is loaded where a task runs, so that --plan and --help do without it
         from solver.missions.history import integrate_missions

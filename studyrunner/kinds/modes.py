@@ -1,7 +1,5 @@
 """Nonlinear modes: tasks and their computation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, cast
@@ -41,7 +39,7 @@ class Mode(tasks.Task):
         own = (identity.joint(self.joint), self.mode, self.direction, self.settings, identity.record)
         return tuple(tasks.digest("mode", *own, amplitude) for amplitude in self.amplitudes)
 
-    def compute(self, models: Mapping[int, ReducedModel], keep: tasks.Keep) -> Iterator[tasks.PointResult]:
+    def compute(self, models: Mapping[int, "ReducedModel"], keep: tasks.Keep) -> Iterator[tasks.PointResult]:
         """Points of the mode."""
         del keep
         from solver.modes.points import follow_mode

@@ -3,8 +3,6 @@
 There are four kinds of tasks: `Sweep` and `History` (`wear`), `Mode` (`modes`), `Mission` (`missions`).
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import json
@@ -52,7 +50,7 @@ class TaskJoint:
     friction_coefficient: float | None
     contact: ContactChange = ()
 
-    def model(self, models: Mapping[int, ReducedModel]) -> ReducedModel:
+    def model(self, models: Mapping[int, "ReducedModel"]) -> "ReducedModel":
         """The model of the scene with what is drawn for the pairs. models: by number of the scene."""
         model = models[self.scene]
         drawn: dict[str, Any] = {name: np.array(values) for name, values in self.contact}
@@ -82,7 +80,7 @@ class StartResult:
         return Packed(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
 
     @classmethod
-    def unpack(cls, place: int, packed: Packed) -> StartResult:
+    def unpack(cls, place: int, packed: Packed) -> "StartResult":
         """The start state from the output of `pack`. Raises an error where it is none that a history can begin from."""
         from solver.results.history import StartState  # a run alone needs it, and numba with it
 
@@ -158,7 +156,7 @@ class Task(ABC):
     resume: Packed | None = field(default=None, compare=False, repr=False)
     names: tuple[str, ...] = field(default=(), compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
-    models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
+    models: tuple["ReducedModel | MappedFile", ...] = field(default=(), compare=False, repr=False)
     variables: tuple[str, ...] = ()
     indices: tuple[tuple[Index, ...], ...] = ()
 
@@ -188,7 +186,7 @@ class Task(ABC):
         """Number of the sweep, and place of the start state, without which the task cannot begin."""
         return None
 
-    def from_start(self, result: StartResult) -> Task:  # noqa: ARG002
+    def from_start(self, result: StartResult) -> "Task":  # noqa: ARG002
         """The task that begins from a start state, where it waits for one."""
         return self
 
@@ -211,7 +209,7 @@ class Task(ABC):
         """Hashes of all inputs of each result, in the order of the places. Equal hashes mean equal results."""
 
     @abstractmethod
-    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[Result]:
+    def compute(self, models: Mapping[int, "ReducedModel"], keep: Keep) -> Iterator[Result]:
         """Gives the results one by one, and the progress from time to time. models: by number of the scene."""
 
     def failed(self, place: int, outcome: int, message: str) -> Result:
@@ -246,7 +244,7 @@ class TaskPlan:
     n_points: int
     sweeps: tuple[Task, ...] = ()
 
-    def named(self, identity: Identity) -> TaskPlan:
+    def named(self, identity: Identity) -> "TaskPlan":
         """The plan with the names and keys of its tasks."""
 
         def with_names(task: Task) -> Task:

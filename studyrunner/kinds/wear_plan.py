@@ -5,8 +5,6 @@ k_w the same states follow each other, each at the cycle count t / s. Where the 
 integrates the history of the largest k_w; the others are read from this one at the counts s t.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

@@ -4,8 +4,6 @@ A job has one result or several, each handed on at once, and reports its progres
 can continue from there. By hand: in the pools of mpi4py and schwimmbad a job has one result and no progress.
 """
 
-from __future__ import annotations
-
 import itertools
 import queue
 import threading

@@ -5,8 +5,6 @@ matplotlib has written, are taken as they are. Numbers of the interactive part a
 floats, within a limit of size.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import math

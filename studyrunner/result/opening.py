@@ -5,8 +5,6 @@ Texts of the file stay texts: without control characters and line breaks, and as
 By hand: `xarray-schema` has no limits of sizes, and leaves texts as they are.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import warnings

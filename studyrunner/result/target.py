@@ -1,7 +1,5 @@
 """Files that a run writes: obstacles are found, and results of other studies protected, before anything is computed."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import sys
@@ -83,7 +81,7 @@ def check_output(option: str, path: Path, inputs: Sequence[Path], *, new: bool =
     return target
 
 
-def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
+def check_result(option: str, path: Path, study: "Study", *, overwrite: bool, how: str = "--overwrite") -> Target:
     """Target of a result, after `check_output` and a test that nothing forbids to replace what exists there.
 
     overwrite: whether a result of another study may be replaced. how: the user asks for that, in words. Raises

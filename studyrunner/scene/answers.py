@@ -1,7 +1,5 @@
 """What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, scene files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -38,7 +36,7 @@ class SmallArray:
     over_axes: bool = False
 
 
-def build_scene_variables(study: Study, model: ReducedModel, progress: Progress) -> tuple[SmallArray, ...]:
+def build_scene_variables(study: Study, model: "ReducedModel", progress: Progress) -> tuple[SmallArray, ...]:
     """What the study asks of its scene, but exact answers. Raises UserError."""
     found: list[SmallArray] = []
     with scene_errors(study.source, None):
@@ -63,7 +61,7 @@ def _mesh(study: Study) -> Iterator[SmallArray]:
         yield SmallArray(name, entry.dimensions, values[name], entry)
 
 
-def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
+def _frequencies(study: Study, model: "ReducedModel") -> Iterator[SmallArray]:
     scene = study.scene
     bundled = scene.is_bundled and as_scene(scene.parameters)
     found = bundled.natural_frequencies(model) if bundled else stuck_frequencies(model)
@@ -87,7 +85,7 @@ class StoredScene:
     origin: Mapping[str, str] = field(default_factory=dict)
 
 
-def scene_to_store(study: Study, model: ReducedModel) -> StoredScene | None:
+def scene_to_store(study: Study, model: "ReducedModel") -> StoredScene | None:
     """Contents of a scene file for the result; of a bundled scene only on request, as the parameters give it again."""
     if study.scene.is_bundled and not study.outputs.scene:
         return None

@@ -1,7 +1,5 @@
 """The scenes of a study: which of its parts share one, what a result says of them, and what differs in their pairs."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

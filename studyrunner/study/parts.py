@@ -1,7 +1,5 @@
 """A study in parts that have one scene and one sample each, and how wide their scenes have to be for what they wear."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -50,7 +48,7 @@ def parts_of(study: Study) -> tuple[Part, ...]:
 
 
 def draw_inputs(
-    study: Study, pairs: ContactInterface | None = None, own_values: Mapping[str, NDArray[np.float64]] | None = None
+    study: Study, pairs: "ContactInterface | None" = None, own_values: Mapping[str, NDArray[np.float64]] | None = None
 ) -> dict[str, NDArray[np.float64]]:
     """Values of the inputs that are the same for all pairs, or with pairs of those that belong to them, as `draw`.
 

@@ -1,7 +1,5 @@
 """Rules between the tables of a study, which are right themselves. Each yields what breaks it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, get_args
 

@@ -1,7 +1,5 @@
 """The summary of a result: for the command, the page and notebooks; as data, and in at most nine lines."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping
