@@ -25,11 +25,6 @@ CACHED_STRUCTURES = 8
 """Condensed structures in the cache. A wear history with its errors uses six."""
 
 
-def _others(n: int, relative: IntArray) -> IntArray:
-    """Indices of all displacements of a structure but the relative ones, ascending."""
-    return np.setdiff1d(np.arange(n), relative)
-
-
 def _dynamic_stiffness(linear: LinearModel, exponent: complex | ComplexArray, at: Any) -> ComplexArray:
     """Entries `at` of `K + s C + s^2 M`, N/m, for motions exp(s t); exponent: s, 1/s."""
     stiffness = linear.stiffness[at] + exponent * linear.damping[at] + exponent**2 * linear.mass[at]
@@ -179,7 +174,7 @@ def _condense_each(
 
 def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray, load: ComplexArray) -> Moving:
     """As `_condense_each`, of a real structure, with matrices shared by all harmonics."""
-    others = _others(load.size, relative)
+    others = np.setdiff1d(np.arange(load.size), relative)
     exponents: ComplexArray = np.asarray(1j * rates[:, None, None], complex)
     rows = np.vstack([linear.response, load.conj()])
     inner, to_pairs = (_dynamic_stiffness(linear, exponents, np.ix_(others, at)) for at in (others, relative))
@@ -208,7 +203,7 @@ def condense(full: Matrix, relative: IntArray, load: Matrix, rows: Matrix | None
 
     Raises numpy.linalg.LinAlgError where the block of the other displacements is singular.
     """
-    others = _others(full.shape[-1], relative)
+    others = np.setdiff1d(np.arange(full.shape[-1]), relative)
     seen = np.zeros((*full.shape[:-2], 0, full.shape[-1])) if rows is None else rows
     to_pairs, to_others = full[..., relative, :], full[..., others, :]
     # the other displacements per u, with the sign reversed, and under the load with u = 0
@@ -234,7 +229,7 @@ def whole_motion(
     Both change with exp(s t); exponent: s, 1/s, `i n w` in harmonic n.
     Raises SingularStructureError where the structure with a stuck joint is singular.
     """
-    n_rel, others, whole = relative.size, _others(len(linear.mass), relative), np.zeros(load.shape, complex)
+    n_rel, others, whole = relative.size, np.setdiff1d(np.arange(len(load)), relative), np.zeros(load.shape, complex)
     whole[relative] = moved
     if others.size:
         rows = _dynamic_stiffness(linear, exponent, np.ix_(others, np.concatenate([relative, others])))
