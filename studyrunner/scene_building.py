@@ -9,8 +9,9 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
+from solver.model import ReducedModel
 from solver.packing import Packed, pack_model, unpack_model
 from studies.model_check import check_model
 from studies.scene import Progress
@@ -28,10 +29,6 @@ from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, new_partial, write_mapped
 from studyrunner.user_error import UserError
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
-
 
 _MODELS_A_RANK = 2
 """Models, or sets of models of the blocks of a mission, that a rank holds where a study has several scenes."""
@@ -53,7 +50,7 @@ def hold_models(cache: ModelCache[Models], scenes: tuple[int, ...], models: Mode
 class SceneModels:
     """Rank 0: which rank has which models (`ModelCache`), and the files of models in use."""
 
-    def __init__(self, read: Callable[[int], "ReducedModel"], beside: Path) -> None:
+    def __init__(self, read: Callable[[int], ReducedModel], beside: Path) -> None:
         """read: the model of a scene. beside: the file that the files of models stand beside."""
         self._read = read
         self._beside = beside
@@ -180,7 +177,7 @@ class _Building(TaskHandler):
     def tick(self, running: object) -> None:  # noqa: ARG002
         self._store.tick()
 
-    def read(self, number: int) -> "ReducedModel":
+    def read(self, number: int) -> ReducedModel:
         """The model of a scene. Raises RuntimeError where it is no longer there."""
         packed = self.found[number].model
         key, model = self._keys[number], None if packed is None else unpack_model(packed)

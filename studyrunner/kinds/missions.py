@@ -3,10 +3,11 @@
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from solver.contact.wear_law import WearLaw
 from solver.missions.mission import Begin, Block, MissionRequest
+from solver.model import ReducedModel
 from solver.packing import Packed
 from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds import task as tasks
@@ -14,9 +15,6 @@ from studyrunner.kinds.estimate import iterations_of_missions, missions_computed
 from studyrunner.kinds.results import mission_values
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
 
 _NO_JOINT = tasks.TaskJoint(0, None)
 
@@ -32,7 +30,7 @@ class PlannedBlock:
     cycles: float
     begin: Begin
 
-    def as_block(self, model: "ReducedModel") -> Block:
+    def as_block(self, model: ReducedModel) -> Block:
         """The block as the solver takes it. model: of the joint."""
         cycles, friction = None if isinstance(self.frequency, Passage) else self.cycles, self.joint.friction_coefficient
         return Block(model, self.frequency, self.excitation_amplitude, friction, cycles, self.begin, self.name)
@@ -59,7 +57,7 @@ class Mission(tasks.Task):
         wear = (self.wear_coefficient, self.law, self.first, self.settings)
         return (tasks.digest("mission", blocks, wear, self.missions, self.until, identity.record),)
 
-    def compute(self, models: Mapping[int, "ReducedModel"], keep: tasks.Keep) -> Iterator[tasks.PointResult]:
+    def compute(self, models: Mapping[int, ReducedModel], keep: tasks.Keep) -> Iterator[tasks.PointResult]:
         """The history."""
         # numba is loaded where a task runs, so that --plan and --help do without it
         from solver.missions.history import integrate_missions

@@ -11,10 +11,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from solver.model import ReducedModel
 from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
@@ -22,11 +23,7 @@ from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.scene_set import ContactChange
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.system.machine import package_digest
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
-    from studyrunner.system.machine import MappedFile
+from studyrunner.system.machine import MappedFile, package_digest
 
 Index = tuple[int, ...]
 """Index of a point along the dimensions of the study."""
@@ -50,7 +47,7 @@ class TaskJoint:
     friction_coefficient: float | None
     contact: ContactChange = ()
 
-    def model(self, models: Mapping[int, "ReducedModel"]) -> "ReducedModel":
+    def model(self, models: Mapping[int, ReducedModel]) -> ReducedModel:
         """The model of the scene with what is drawn for the pairs. models: by number of the scene."""
         model = models[self.scene]
         drawn: dict[str, Any] = {name: np.array(values) for name, values in self.contact}
@@ -156,7 +153,7 @@ class Task(ABC):
     resume: Packed | None = field(default=None, compare=False, repr=False)
     names: tuple[str, ...] = field(default=(), compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
-    models: tuple["ReducedModel | MappedFile", ...] = field(default=(), compare=False, repr=False)
+    models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
     variables: tuple[str, ...] = ()
     indices: tuple[tuple[Index, ...], ...] = ()
 
@@ -209,7 +206,7 @@ class Task(ABC):
         """Hashes of all inputs of each result, in the order of the places. Equal hashes mean equal results."""
 
     @abstractmethod
-    def compute(self, models: Mapping[int, "ReducedModel"], keep: Keep) -> Iterator[Result]:
+    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[Result]:
         """Gives the results one by one, and the progress from time to time. models: by number of the scene."""
 
     def failed(self, place: int, outcome: int, message: str) -> Result:

@@ -3,11 +3,12 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.model import ReducedModel
 from studies.scene import Progress, as_scene, stuck_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
@@ -17,9 +18,6 @@ from studyrunner.study.parts import parts_of
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import Variable
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ class SmallArray:
     over_axes: bool = False
 
 
-def build_scene_variables(study: Study, model: "ReducedModel", progress: Progress) -> tuple[SmallArray, ...]:
+def build_scene_variables(study: Study, model: ReducedModel, progress: Progress) -> tuple[SmallArray, ...]:
     """What the study asks of its scene, but exact answers. Raises UserError."""
     found: list[SmallArray] = []
     with scene_errors(study.source, None):
@@ -61,7 +59,7 @@ def _mesh(study: Study) -> Iterator[SmallArray]:
         yield SmallArray(name, entry.dimensions, values[name], entry)
 
 
-def _frequencies(study: Study, model: "ReducedModel") -> Iterator[SmallArray]:
+def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
     scene = study.scene
     bundled = scene.is_bundled and as_scene(scene.parameters)
     found = bundled.natural_frequencies(model) if bundled else stuck_frequencies(model)
@@ -85,7 +83,7 @@ class StoredScene:
     origin: Mapping[str, str] = field(default_factory=dict)
 
 
-def scene_to_store(study: Study, model: "ReducedModel") -> StoredScene | None:
+def scene_to_store(study: Study, model: ReducedModel) -> StoredScene | None:
     """Contents of a scene file for the result; of a bundled scene only on request, as the parameters give it again."""
     if study.scene.is_bundled and not study.outputs.scene:
         return None

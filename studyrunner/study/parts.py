@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
+from solver.model import ContactInterface
 from studies.scene import ExpectedWear, as_scene
 from studyrunner.scatter import Scattered, draw
 from studyrunner.study.scene_section import SceneSection
@@ -16,9 +16,6 @@ from studyrunner.study.sections import MissionBlock
 from studyrunner.study.study import NUMBERS, Study
 from studyrunner.user_error import UserError
 from studyrunner.values import Wrong
-
-if TYPE_CHECKING:
-    from solver.model import ContactInterface
 
 _FAR = 3.1
 """Standard deviations of each input up to which a scene has room for the wear of its samples: 999 of 1000 lie below.
@@ -48,7 +45,7 @@ def parts_of(study: Study) -> tuple[Part, ...]:
 
 
 def draw_inputs(
-    study: Study, pairs: "ContactInterface | None" = None, own_values: Mapping[str, NDArray[np.float64]] | None = None
+    study: Study, pairs: ContactInterface | None = None, own_values: Mapping[str, NDArray[np.float64]] | None = None
 ) -> dict[str, NDArray[np.float64]]:
     """Values of the inputs that are the same for all pairs, or with pairs of those that belong to them, as `draw`.
 
