@@ -67,8 +67,7 @@ class Normal(Distribution):
     std: NotNegative | None = None
     relative_std: NotNegative | None = None
 
-    def at(self, own: Array, score: Array) -> Array:
-        """As `Distribution.at`."""
+    def at(self, own: Array, score: Array) -> Array:  # noqa: D102
         if self.std is not None:
             return (own if self.mean is None else self.mean) + self.std * score
         share = (self.relative_std or 0.0) * score
@@ -87,8 +86,7 @@ class Lognormal(Distribution):
     median: Positive | None = None
     factor: Annotated[float, Field(ge=1)] = Field(description="1 or more")
 
-    def at(self, own: Array, score: Array) -> Array:
-        """As `Distribution.at`."""
+    def at(self, own: Array, score: Array) -> Array:  # noqa: D102
         return (own if self.median is None else self.median) * self.factor**score
 
 
@@ -109,8 +107,7 @@ class Uniform(Distribution):
         if len(ends) == 1 or (ends and ends[0] >= ends[1]):
             yield Wrong("", self.model_dump(exclude_none=True), "give a low, and a high above it")
 
-    def at(self, own: Array, score: Array) -> Array:
-        """As `Distribution.at`."""
+    def at(self, own: Array, score: Array) -> Array:  # noqa: D102
         from scipy.special import ndtr
 
         if self.low is not None and self.high is not None:

@@ -170,8 +170,7 @@ class LoadingPath(Path[State]):
             return self.case.joint(parameter, self.excitation_amplitude)
         return self.case.joint(self.omega, parameter * self.excitation_amplitude)
 
-    def joint_of(self, state: State) -> Joint:
-        """As in Path."""
+    def joint_of(self, state: State) -> Joint:  # noqa: D102
         return self.joint_at(state.parameter)
 
     def balance_at(self, parameter: float, history: FloatArray) -> Balance:
@@ -194,8 +193,7 @@ class LoadingPath(Path[State]):
         history = self.joint_at(target).law.history_at_rest(start.evaluation, start.history)
         return self.near(replace(start, parameter=target), begin, history, run)
 
-    def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:
-        """As in Path."""
+    def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:  # noqa: D102
         balance = self.balance_at(state.parameter, history)
         found = run.state(balance, predicted_h, state.parameter, NEAR_ITERATIONS)
         return found if found is not None and run.is_stable(balance.joint, found.evaluation) else None
@@ -225,8 +223,7 @@ class LoadingPath(Path[State]):
         at = self.describe(state)
         return Failure(Outcome.BRANCH_LOST, f"the search ends {at}, after {run.budget.iterations} iterations")
 
-    def change(self, before: State, after: State) -> float:
-        """As in Path."""
+    def change(self, before: State, after: State) -> float:  # noqa: D102
         one, other = before.evaluation, after.evaluation
         if self.rests(before) and self.rests(after):
             # over a whole resonance, where the phase reverses, the change is larger than 1
@@ -241,8 +238,7 @@ class LoadingPath(Path[State]):
         one, other = before.evaluation, after.evaluation
         return max(vibration_change(one, other), vibration_change(other, one))
 
-    def rests(self, state: State) -> bool:
-        """As in Path."""
+    def rests(self, state: State) -> bool:  # noqa: D102
         return nothing_happens(state.evaluation)
 
     def forgets(self, state: State) -> bool:
@@ -272,8 +268,7 @@ class LoadingPath(Path[State]):
         # where the error is above rtol already, there are no more harmonics
         return enough and (foreseen <= settings.rtol or error > settings.rtol)
 
-    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:
-        """As in Path."""
+    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:  # noqa: D102
         found = refine(ResolvedState(self.case, self.joint_of(state), state), run, node=True)
         found = with_level_above(found, run, node=True)
         return replace(self, case=found.case), found.point, found.estimate

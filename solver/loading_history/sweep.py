@@ -201,7 +201,6 @@ class Sweep(Generic[S]):
         self.length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), path.longest)
 
     def _advance(self, before: S, step: Step[S]) -> None:
-        """Make the next node the current one."""
         self.ahead = None
         self.passed.append(step.state.parameter)
         self.nodes = (step.state,) if step.folds else (*self.nodes, step.state)[-LAST_NODES:]

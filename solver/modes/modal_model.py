@@ -73,8 +73,7 @@ class ModalModel(ReducedModel):
 
     first: LinearModel = field(kw_only=True)
 
-    def harmonic_structure(self, harmonic: int) -> LinearModel:
-        """As in ReducedModel."""
+    def harmonic_structure(self, harmonic: int) -> LinearModel:  # noqa: D102
         return self.first if harmonic == 1 else super().harmonic_structure(harmonic)
 
 

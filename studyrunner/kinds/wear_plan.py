@@ -217,7 +217,6 @@ def _group(study: Study, point: _Values) -> tuple[str, Hashable]:
 
 
 def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
-    """The histories by task."""
     groups: dict[object, list[_Shared]] = {}
     for each in shared:
         alone = each[0].unworn or not study.solver.shortcuts

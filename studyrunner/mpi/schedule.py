@@ -64,14 +64,12 @@ class _Compiler(Listener):
         return time.perf_counter() - self.seconds
 
     def on_start(self, event: Event) -> None:  # noqa: ARG002
-        """Begin of a function, which may be inside another one."""
         if self._depth == 0:
             self._began = time.perf_counter()
             self.say(COMPILING)
         self._depth += 1
 
     def on_end(self, event: Event) -> None:  # noqa: ARG002
-        """End of a function."""
         self._depth -= 1
         if self._depth == 0:
             self.seconds += time.perf_counter() - self._began

@@ -73,7 +73,6 @@ def _save(drawing: Drawing, folder: Path) -> dict[str, Any]:
 
 
 def _build_page(result: Result, parts: Sequence[Any]) -> str:
-    """The page as text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
 

@@ -138,7 +138,6 @@ def _slabs(
 def _create_all(
     file: netCDF4.Dataset, study: Study, facts: SceneFacts, slab: Sequence[int], arrays: Sequence[SmallArray]
 ) -> dict[str, Variable]:
-    """Dimensions and variables of the histories."""
     sizes = {name: len(values) for name, values in study.dimensions.items()} | variable_sizes(study, facts)
     variables = {**study.recorded, **study.kind.always}
     for name, size in sizes.items():

@@ -197,9 +197,7 @@ def largest_harmonics(model: ReducedModel) -> int | None:
     """Largest number of harmonics for which the model has all nodal diameters; None without limit."""
     # After n_sectors harmonics the nodal diameters come again.
     for harmonic in range(1, model.n_sectors):
-        try:
-            model.harmonic_structure(harmonic)
-        except KeyError:
+        if not model.has_harmonics(harmonic):
             return harmonic - 1
     return None
 

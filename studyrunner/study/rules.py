@@ -73,7 +73,6 @@ def _frequency(study: Study) -> Iterator[Wrong]:
 
 
 def _followed(study: Study) -> str | None:
-    """What the frequency follows."""
     given: tuple[Any, ...] = study.axes.frequency or ()
     return next((each for each in given if isinstance(each, str)), None)
 

@@ -71,7 +71,6 @@ class Summary:
         return tuple(f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in self.rows)
 
     def __str__(self) -> str:
-        """The summary as text."""
         return "\n".join(self.lines)
 
 
