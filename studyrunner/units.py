@@ -158,7 +158,7 @@ def show_value(axis: "xr.DataArray", index: int) -> str:
     return text if name == "frequency" else f"{name} {text}"
 
 
-def show_power(value: float, _position: object = None) -> str:
+def show_power(value: float) -> str:
     """A tick of a logarithmic axis: powers of ten as such. Plain text, which is drawn much faster than a formula."""
     if value <= 0.0:
         return ""

@@ -6,15 +6,13 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from studyrunner.checkpoint.store import read_study
+from studyrunner.study.study import Study
 from studyrunner.study.text import read_archived, read_toml
 from studyrunner.system.machine import find_fault, new_partial
 from studyrunner.user_error import UserError
-
-if TYPE_CHECKING:
-    from studyrunner.study.study import Study
 
 _BYTES_OF_TRIAL = 4096  # a full disk has room for a name
 
@@ -81,7 +79,7 @@ def check_output(option: str, path: Path, inputs: Sequence[Path], *, new: bool =
     return target
 
 
-def check_result(option: str, path: Path, study: "Study", *, overwrite: bool, how: str = "--overwrite") -> Target:
+def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
     """Target of a result, after `check_output` and a test that nothing forbids to replace what exists there.
 
     overwrite: whether a result of another study may be replaced. how: the user asks for that, in words. Raises
