@@ -5,8 +5,6 @@ Everything that `solver`, `studies` and `studyrunner` export, loaded at its firs
 `integrate_mission`, `response_curve` and their results. Every `xarray.Dataset` has the accessor `fretwear`.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING
 

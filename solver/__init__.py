@@ -19,8 +19,6 @@ For use in Python, from this package itself:
 paper, and measurements.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING
 

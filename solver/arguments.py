@@ -1,7 +1,5 @@
 """Checks of what users give to the functions of this package; each raises ValueError with a sentence."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import get_args

@@ -1,7 +1,5 @@
 """CPU time of a computation, without the time in which kernels are compiled or loaded from the cache."""
 
-from __future__ import annotations
-
 import threading
 import time
 
@@ -20,13 +18,11 @@ class _Compiler(Listener, threading.local):
         self._began = 0.0
 
     def on_start(self, _: Event) -> None:
-        """Begin of a kernel."""
         if self._depth == 0:
             self._began = time.thread_time()
         self._depth += 1
 
     def on_end(self, _: Event) -> None:
-        """End of a kernel."""
         self._depth -= 1
         if self._depth == 0:
             self.spent += time.thread_time() - self._began

@@ -11,8 +11,6 @@ Mech. 16 (1949)), and for randomly rough surfaces (Campana, Persson and Mueser, 
 085001).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import cast
 

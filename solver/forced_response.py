@@ -1,7 +1,5 @@
 """Periodic states of a joint that is excited: over frequency, and one of them as equations with their Jacobian."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

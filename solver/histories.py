@@ -1,7 +1,5 @@
 """The wear of one joint over cycles or over missions, from a model in Python."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

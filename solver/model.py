@@ -1,7 +1,5 @@
 """The model of a joint: a reduced linear structure and the contact pairs on it. All values are in SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -95,7 +93,7 @@ class LinearModel(_ByRows):
     response: Matrix
 
     @cached_property
-    def conjugate(self) -> LinearModel:
+    def conjugate(self) -> "LinearModel":
         """The structure of a harmonic whose nodal diameter is folded back: conjugate matrices, so damping is kept."""
         parts = (self.mass, self.damping, self.stiffness, self.load_static, self.load_harmonic, self.response)
         return LinearModel(*(np.conj(part) for part in parts))
@@ -117,7 +115,7 @@ class ReducedModel:
     n_sectors: int = 0
     nodal_diameter: int = 0
 
-    def harmonic_structure(self, harmonic: int) -> LinearModel:
+    def harmonic_structure(self, harmonic: int) -> "LinearModel":
         """Linear model in which a harmonic moves: that of nodal diameter `n d` modulo N, conjugate above N/2.
 
         Raises KeyError where the scene does not have that nodal diameter.

@@ -1,7 +1,5 @@
 """A reduced model from matrices and contact pairs in Python, for use without scene files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Nonlinear modes of a joint, from a model in Python: frequency and damping over the amplitude, and the response."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any, get_args

@@ -3,8 +3,6 @@
 How well its result is known: an error that is not known is inf.
 """
 
-from __future__ import annotations
-
 import math
 import traceback
 from enum import IntEnum
@@ -45,7 +43,6 @@ class Outcome(IntEnum):
     STATIC_OPEN = 22
 
     def __str__(self) -> str:
-        """The word, as `meaning`."""
         return self.meaning
 
     __repr__ = __str__
@@ -129,7 +126,6 @@ class Ended:
     message: str
 
     def __post_init__(self) -> None:
-        """Check the sentence."""
         if self.outcome is not Outcome.CONVERGED and not self.message:
             raise ValueError(f"{self.outcome.meaning} without a sentence about the reason")
 

@@ -4,21 +4,20 @@
 changes the last bits of sums: a computation that may be resumed goes on from the unpacked value.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, TypeVar, cast
+from functools import cache
+from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.outcome import Outcome
 
 T = TypeVar("T")
 
-_PLAIN: dict[Any, Any] = {"float": float | int, "int": int, "str": str, "bool": bool, "FloatArray": np.ndarray}
+_PLAIN: dict[Any, Any] = {float: float | int, int: int, str: str, bool: bool, FloatArray: np.ndarray}
 """Types of fields that are checked when a value is rebuilt, by their annotation."""
 
 _CLASSES: dict[str, type[Any]] = {each.__name__: each for each in (ContactInterface, LinearModel, ReducedModel)}
@@ -116,10 +115,15 @@ def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> Any:
         items = [_rebuilt(item, arrays) for item in content]
         return tuple(items) if kind == "tuple" else items
     made = _CLASSES[kind](**_rebuilt(content, arrays))
-    for field in fields(made):
-        value = getattr(made, field.name)
-        if not isinstance(value, _PLAIN.get(field.type, object)):
-            raise TypeError(f"{kind}.{field.name} is of type {type(value).__name__}")
-        if field.type == "FloatArray" and value.dtype != np.float64:
-            raise TypeError(f"{kind}.{field.name} holds {value.dtype}")
+    for name, annotation in _annotations(kind).items():
+        value = getattr(made, name)
+        if not isinstance(value, _PLAIN.get(annotation, object)):
+            raise TypeError(f"{kind}.{name} is of type {type(value).__name__}")
+        if annotation == FloatArray and value.dtype != np.float64:
+            raise TypeError(f"{kind}.{name} holds {value.dtype}")
     return made
+
+
+@cache
+def _annotations(kind: str) -> dict[str, Any]:
+    return get_type_hints(_CLASSES[kind])

@@ -1,7 +1,5 @@
 """What results of the solver are in Python: a Dataset, a picture, five lines. xarray and matplotlib load when used."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -67,7 +65,7 @@ class Presented:
     SHOWN: ClassVar[tuple[str, str, str]] = ("worn_volume", "worn_volume_error", "wear_depth")
     DRAWN: ClassVar[tuple[str, ...]] = ("worn_volume",)
 
-    def to_xarray(self) -> xr.Dataset:
+    def to_xarray(self) -> "xr.Dataset":
         """All values, named as here, in SI units; `outcome` as words.
 
         A complex `response` stands as `response_amplitude` and `response_phase`, rad, as in a result file.
@@ -82,7 +80,7 @@ class Presented:
                 data |= _variables(field.name, getattr(self, field.name), over, len(points))
         return xr.Dataset(data, {over: (over, points, {"units": unit_of(name)})})
 
-    def plot(self, axes: Axes | None = None) -> Axes:
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
         """Draws the main values over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
         axes = axes or new_axes()
         at = getattr(self, self.OVER[0])
@@ -132,7 +130,7 @@ def _variables(name: str, value: Any, over: str, n_points: int) -> dict[str, tup
     return {name: (dims, value, units)}
 
 
-def new_axes() -> Axes:
+def new_axes() -> "Axes":
     """Axes of a new figure of matplotlib."""
     from matplotlib import pyplot
 

@@ -1,7 +1,5 @@
 """Numerical settings of the solver, all with defaults."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
@@ -147,7 +145,7 @@ class SolverSettings:
         return max(self.tolerance, ROUGH_SHARE * self.rtol)
 
     @property
-    def of_steps(self) -> SolverSettings:
+    def of_steps(self) -> "SolverSettings":
         """The settings of the states of an adaptive history, whose tolerance follows from the error of its steps."""
         return replace(self, tolerance=max(self.tolerance, STEP_SHARE * self.rtol))
 

@@ -1,7 +1,5 @@
 """A whole response curve of a joint, over frequency or excitation amplitude: folds, unstable parts, multipliers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -73,7 +71,7 @@ class ResponseCurve(Presented):
         """Numbers of the points (n_points,)."""
         return np.arange(self.frequency.size)
 
-    def plot(self, axes: Axes | None = None) -> Axes:
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
         """As for other results, over the parameter that changes along the curve; solid where it is stable."""
         axes = axes or new_axes()
         at, stable = getattr(self, self.parameter), np.array(self.stability) == "stable"

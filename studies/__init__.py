@@ -11,8 +11,6 @@ scene files (`model_check` what they must obey, `hdf5` how datasets are read). T
 studies, `notebooks` read their results.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from studies.scene_error import SceneError, remedy_of
@@ -27,7 +25,7 @@ __all__ = ["SceneError", "build_scene", "read_scene"]
 # What is heavy is imported where it is used: the commands import this package before numpy may be loaded.
 
 
-def build_scene(name: str, /, *, n_harmonics: int = OF_A_WAVE, **parameters: object) -> ReducedModel:
+def build_scene(name: str, /, *, n_harmonics: int = OF_A_WAVE, **parameters: object) -> "ReducedModel":
     """Reduced model of a bundled scene, as a study with the same parameters has it.
 
     name: one of `studies.scenes.BUNDLED`, such as "dovetail_sector" or "sdof_slider". n_harmonics: a sector under a

@@ -1,11 +1,9 @@
 """What a scene is: its parameters, its reduced model, and what it can tell beside the model."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -123,7 +121,7 @@ class Scene(BaseModel):
         """Outer faces of its mesh, of a scene that offers one. Raises SceneError."""
         raise NotImplementedError
 
-    def with_room_for_wear(self, expected: ExpectedWear) -> Scene:
+    def with_room_for_wear(self, expected: ExpectedWear) -> Self:
         """The scene with room for what it wears, where its pairs end at an artificial edge; else as it is."""
         del expected
         return self

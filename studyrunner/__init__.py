@@ -11,8 +11,6 @@ For use in Python, from this package itself:
 The rooms are in the map of CONTRIBUTING.md.
 """
 
-from __future__ import annotations
-
 import os
 from importlib import import_module
 

@@ -3,8 +3,6 @@
 Importing this module gives every `xarray.Dataset` read from a result file the accessor `fretwear`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Studies in Python: read one, run it in this process, open a result. For use as `studyrunner.run_study` and so on."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -38,39 +36,21 @@ def run_study(
     """Run a study in this process, as the command `run-study` does, and open its result, which is the same to the last
     bit. A run that was ended early goes on, from here or by the command.
 
-    Parameters
-    ----------
-    study
-        As `read_study` gives it, or what it reads: a path, or the name of a bundled study.
-    output
-        The result file; `<name of the study>.nc` in the current folder if not given.
-    overrides
-        As in `read_study`, where the study is not read yet.
-    fresh
-        Start over: forget what an earlier run of this study has left.
-    overwrite
-        Replace a result that is of another study: one of another name or of another scene.
-    retry_failed
-        Compute points that failed in an earlier run once more.
-    date
-        `date_created` of the result, in a form of ISO 8601, or `"now"`; none if not given: equal runs have equal files.
-    progress
-        Whether stderr tells how far the run is.
+    - study: as `read_study` gives it, or what it reads: a path, or the name of a bundled study.
+    - output: the result file; `<name of the study>.nc` in the current folder if not given.
+    - overrides: as in `read_study`, where the study is not read yet.
+    - fresh: start over: forget what an earlier run of this study has left.
+    - overwrite: replace a result that is of another study: one of another name or of another scene.
+    - retry_failed: compute points that failed in an earlier run once more.
+    - date: `date_created` of the result, in a form of ISO 8601, or `"now"`; none if not given: equal runs have equal
+      files.
+    - progress: whether stderr tells how far the run is.
 
-    Returns
-    -------
-    xarray.Dataset
-        As `open_result` gives it. Points that failed are no exception: `outcome` and `message` say why.
+    The dataset is as `open_result` gives it. Points that failed are no exception: `outcome` and `message` say why.
 
-    Raises
-    ------
-    UserError
-        Where something is wrong, another run is at work, or a launcher has started several processes. Nothing is
-        computed then.
-    StorageError
-        Where something cannot be written on the way. What was computed is kept.
-    KeyboardInterrupt
-        After Ctrl-C; the file holds the points that were computed until then.
+    Raises UserError where something is wrong, another run is at work, or a launcher has started several processes:
+    nothing is computed then; StorageError where something cannot be written on the way: what was computed is kept;
+    KeyboardInterrupt after Ctrl-C: the file holds the points that were computed until then.
     """
     if (announced := launcher_size()) > 1:
         remedy = "call it in one process, or give `mpiexec run-study`: here each process would compute all of it"

@@ -1,7 +1,5 @@
 """The command `run-study` on each rank. Signals are handled once the ranks have found each other."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os
@@ -166,7 +164,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     return BAD_INPUT
 
 
-def _describe(study: Study, options: argparse.Namespace) -> int:
+def _describe(study: "Study", options: argparse.Namespace) -> int:
     """What the options --plan, --check and --write-scene print and write."""
     from studyrunner.plan import plan_lines
     from studyrunner.result.target import check_output
@@ -190,7 +188,7 @@ def _describe(study: Study, options: argparse.Namespace) -> int:
     return CONVERGED
 
 
-def _compute(ranks: Ranks, study: Study, options: argparse.Namespace) -> int:
+def _compute(ranks: Ranks, study: "Study", options: argparse.Namespace) -> int:
     from solver.outcome import COMPLETE
     from studyrunner.checkpoint.store import Store
     from studyrunner.result.target import check_result

@@ -1,7 +1,5 @@
 """Where the commands begin: until they are loaded, a signal ends them without a traceback."""
 
-from __future__ import annotations
-
 from studyrunner.system.process import leave_endings
 
 

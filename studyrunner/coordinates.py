@@ -1,7 +1,5 @@
 """The coordinates of a result file, and its variables that are those of the scene alone."""
 
-from __future__ import annotations
-
 from studyrunner.variables import Variable
 
 _AUXILIARY, _REFERENCE = "auxiliaryInformation", "referenceInformation"

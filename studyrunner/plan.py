@@ -1,7 +1,5 @@
 """The tasks of a study, whatever its kind, what `--plan` says of them, and questions about values that are far off."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import time

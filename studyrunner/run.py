@@ -1,7 +1,5 @@
 """One run of a study: builds its scenes, does the tasks that are left, and writes the result file."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 

@@ -3,8 +3,6 @@
 By hand: a column of `scipy.stats.qmc` depends on the number of columns; its plain Sobol' sequence is used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
@@ -69,8 +67,7 @@ class Normal(Distribution):
     std: NotNegative | None = None
     relative_std: NotNegative | None = None
 
-    def at(self, own: Array, score: Array) -> Array:
-        """As `Distribution.at`."""
+    def at(self, own: Array, score: Array) -> Array:  # noqa: D102
         if self.std is not None:
             return (own if self.mean is None else self.mean) + self.std * score
         share = (self.relative_std or 0.0) * score
@@ -89,8 +86,7 @@ class Lognormal(Distribution):
     median: Positive | None = None
     factor: Annotated[float, Field(ge=1)] = Field(description="1 or more")
 
-    def at(self, own: Array, score: Array) -> Array:
-        """As `Distribution.at`."""
+    def at(self, own: Array, score: Array) -> Array:  # noqa: D102
         return (own if self.median is None else self.median) * self.factor**score
 
 
@@ -111,8 +107,7 @@ class Uniform(Distribution):
         if len(ends) == 1 or (ends and ends[0] >= ends[1]):
             yield Wrong("", self.model_dump(exclude_none=True), "give a low, and a high above it")
 
-    def at(self, own: Array, score: Array) -> Array:
-        """As `Distribution.at`."""
+    def at(self, own: Array, score: Array) -> Array:  # noqa: D102
         from scipy.special import ndtr
 
         if self.low is not None and self.high is not None:
@@ -204,7 +199,7 @@ def flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def draw(
-    section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ContactInterface | None = None
+    section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: "ContactInterface | None" = None
 ) -> dict[str, Array]:
     """What the samples draw of each input that is the same for all pairs, (samples,) or (n_values, samples) of an axis;
     with pairs of each input that belongs to them, (samples, n_pairs). Without width the study's own values, exactly.
@@ -239,7 +234,7 @@ def draw(
     return found
 
 
-def _field(name: str, length: float, pairs: ContactInterface) -> Array:
+def _field(name: str, length: float, pairs: "ContactInterface") -> Array:
     """Factor L (n_pairs, n_pairs) of a Gaussian field L z of unit variance, z independent.
 
     Correlation exp(-(r / length)^2 / 2) of two pairs of a surface at the distance r; surfaces are independent.

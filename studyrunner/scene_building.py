@@ -4,15 +4,14 @@ They are stored in the file of the run. A task brings the model to a rank that d
 ranks map (`write_mapped`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
+from solver.model import ReducedModel
 from solver.packing import Packed, pack_model, unpack_model
 from studies.model_check import check_model
 from studies.scene import Progress
@@ -30,10 +29,6 @@ from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, new_partial, write_mapped
 from studyrunner.user_error import UserError
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
-
 
 _MODELS_A_RANK = 2
 """Models, or sets of models of the blocks of a mission, that a rank holds where a study has several scenes."""
@@ -76,7 +71,7 @@ class SceneModels:
             self._files.pop(number).path.unlink(missing_ok=True)
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
-    def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
+    def _hand(self, rank: int, number: int) -> "ReducedModel | MappedFile":
         if rank in self._blind:
             return self._read(number)
         if number not in self._files:

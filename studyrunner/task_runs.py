@@ -1,12 +1,10 @@
 """The tasks of a study while they are done: by any rank its own, and on rank 0 the state of all of them."""
 
-from __future__ import annotations
-
 from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from solver.model import ReducedModel
 from solver.outcome import Outcome, describe_error, is_machine_fault
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
@@ -16,9 +14,6 @@ from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, Scen
 from studyrunner.system.machine import MappedFile, open_mapped
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
 
 _LATE = 0.3
 """Expected further time of a late task over its time: the mean, for estimates to a factor of two."""

@@ -3,8 +3,6 @@
 By hand: `EngFormatter` of matplotlib and `to_compact` of pint choose a prefix for each number.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -55,7 +53,7 @@ class Scale:
     unit: str
     least: float = field(default=0.0, compare=False)
 
-    def __call__(self, values: ArrayLike) -> NDArray[np.float64]:
+    def __call__(self, values: "ArrayLike") -> "NDArray[np.float64]":
         """Values as shown."""
         return np.asarray(values, dtype=float) * self.factor
 
@@ -69,7 +67,7 @@ class Scale:
         return f"{text} {self.unit}" if self.unit else text
 
 
-def scale_for(units: str, *values: ArrayLike) -> Scale:
+def scale_for(units: str, *values: "ArrayLike") -> Scale:
     """Scale for values in these units of SI, by the largest magnitude among them; NaN and infinities do not count."""
     arrays = [np.abs(np.asarray(each, dtype=float)) for each in values]
     largest = max((float(each.max(initial=0.0, where=np.isfinite(each))) for each in arrays), default=0.0)
@@ -142,7 +140,7 @@ def describe_reach(last: float, end: float, error: float) -> str:
     return f"{reached}, the worn volume there to {show_percent(error)}" if known else reached
 
 
-def units_of(axis: xr.DataArray) -> str:
+def units_of(axis: "xr.DataArray") -> str:
     """Unit of an axis: `cycles` where it counts them, empty where there is none."""
     name = str(axis.name)
     if name == "step":
@@ -151,7 +149,7 @@ def units_of(axis: xr.DataArray) -> str:
     return "" if units == "1" else units
 
 
-def show_value(axis: xr.DataArray, index: int) -> str:
+def show_value(axis: "xr.DataArray", index: int) -> str:
     """A value of an axis in words."""
     name, value = str(axis.name).replace("_", " "), axis.values[index]
     if isinstance(value, str):
@@ -160,7 +158,7 @@ def show_value(axis: xr.DataArray, index: int) -> str:
     return text if name == "frequency" else f"{name} {text}"
 
 
-def show_power(value: float, _position: object = None) -> str:
+def show_power(value: float) -> str:
     """A tick of a logarithmic axis: powers of ten as such. Plain text, which is drawn much faster than a formula."""
     if value <= 0.0:
         return ""

@@ -3,8 +3,6 @@
 By hand: `rich` takes five control characters out of a text, and leaves those that move the cursor.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import re
@@ -31,10 +29,10 @@ class UserError(Exception):
     key: str
     value: object
     remedy: str
-    others: tuple[UserError, ...] = ()
+    others: tuple["UserError", ...] = ()
 
     @property
-    def mistakes(self) -> tuple[UserError, ...]:
+    def mistakes(self) -> tuple["UserError", ...]:
         """All mistakes, one by one."""
         return (UserError(self.place, self.key, self.value, self.remedy), *self.others)
 

@@ -3,8 +3,6 @@
 By hand: `linspace` of numpy rounds more than once, and values of `geomspace` differ between machines.
 """
 
-from __future__ import annotations
-
 import decimal
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Of modes the axes end with modal_amplitude and cycle. Of missions slow time is c
 those of single blocks.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 

@@ -4,8 +4,6 @@ The depths of the pairs in the result are those of a joint that is mounted worn,
 of zero cycles gives its states.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast

@@ -4,8 +4,6 @@ The parameter is the further unknown of a bordered system, whose further equatio
 tangent of the branch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 

@@ -11,8 +11,6 @@ any friction. From step to step c falls, until Newton's method finds the state w
 state moves without end, in a direction that shows why.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ step, or its local error, over the one allowed (`take_step`). Natural steps of N
 fails (`follow_naturally`). Changes of the vibration are those of `vibration_change`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar

@@ -7,8 +7,6 @@ amplitude of the first response, in its first harmonic, the rise of the amplitud
 this lag.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import dataclass, replace

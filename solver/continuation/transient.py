@@ -13,8 +13,6 @@ long as 1/D exceeds their rate, which the determinant of the step shows. So D st
 is tested for stability, and D is bounded by this rate once a state was unstable.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import cast
 

@@ -7,8 +7,6 @@ joint least, so that no sweep begins at a resonance. It depends on the scene and
 a study.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -172,8 +170,7 @@ class LoadingPath(Path[State]):
             return self.case.joint(parameter, self.excitation_amplitude)
         return self.case.joint(self.omega, parameter * self.excitation_amplitude)
 
-    def joint_of(self, state: State) -> Joint:
-        """As in Path."""
+    def joint_of(self, state: State) -> Joint:  # noqa: D102
         return self.joint_at(state.parameter)
 
     def balance_at(self, parameter: float, before: State) -> Balance:
@@ -195,8 +192,7 @@ class LoadingPath(Path[State]):
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
         return self._stable(self.balance_at(target, start), begin, target, run)
 
-    def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:
-        """As in Path."""
+    def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:  # noqa: D102
         return self._stable(Balance(self.joint_of(state), history), predicted_h, state.parameter, run)
 
     def _stable(self, balance: Balance, predicted_h: FloatArray, parameter: float, run: Run) -> State | None:
@@ -228,8 +224,7 @@ class LoadingPath(Path[State]):
         at = self.describe(state)
         return Failure(Outcome.BRANCH_LOST, f"the search ends {at}, after {run.budget.iterations} iterations")
 
-    def change(self, before: State, after: State) -> float:
-        """As in Path."""
+    def change(self, before: State, after: State) -> float:  # noqa: D102
         one, other = before.evaluation, after.evaluation
         if self.rests(before) and self.rests(after):
             # over a whole resonance, where the phase reverses, the change is larger than 1
@@ -244,8 +239,7 @@ class LoadingPath(Path[State]):
         one, other = before.evaluation, after.evaluation
         return max(vibration_change(one, other), vibration_change(other, one))
 
-    def rests(self, state: State) -> bool:
-        """As in Path."""
+    def rests(self, state: State) -> bool:  # noqa: D102
         return nothing_happens(state.evaluation)
 
     def forgets(self, state: State) -> bool:
@@ -275,8 +269,7 @@ class LoadingPath(Path[State]):
         # where the error is above rtol already, there are no more harmonics
         return enough and (foreseen <= settings.rtol or error > settings.rtol)
 
-    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:
-        """As in Path."""
+    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:  # noqa: D102
         found = refine(ResolvedState(self.case, self.joint_of(state), state), run, node=True)
         found = with_level_above(found, run, node=True)
         return replace(self, case=found.case), found.point, found.estimate

@@ -8,8 +8,6 @@ where the phase lag passes pi/2. A resonance that the sweep jumps over at a fold
 amplitude is sought from there, as it has small maxima where pairs begin to slip, far from any resonance.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace

@@ -10,8 +10,6 @@ harmonics one level lower where these are automatic. The reference begins where 
 fold and where each pair slips or opens within the period: such a state follows from its parameter alone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -211,7 +209,6 @@ class Sweep(Generic[S]):
         self.length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), path.longest)
 
     def _advance(self, before: S, step: Step[S]) -> None:
-        """Make the next node the current one."""
         self.ahead = None
         self.passed.append(step.state.parameter)
         self.nodes = (step.state,) if step.folds else (*self.nodes, step.state)[-LAST_NODES:]

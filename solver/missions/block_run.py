@@ -1,7 +1,5 @@
 """One block of one mission: the state with which it begins, its wear, and the reference solution of its wear."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

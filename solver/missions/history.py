@@ -1,7 +1,5 @@
 """One mission history: the problem over the slow time, comparison with the reference solution, outcome."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -179,7 +177,6 @@ def integrate_missions(
 
 
 def _assembled(mission: MissionRequest, solution: Solution) -> MissionHistory:
-    """The result, not judged yet."""
     course, state, counts, area = solution.course, solution.state, np.array(mission.missions, float), mission.area
     compare_at = partial(_compare, solution, slice(None))
     both, whole = compare_at(counts)

@@ -1,7 +1,5 @@
 """What a mission is, blocks of vibration in order and how often they are repeated; and the result of its history."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -23,8 +23,6 @@ A vibration does not tell apart frequencies that are closer than the inverse of 
 below sqrt(|df/dt|) is not divided. At a resonance without damping or friction the integral is infinite.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -20,8 +20,6 @@ product of the flows of the linearised wear rates of the blocks. By how much it 
 last node is a part of the error of the step.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

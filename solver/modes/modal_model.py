@@ -10,8 +10,6 @@ The structure with its joint held is singular at the frequency of its own mode. 
 end moves with the real amplitude Q (the drive). At a nonlinear mode `q = Q`, so that the spring has no force.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -75,8 +73,7 @@ class ModalModel(ReducedModel):
 
     first: LinearModel = field(kw_only=True)
 
-    def harmonic_structure(self, harmonic: int) -> LinearModel:
-        """As in ReducedModel."""
+    def harmonic_structure(self, harmonic: int) -> LinearModel:  # noqa: D102
         return self.first if harmonic == 1 else super().harmonic_structure(harmonic)
 
 

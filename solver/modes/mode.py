@@ -8,8 +8,6 @@ the drive Q of the modal model (`modal_model`), and with the further equations
 the spring on the modal coordinate has no force, which also fixes the phase; and the amplitude a is given.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self, cast
@@ -92,8 +90,7 @@ class NonlinearMode(Path[ModeState]):
         """Joint of the modal model at some values (3,)."""
         return self.case_of(values).joint(float(values[0]), float(values[2]))
 
-    def joint_of(self, state: ModeState) -> Joint:
-        """As in Path."""
+    def joint_of(self, state: ModeState) -> Joint:  # noqa: D102
         return self.joint_with(state.values)
 
     def find(
@@ -118,8 +115,7 @@ class NonlinearMode(Path[ModeState]):
         after = final_history(found.balance, found.at)
         return ModeState(found.at, after, amplitude, values=found.values, shape=found.extra)
 
-    def ahead(self, parameter: float, length: float) -> float:
-        """As in Path."""
+    def ahead(self, parameter: float, length: float) -> float:  # noqa: D102
         return parameter * math.exp(length)
 
     def solve(self, states: tuple[ModeState, ...], target: float, run: Run) -> ModeState | None:
@@ -140,8 +136,7 @@ class NonlinearMode(Path[ModeState]):
         found = (self.find(target, start, history, run, NEAR_ITERATIONS, first) for start in starts)
         return next((state for state in found if state is not None), None)
 
-    def change(self, before: ModeState, after: ModeState) -> float:
-        """As in Path."""
+    def change(self, before: ModeState, after: ModeState) -> float:  # noqa: D102
         sticks = all((state.evaluation.status_t == STICK).all() for state in (before, after))
         return self.differs(before, after) / self.largest_change(sticks=sticks)
 
@@ -150,12 +145,10 @@ class NonlinearMode(Path[ModeState]):
         one, other = (state.evaluation.predicted_h[:, 1:] / state.parameter for state in (before, after))
         return float(np.linalg.norm(other - one)) / max(float(np.linalg.norm(one)), 1e-300)
 
-    def near(self, state: ModeState, predicted_h: FloatArray, history: FloatArray, run: Run) -> ModeState | None:
-        """As in Path."""
+    def near(self, state: ModeState, predicted_h: FloatArray, history: FloatArray, run: Run) -> ModeState | None:  # noqa: D102
         return self.find(state.parameter, (predicted_h, state.values), history, run)
 
-    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:
-        """As in Path."""
+    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:  # noqa: D102
         # the error of the first response is judged in a sweep of the frequency only
         return *self.refined(state, run, node=True), NOTHING
 
@@ -165,8 +158,7 @@ class NonlinearMode(Path[ModeState]):
         chosen = refine(_resolved(replace(self, case=replace(self.case, settings=settings)), state), run, node=node)
         return self.at(chosen.case.resolution), cast("ModeState", chosen.point)
 
-    def describe(self, state: ModeState) -> str:
-        """As in Path."""
+    def describe(self, state: ModeState) -> str:  # noqa: D102
         return f"at the modal amplitude {state.parameter:.4g} m sqrt(kg)"
 
 
@@ -178,8 +170,7 @@ class ResolvedMode(ResolvedState):
 
     mode: NonlinearMode
 
-    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedMode | None:  # noqa: ARG002
-        """As in ResolvedState."""
+    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> "ResolvedMode | None":  # noqa: ARG002, D102
         other = self.mode.at(resolution)
         found = self.mode.move(cast("ModeState", self.point), other, run)
         return None if found is None else _resolved(other, found)
@@ -191,7 +182,7 @@ class ResolvedMode(ResolvedState):
         found = self.solve_at(shifted(self.case.resolution, 2), run)
         return ([], False) if found is None else ([found], True)
 
-    def at_rest(self, _: Run) -> ResolvedMode:
+    def at_rest(self, _: Run) -> Self:
         """As in ResolvedState: the mode itself says where its masses rest."""
         return self
 

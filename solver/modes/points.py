@@ -4,13 +4,11 @@ The errors of frequency and damping are, as those of a start state, the change w
 safety factor, and the change with the tangential history that the reference sweep leaves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure, first_response
-from solver.loading_history.path import Path, Step
+from solver.loading_history.path import Step
 from solver.loading_history.sweep import Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_rest
@@ -146,7 +144,7 @@ class _Way:
         found = sweep.state_at(amplitude, run.fresh())
         if not isinstance(found, Step):
             return _lost(sweep)
-        return _judged(_mode_of(sweep.path), found.state, sweep, run)
+        return _judged(cast("NonlinearMode", sweep.path), found.state, sweep, run)
 
     def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState]:
         """The sweep with rising amplitude at the node before an amplitude; without a node where it does not begin."""
@@ -167,7 +165,7 @@ class _Way:
             if rest.glued:
                 raised = self._raised_to(rest, top, deadline)
                 first = raised.last if raised.ahead is None else raised.ahead.state
-                mode, budget.iterations = _mode_of(raised.path), raised.budget.iterations
+                mode, budget.iterations = cast("NonlinearMode", raised.path), raised.budget.iterations
             else:
                 first = rest.sliding(top, Run(mode.case.settings.tolerance, budget))
             self.down, self.top = _begun(mode, first, -1.0, budget), top
@@ -179,11 +177,6 @@ def _begun(mode: NonlinearMode, first: ModeState | None, sign: float, budget: Bu
     if first is not None:
         sweep.begin(mode, first)
     return sweep
-
-
-def _mode_of(path: Path[ModeState]) -> NonlinearMode:
-    assert isinstance(path, NonlinearMode)
-    return path
 
 
 def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | None, run: Run) -> ModePoint | Failure:

@@ -1,7 +1,5 @@
 """What is reported of a converged state: pressures, slip, responses, loops, certificate; or its whole motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

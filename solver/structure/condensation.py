@@ -6,8 +6,6 @@ into those of the pairs (r) and all others (i),
     Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = f_r - A_ri A_ii^-1 f_i.                                         (8)
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,11 +23,6 @@ DENSE_BYTES = 2e6
 
 CACHED_STRUCTURES = 8
 """Condensed structures in the cache. A wear history with its errors uses six."""
-
-
-def _others(n: int, relative: IntArray) -> IntArray:
-    """Indices of all displacements of a structure but the relative ones, ascending."""
-    return np.setdiff1d(np.arange(n), relative)
 
 
 def _dynamic_stiffness(linear: LinearModel, exponent: complex | ComplexArray, at: Any) -> ComplexArray:
@@ -181,7 +174,7 @@ def _condense_each(
 
 def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray, load: ComplexArray) -> Moving:
     """As `_condense_each`, of a real structure, with matrices shared by all harmonics."""
-    others = _others(load.size, relative)
+    others = np.setdiff1d(np.arange(load.size), relative)
     exponents: ComplexArray = np.asarray(1j * rates[:, None, None], complex)
     rows = np.vstack([linear.response, load.conj()])
     inner, to_pairs = (_dynamic_stiffness(linear, exponents, np.ix_(others, at)) for at in (others, relative))
@@ -210,7 +203,7 @@ def condense(full: Matrix, relative: IntArray, load: Matrix, rows: Matrix | None
 
     Raises numpy.linalg.LinAlgError where the block of the other displacements is singular.
     """
-    others = _others(full.shape[-1], relative)
+    others = np.setdiff1d(np.arange(full.shape[-1]), relative)
     seen = np.zeros((*full.shape[:-2], 0, full.shape[-1])) if rows is None else rows
     to_pairs, to_others = full[..., relative, :], full[..., others, :]
     # the other displacements per u, with the sign reversed, and under the load with u = 0
@@ -236,7 +229,7 @@ def whole_motion(
     Both change with exp(s t); exponent: s, 1/s, `i n w` in harmonic n.
     Raises SingularStructureError where the structure with a stuck joint is singular.
     """
-    n_rel, others, whole = relative.size, _others(len(linear.mass), relative), np.zeros(load.shape, complex)
+    n_rel, others, whole = relative.size, np.setdiff1d(np.arange(len(load)), relative), np.zeros(load.shape, complex)
     whole[relative] = moved
     if others.size:
         rows = _dynamic_stiffness(linear, exponent, np.ix_(others, np.concatenate([relative, others])))

@@ -5,8 +5,6 @@ are equally spaced over one period, the first at phase 0 (`N` of them, on the la
 harmonic n means `x(t) = Re(X exp(i n w t))`, so `X = cosine - i sine`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 

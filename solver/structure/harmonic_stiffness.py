@@ -1,7 +1,5 @@
 """The condensed dynamic stiffness Z_r of Eq. (8) at all harmonics: storage, and product with a motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import cast
@@ -24,7 +22,7 @@ class DenseStiffness:
         return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
 
     @cached_property
-    def single(self) -> DenseStiffness:
+    def single(self) -> "DenseStiffness":
         """Z_r in single precision."""
         return DenseStiffness(self.dense.astype(np.complex64))
 
@@ -79,7 +77,7 @@ class SharedStiffness:
         return forces[:n_rel] - self._product(back, behind)
 
     @cached_property
-    def single(self) -> SharedStiffness:
+    def single(self) -> "SharedStiffness":
         """As in `DenseStiffness`."""
         return replace(self, inner_compliance=self.inner_compliance.astype(np.complex64))
 

@@ -9,8 +9,6 @@ with the stiffness Z_n of the structure and the penalty E_n. So E_n has to be ne
   mass dominates in the harmonics that are left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -58,10 +56,6 @@ class Penalty:
         """Penalty (n_contact, 3), N/m, of the three displacements of elastic pairs."""
         return np.stack([self.normal, self.tangential, self.tangential], axis=1)
 
-    def at_rate(self, rate: float) -> FloatArray:
-        """E (n_contact, 2), N/m, normal and tangential, of a motion that grows at a real rate, 1/s."""
-        return np.stack([self.normal, np.where(self.inertial, self.mass * rate**2, self.tangential)], axis=1)
-
 
 def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     """Penalty from the condensed `K + s^2 M` at the real rate s = `(highest + 1) omega`, the first harmonic left out.
@@ -79,7 +73,8 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     mass = np.ones(contact.n_contact)
     if inertial.any():
         # the mass that a tangential force accelerates, with all other pairs free: 1 / G = k + m s^2, compliance G
-        low, high = (1.0 / compliance_at(model, s) for s in (rate, 2.0 * rate))
+        of = model.harmonic_structure(1), tuple(contact.relative.tolist())
+        low, high = (1.0 / _diagonal(*of, s, compliance=True) for s in (rate, 2.0 * rate))
         pair, component = np.divmod(contact.component_index, 3)
         least, tangent = np.full(contact.n_contact, np.inf), component > 0
         np.minimum.at(least, pair[tangent], ((high - low) / (3.0 * rate**2))[tangent])
@@ -106,15 +101,9 @@ def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
     return np.where(size > 0.0, size, 1.0)
 
 
-def compliance_at(model: ReducedModel, rate: float) -> FloatArray:
-    """Compliance (n_rel,), m/N, of each relative displacement at a real rate, 1/s, with all others free."""
-    relative = model.contact.relative
-    return _diagonal(model.harmonic_structure(1), tuple(relative.tolist()), rate, compliance=True)
-
-
 @lru_cache(maxsize=64)
 def _diagonal(linear: LinearModel, relative: tuple[int, ...], rate: float, *, compliance: bool) -> FloatArray:
-    """Diagonal of the condensed `K + s^2 M`, N/m, or of its inverse, m/N: the same for many states."""
+    """Diagonal (n_rel,) of the condensed `K + s^2 M`, N/m, or of its inverse, m/N: the same for many states."""
     full = linear.stiffness + rate**2 * linear.mass
     with regular(f"in motions that grow at {rate:.6g} 1/s: a part has neither mass nor stiffness"):
         condensed = condense(full, np.array(relative, np.intp), np.zeros(full.shape[0])).stiffness

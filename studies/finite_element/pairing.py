@@ -1,7 +1,5 @@
 """Contact pairs of two surfaces: nodes of one surface, and points of the other; the meshes need not match."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -59,7 +57,7 @@ class ContactSurfaces:
         return axis.turned(coordinates, self.sector)
 
     @property
-    def turned_round(self) -> ContactSurfaces:
+    def turned_round(self) -> "ContactSurfaces":
         """The same with the surfaces in the other order."""
         return replace(self, first=self.second, second=self.first, sector=-self.sector, label=self.name)
 
@@ -126,7 +124,7 @@ class ContactPairs:
         carried.eliminate_zeros()
         return carried
 
-    def chosen(self, which: IntArray | BoolArray) -> ContactPairs:
+    def chosen(self, which: IntArray | BoolArray) -> "ContactPairs":
         """Some of the pairs."""
         return replace(self, **{name: getattr(self, name)[which] for name in ("opposite", *_ARRAYS)})
 

@@ -145,7 +145,6 @@ def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
 
 
 def _retained(stiffness: Matrix, pairs: ContactPairs, joint: JointDefinition) -> Matrix:
-    """Reduced stiffness with the retainer."""
     if (retainer := joint.retainer) is None:
         return stiffness
     direction = retainer.direction / np.linalg.norm(retainer.direction)

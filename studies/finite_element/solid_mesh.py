@@ -3,8 +3,6 @@
 Matrices are (3 n_nodes, 3 n_nodes), unconstrained, displacements node by node in x, y, z.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -59,7 +57,7 @@ class SolidMesh:
         """Number of nodes."""
         return len(self.coordinates)
 
-    def with_nodes(self, numbers: IntArray) -> SolidMesh:
+    def with_nodes(self, numbers: IntArray) -> "SolidMesh":
         """The mesh with further nodes (m,), without elements or a place: others follow them."""
         coordinates = np.vstack([self.coordinates, np.full((len(numbers), 3), np.nan)])
         return SolidMesh(coordinates, np.concatenate([self.numbers, numbers]), self.groups)
@@ -153,7 +151,7 @@ def _batches(group: ElementGroup) -> Iterator[slice]:
 
 
 def _assemble(
-    mesh: SolidMesh, matrices_of: Callable[[ElementBatch, IntArray], FloatArray], per_node: int
+    mesh: SolidMesh, matrices_of: "Callable[[ElementBatch, IntArray], FloatArray]", per_node: int
 ) -> sparse.csr_matrix:
     """Sum of the element matrices of batches and their nodes, `per_node` displacements a node."""
     size = per_node * mesh.n_nodes

@@ -4,8 +4,6 @@ Each is a module of this package with a class `Parameters`, a `studies.scene.Sce
 scene is asked for, so that listing the scenes costs nothing.
 """
 
-from __future__ import annotations
-
 import inspect
 import sys
 from importlib import import_module
@@ -34,7 +32,7 @@ AUTOMATIC_HARMONICS_OF_A_WAVE = 39
 """Harmonics whose nodal diameters a cyclic scene is built with where their number is automatic."""
 
 
-def scene_parameters(model: str) -> type[Scene]:
+def scene_parameters(model: str) -> "type[Scene]":
     """Class of the parameters of a bundled scene. Raises SceneError where no bundled scene has this name."""
     if model not in BUNDLED:
         remedy = f"give one of {', '.join(BUNDLED)}, or the path of a scene file or of a model (.inp, .msh, .cdb, .csv)"
@@ -42,7 +40,7 @@ def scene_parameters(model: str) -> type[Scene]:
     return cast("type[Scene]", import_module(f"{__name__}.{model}").Parameters)
 
 
-def build_scene(model: str, parameters: BaseModel, n_harmonics: int) -> ReducedModel:
+def build_scene(model: str, parameters: "BaseModel", n_harmonics: int) -> "ReducedModel":
     """Reduced model of a bundled scene, with all nodal diameters that the harmonics 0..n_harmonics see.
 
     Raises SceneError where the parameters describe no possible structure.

@@ -7,9 +7,7 @@ halves, a depth is the sum of both bodies. A stroke has to be small against the 
 that of Hertz, the stick zone that of Cattaneo; partial slip wears to a known profile.
 """
 
-from __future__ import annotations
-
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -68,7 +66,7 @@ class Parameters(PressedBody):
     )
 
     @model_validator(mode="after")
-    def _check_depth(self) -> Parameters:
+    def _check_depth(self) -> Self:
         width, reference = 2.0 * self.patched, self._reference_depth
         if reference <= width:
             raise SceneError("depth", f"{reference:g}", f"give more than the width of all strips, {width:g} m")

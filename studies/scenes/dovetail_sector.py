@@ -91,13 +91,6 @@ class Parameters(SectorParameters):
     fillet_height: float = Field(0.008, gt=0, description="height over which the neck blends into the blade, m")
 
     @property
-    def retainer(self) -> float:
-        """Stiffness of the retainer, N/m, with its default filled in."""
-        if self.retention_stiffness is None:
-            return _TRAVELLING_RETAINER if self.nodal_diameter > 0 else 0.0
-        return self.retention_stiffness
-
-    @property
     def flank_bottom(self) -> tuple[float, float]:
         """Radius along the centre line and half width, m, at the inner end of the flanks."""
         angle = radians(self.flank_angle)
@@ -106,8 +99,7 @@ class Parameters(SectorParameters):
             self.flank_top_half_width + self.flank_length * sin(angle),
         )
 
-    def impossible(self) -> Iterator[tuple[bool, str, str]]:
-        """As `SectorParameters.impossible`."""
+    def impossible(self) -> Iterator[tuple[bool, str, str]]:  # noqa: D102
         yield from super().impossible()
         (bottom_radius, bottom_half_width), neck = self.flank_bottom, self.flank_top_half_width
         low = bottom_radius <= self.slot_bottom_radius + self.root_clearance
@@ -157,7 +149,8 @@ class Parameters(SectorParameters):
         right = np.concatenate([web[:, -1], post_right[1:, -1]]).ravel()
         pairs = build_contact_pairs(solid, contacts, AXIS)
         pairs = _arranged(pairs, np.concatenate(blade_flanks), solid.n_nodes)
-        retainer = Retainer(self.retainer, AXIS)
+        usual = _TRAVELLING_RETAINER if self.nodal_diameter > 0 else 0.0
+        retainer = Retainer(usual if self.retention_stiffness is None else self.retention_stiffness, AXIS)
         return self.sector_of(solid, contacts, web[0].ravel(), (left, right), tip, retainer, pairs)
 
 

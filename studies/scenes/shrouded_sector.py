@@ -43,8 +43,7 @@ class Parameters(SectorParameters):
     shroud_angle: float = Field(35.0, ge=-60, le=60, description="angle of blade and contact faces at the tip, degrees")
     shroud_thickness: float = Field(0.006, gt=0, description="radial thickness of the shroud, m")
 
-    def define_sector(self) -> tuple[FeModel, JointDefinition]:
-        """As `SectorParameters.define_sector`."""
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:  # noqa: D102
         self.check()
         m, angle = self.mesh, radians(self.shroud_angle)
         solid, (disk, _, shroud) = mesh_of_bodies([(self._blocks(), ("disk", "blade", "shroud"), self.material)])
@@ -55,8 +54,7 @@ class Parameters(SectorParameters):
         cut = disk[:, 0].ravel(), disk[:, -1].ravel()
         return self.sector_of(solid, (contact,), disk[0].ravel(), cut, (middle, across))
 
-    def impossible(self) -> Iterator[tuple[bool, str, str]]:
-        """As `SectorParameters.impossible`."""
+    def impossible(self) -> Iterator[tuple[bool, str, str]]:  # noqa: D102
         yield from super().impossible()
         wide = self._blade_half_angle(self.rim_radius, self.root_angle) > 0.9 * self.half_pitch
         remedy = "make it thinner, or use fewer blades, so that there is room between the blades"

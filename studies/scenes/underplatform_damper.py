@@ -55,8 +55,7 @@ class Parameters(SectorParameters):
         """Radial height of the roof over the sides of the wedge, m."""
         return (self.damper_half_width - 0.5 * self.platform_gap) * tan(radians(self.roof_angle))
 
-    def define_sector(self) -> tuple[FeModel, JointDefinition]:
-        """As `SectorParameters.define_sector`."""
+    def define_sector(self) -> tuple[FeModel, JointDefinition]:  # noqa: D102
         self.check()
         m, angle = self.mesh, radians(self.tip_angle)
         blade_body = (self._blade_body(), ("disk", "shank", "platform", "blade"), self.material)
@@ -77,8 +76,7 @@ class Parameters(SectorParameters):
         cut, retainer = (disk[:, 0].ravel(), disk[:, -1].ravel()), Retainer(self.retention_stiffness, AXIS)
         return self.sector_of(solid, contacts, disk[0].ravel(), cut, (middle, across), retainer)
 
-    def impossible(self) -> Iterator[tuple[bool, str, str]]:
-        """As `SectorParameters.impossible`."""
+    def impossible(self) -> Iterator[tuple[bool, str, str]]:  # noqa: D102
         yield from super().impossible()
         half, room = self.damper_half_width, 0.95 * self.half_pitch * self.platform_radius
         yield 0.5 * self.platform_gap >= half, "platform_gap", "make it smaller than the wedge is wide"

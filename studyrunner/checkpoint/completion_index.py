@@ -1,7 +1,5 @@
 """Finished tasks of a plan, and results of earlier runs: the link between tasks and the file of a run."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Collection, Iterator, Sequence

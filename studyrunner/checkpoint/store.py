@@ -5,8 +5,6 @@ lock share no memory with other processes, as WAL does: this works on file syste
 a finished transaction survives a power cut.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -4,8 +4,6 @@ bundled studies on one core. A joint that jumps takes longer; one in which nothi
 Numbers of Newton iterations have in brackets what was measured.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

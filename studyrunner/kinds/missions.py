@@ -1,14 +1,13 @@
 """Mission histories: tasks and their computation."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from solver.contact.wear_law import WearLaw
 from solver.missions.mission import Begin, Block, MissionRequest
+from solver.model import ReducedModel
 from solver.packing import Packed
 from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds import task as tasks
@@ -16,9 +15,6 @@ from studyrunner.kinds.estimate import iterations_of_missions, missions_computed
 from studyrunner.kinds.results import mission_values
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
 
 _NO_JOINT = tasks.TaskJoint(0, None)
 

@@ -1,22 +1,18 @@
 """Nonlinear modes: tasks and their computation."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
 
+from solver.model import ReducedModel
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
 from studyrunner.kinds.results import first_harmonic, named
 from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
 from studyrunner.variables import OF_A_MODE_POINT
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
 
 
 @dataclass(frozen=True, kw_only=True)

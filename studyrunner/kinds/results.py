@@ -1,7 +1,5 @@
 """From what the solver returns to the variables of a result: of a wear history, and of a mission history."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -53,7 +51,7 @@ def named(names: Sequence[str], own: Mapping[str, Any], source: object) -> dict[
     return {name: own[name] if name in own else getattr(source, name) for name in names}
 
 
-def build_result(task: History, integrated: Integrated, history: WearHistory, place: int = 0) -> PointResult:
+def build_result(task: "History", integrated: "Integrated", history: WearHistory, place: int = 0) -> PointResult:
     """One history of a task at the output counts, with the variables that the task asks for.
 
     integrated: the history that was integrated. place: number among those that are read from it.
@@ -127,7 +125,7 @@ def _at_counts(
     return found
 
 
-def mission_values(task: Mission, history: MissionHistory) -> dict[str, Any]:
+def mission_values(task: "Mission", history: "MissionHistory") -> dict[str, Any]:
     """Variables of the result, at the numbers of missions that the task asks for."""
     counts = np.array(task.missions)
     rows, ends = (np.searchsorted(history.missions, each) for each in (counts, np.clip(counts, 1.0, None)))

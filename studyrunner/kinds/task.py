@@ -3,8 +3,6 @@
 There are four kinds of tasks: `Sweep` and `History` (`wear`), `Mode` (`modes`), `Mission` (`missions`).
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import json
@@ -13,10 +11,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from solver.model import ReducedModel
 from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
@@ -24,11 +23,7 @@ from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.scene.scene_set import ContactChange
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
-from studyrunner.system.machine import package_digest
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
-    from studyrunner.system.machine import MappedFile
+from studyrunner.system.machine import MappedFile, package_digest
 
 Index = tuple[int, ...]
 """Index of a point along the dimensions of the study."""
@@ -82,7 +77,7 @@ class StartResult:
         return Packed(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
 
     @classmethod
-    def unpack(cls, place: int, packed: Packed) -> StartResult:
+    def unpack(cls, place: int, packed: Packed) -> "StartResult":
         """The start state from the output of `pack`. Raises an error where it is none that a history can begin from."""
         from solver.results.history import StartState  # a run alone needs it, and numba with it
 
@@ -188,7 +183,7 @@ class Task(ABC):
         """Number of the sweep, and place of the start state, without which the task cannot begin."""
         return None
 
-    def from_start(self, result: StartResult) -> Task:  # noqa: ARG002
+    def from_start(self, result: StartResult) -> "Task":  # noqa: ARG002
         """The task that begins from a start state, where it waits for one."""
         return self
 
@@ -246,7 +241,7 @@ class TaskPlan:
     n_points: int
     sweeps: tuple[Task, ...] = ()
 
-    def named(self, identity: Identity) -> TaskPlan:
+    def named(self, identity: Identity) -> "TaskPlan":
         """The plan with the names and keys of its tasks."""
 
         def with_names(task: Task) -> Task:

@@ -1,7 +1,5 @@
 """Tasks of wear: start states along a sweep, and wear histories that begin from them."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.wear_law import WearLaw
+from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
@@ -22,7 +21,6 @@ from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.variables import OWN_STEPS
 
 if TYPE_CHECKING:
-    from solver.model import ReducedModel
     from solver.wear.wearing_joint import WearRequest
 
 _COST_AT_REST = 0.01  # estimated time of a history in which nothing wears, over that of a history with steps
@@ -206,7 +204,7 @@ class History(_FromRest):
         wear = (kind, self.wear_coefficient, tuple((each.step, each.scheme) for each in self.integrated))
         return (("task", kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
 
-    def from_start(self, result: StartResult) -> History:
+    def from_start(self, result: StartResult) -> "History":
         """The history from a start state. Its time grows with the unknowns: a history seldom factorises anew."""
         n_unknowns = result.n_unknowns or self.n_unknowns
         cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else _COST_AT_REST))
@@ -238,7 +236,7 @@ class History(_FromRest):
             for place in places:
                 yield replace(build_result(self, each, history, self.results[place][1]), place=place)
 
-    def _asked(self, integrated: Integrated) -> WearRequest:
+    def _asked(self, integrated: Integrated) -> "WearRequest":
         from solver.wear.wearing_joint import WearRequest, steps_of
 
         counts: NDArray[np.float64] | ToTheEnd

@@ -5,8 +5,6 @@ k_w the same states follow each other, each at the cycle count t / s. Where the 
 integrates the history of the largest k_w; the others are read from this one at the counts s t.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter
@@ -219,7 +217,6 @@ def _group(study: Study, point: _Values) -> tuple[str, Hashable]:
 
 
 def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
-    """The histories by task."""
     groups: dict[object, list[_Shared]] = {}
     for each in shared:
         alone = each[0].unworn or not study.solver.shortcuts

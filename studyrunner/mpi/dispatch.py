@@ -5,8 +5,6 @@ By hand: the pools of mpi4py and schwimmbad know no expected run times and leave
 here 1.97).
 """
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence

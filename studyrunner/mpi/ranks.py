@@ -4,8 +4,6 @@ Only this module imports mpi4py, and only where a launcher is at work: `run-stud
 calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNELED). The loss of a rank ends all.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import platform
@@ -14,13 +12,9 @@ import time
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from studyrunner.system.machine import package_digest
 from studyrunner.system.process import die, leave_endings, uninterrupted
-
-if TYPE_CHECKING:
-    from mpi4py import MPI
 
 POLL_SECONDS = 1e-3  # between two looks for a message: a blocking receive would keep a core busy
 

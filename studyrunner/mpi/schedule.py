@@ -4,8 +4,6 @@ A job has one result or several, each handed on at once, and reports its progres
 can continue from there. By hand: in the pools of mpi4py and schwimmbad a job has one result and no progress.
 """
 
-from __future__ import annotations
-
 import itertools
 import queue
 import threading
@@ -66,14 +64,12 @@ class _Compiler(Listener):
         return time.perf_counter() - self.seconds
 
     def on_start(self, event: Event) -> None:  # noqa: ARG002
-        """Begin of a function, which may be inside another one."""
         if self._depth == 0:
             self._began = time.perf_counter()
             self.say(COMPILING)
         self._depth += 1
 
     def on_end(self, event: Event) -> None:  # noqa: ARG002
-        """End of a function."""
         self._depth -= 1
         if self._depth == 0:
             self.seconds += time.perf_counter() - self._began

@@ -1,7 +1,5 @@
 """The command `study-report`."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
@@ -118,7 +116,7 @@ def _report(options: argparse.Namespace) -> int:
     return WRITTEN
 
 
-def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Result:
+def _compute(result: "Result", folder: Path, options: argparse.Namespace) -> "Result":
     """The result with what its file does not hold of the worn joint: what was asked for, and its response curve."""
     from studyrunner.worn_joint import compute_worn_joint, has_worn_response
 

@@ -1,7 +1,5 @@
 """The table of figures: all figures and tables of the report, in the order of the page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, cast

@@ -1,7 +1,5 @@
 """Figures of the report: their one style, panels and what stands in them, their files; and tables."""
 
-from __future__ import annotations
-
 import csv
 import math
 import textwrap

@@ -5,8 +5,6 @@ matplotlib has written, are taken as they are. Numbers of the interactive part a
 floats, within a limit of size.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import math
@@ -75,7 +73,6 @@ def _save(drawing: Drawing, folder: Path) -> dict[str, Any]:
 
 
 def _build_page(result: Result, parts: Sequence[Any]) -> str:
-    """The page as text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
 

@@ -7,8 +7,6 @@ of one of them.
 By hand: `mplot3d` leaves a wide margin, and draws both sides of a face alike; the PVD file is a few lines.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable
@@ -82,7 +80,7 @@ class RootSurface:
         worn[self.contact_nodes] -= factor * np.nan_to_num(depth[self.pairs])[:, None] * self.normals
         return worn
 
-    def near_contact(self, most_faces: int) -> RootSurface:
+    def near_contact(self, most_faces: int) -> "RootSurface":
         """The surface with at most so many faces: those in contact, and those nearest to them."""
         if len(self.faces) <= most_faces:
             return self

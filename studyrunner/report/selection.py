@@ -1,7 +1,5 @@
 """What a figure shows of a result: some combinations of the axes, and an axis, or slow time, to draw over."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass

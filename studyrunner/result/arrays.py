@@ -1,7 +1,5 @@
 """Attributes of the variables of a result file, and all of its arrays that no task computes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

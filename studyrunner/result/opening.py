@@ -5,8 +5,6 @@ Texts of the file stay texts: without control characters and line breaks, and as
 By hand: `xarray-schema` has no limits of sizes, and leaves texts as they are.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import warnings
@@ -57,10 +55,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     place of `contact`. The file stays open until the dataset is closed: use it in a `with` statement, or call its
     `load` and `close`. A file that is replaced meanwhile, by another run, stays as it was for this dataset.
 
-    Raises
-    ------
-    UserError
-        Where there is no such file, it is no result of `run-study`, or it is damaged: one line.
+    Raises UserError where there is no such file, it is no result of `run-study`, or it is damaged: one line.
     """
     opened = _open(path)[0]
     # without axes of one value, which would leave no room for the words where the dataset is printed

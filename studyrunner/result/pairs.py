@@ -3,8 +3,6 @@
 Where the scenes of a study differ in their pairs, a figure shows one scene.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re

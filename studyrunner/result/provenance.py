@@ -1,7 +1,5 @@
 """Origin of a result: attributes of the file, and a comparison of a result with the present scene and solver."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 from collections.abc import Iterator

@@ -1,22 +1,18 @@
 """Files that a run writes: obstacles are found, and results of other studies protected, before anything is computed."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from studyrunner.checkpoint.store import read_study
+from studyrunner.study.study import Study
 from studyrunner.study.text import read_archived, read_toml
 from studyrunner.system.machine import find_fault, new_partial
 from studyrunner.user_error import UserError
-
-if TYPE_CHECKING:
-    from studyrunner.study.study import Study
 
 _BYTES_OF_TRIAL = 4096  # a full disk has room for a name
 

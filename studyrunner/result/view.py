@@ -1,7 +1,5 @@
 """A result file as summary and report read it: axes, points with results, how well they are known, the shown point."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
@@ -51,7 +49,7 @@ class Result:
     fixed: tuple[str, ...] = ()
     blocks: xr.Dataset | None = None
     chosen: Mapping[str, float | str] = field(default_factory=dict)
-    measured: Profile | None = None
+    measured: "Profile | None" = None
     recomputed: Mapping[str, xr.Dataset] = field(default_factory=dict)
     no_worn_response: str = ""
 

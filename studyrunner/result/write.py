@@ -6,8 +6,6 @@ the number of points.
 By hand: `to_netcdf` of xarray has the whole result in memory, or needs dask.
 """
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import math
@@ -140,7 +138,6 @@ def _slabs(
 def _create_all(
     file: netCDF4.Dataset, study: Study, facts: SceneFacts, slab: Sequence[int], arrays: Sequence[SmallArray]
 ) -> dict[str, Variable]:
-    """Dimensions and variables of the histories."""
     sizes = {name: len(values) for name, values in study.dimensions.items()} | variable_sizes(study, facts)
     variables = {**study.recorded, **study.kind.always}
     for name, size in sizes.items():
@@ -163,7 +160,7 @@ def _create_all(
 
 def _create(
     file: netCDF4.Dataset, name: str, entry: Variable, dimensions: Sequence[str], chunks: Sequence[int]
-) -> netCDF4.Variable[Any]:
+) -> "netCDF4.Variable[Any]":
     """A compressed variable with its attributes; texts of any length cannot be compressed."""
     if entry.is_text:
         variable = file.createVariable(name, str, dimensions)

@@ -1,15 +1,14 @@
 """What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, scene files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.model import ReducedModel
 from studies.scene import Progress, as_scene, stuck_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
@@ -19,9 +18,6 @@ from studyrunner.study.parts import parts_of
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import Variable
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """The scene of a study: builds or reads the reduced model and describes the scene for the runner."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json
@@ -9,14 +7,14 @@ import math
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
+from solver.model import ContactInterface, ReducedModel
 from studies.fe_models.files import file_digest
-from studies.scene import Progress, as_scene, make_compliant, silent, stuck_frequencies
+from studies.scene import Progress, SurfaceMesh, as_scene, make_compliant, silent, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.study.mistakes import raise_wrong, scene_errors
@@ -25,10 +23,6 @@ from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
 from studyrunner.values import Wrong
 from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
-
-if TYPE_CHECKING:
-    from solver.model import ContactInterface, ReducedModel
-    from studies.scene import SurfaceMesh
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
 
@@ -203,9 +197,7 @@ def largest_harmonics(model: ReducedModel) -> int | None:
     """Largest number of harmonics for which the model has all nodal diameters; None without limit."""
     # After n_sectors harmonics the nodal diameters come again.
     for harmonic in range(1, model.n_sectors):
-        try:
-            model.harmonic_structure(harmonic)
-        except KeyError:
+        if not model.has_harmonics(harmonic):
             return harmonic - 1
     return None
 

@@ -1,7 +1,5 @@
 """The scenes of a study: which of its parts share one, what a result says of them, and what differs in their pairs."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -207,9 +205,8 @@ def scatters_pairs(study: Study) -> bool:
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
-    """Wear depths (n_contact,), m, with which a study of one scene begins. Raises UserError where pairs differ."""
-    if study.scene.worn is None:
-        return np.zeros(facts.contact.n_contact)
+    """Wear depths (n_contact,), m, with which a study of a worn scene begins. Raises UserError where pairs differ."""
+    assert study.scene.worn is not None
     try:
         return np.array(study.scene.worn.depths(facts.contact.n_contact))
     except Wrong as error:

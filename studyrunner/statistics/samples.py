@@ -7,8 +7,6 @@ By hand: functions of `scipy.stats` take no samples without a value, `spearmanr`
 quantiles are of one set of samples a call; mixtures of scikit-learn take a skewed density for two groups.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -52,17 +50,17 @@ class SampleValues:
         """Whether a sample has a value, (..., n)."""
         return np.asarray(self.low == self.high)
 
-    def at(self, place: Any) -> SampleValues:
+    def at(self, place: Any) -> "SampleValues":
         """Some of the points or samples, as numpy's indices select them."""
         return SampleValues(self.low[place], self.high[place], self.error[place])
 
-    def widened(self, where: Any = True) -> SampleValues:
+    def widened(self, where: Any = True) -> "SampleValues":
         """Some of the samples, or all, between their values less and more the numerical error, without error."""
         by = np.where(where, self.error, 0.0)
         return SampleValues(self.low - by, self.high + by, np.where(where, 0.0, self.error))
 
     @property
-    def limited(self) -> SampleValues:
+    def limited(self) -> "SampleValues":
         """The samples with no bound above the largest value."""
         largest = np.where(self.is_known, self.high, self.low).max(axis=-1, keepdims=True)
         return SampleValues(self.low, np.minimum(self.high, np.maximum(largest, self.low)), self.error)

@@ -1,7 +1,5 @@
 """The statistics of a result with samples, as a labelled dataset and in sentences."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The keys of a study file as text, from the classes that check them: a new study, and a list of all keys."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, get_args, get_origin

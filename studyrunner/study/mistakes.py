@@ -1,7 +1,5 @@
 """What is wrong with the tables of a study: one sentence for each key that pydantic or a rule between keys refuses."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,16 +1,14 @@
 """A study in parts that have one scene and one sample each, and how wide their scenes have to be for what they wear."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
+from solver.model import ContactInterface
 from studies.scene import ExpectedWear, as_scene
 from studyrunner.scatter import Scattered, draw
 from studyrunner.study.scene_section import SceneSection
@@ -18,9 +16,6 @@ from studyrunner.study.sections import MissionBlock
 from studyrunner.study.study import NUMBERS, Study
 from studyrunner.user_error import UserError
 from studyrunner.values import Wrong
-
-if TYPE_CHECKING:
-    from solver.model import ContactInterface
 
 _FAR = 3.1
 """Standard deviations of each input up to which a scene has room for the wear of its samples: 999 of 1000 lie below.

@@ -1,7 +1,5 @@
 """Rules between the tables of a study, which are right themselves. Each yields what breaks it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, get_args
 
@@ -75,7 +73,6 @@ def _frequency(study: Study) -> Iterator[Wrong]:
 
 
 def _followed(study: Study) -> str | None:
-    """What the frequency follows."""
     given: tuple[Any, ...] = study.axes.frequency or ()
     return next((each for each in given if isinstance(each, str)), None)
 

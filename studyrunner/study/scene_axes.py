@@ -1,7 +1,5 @@
 """Axes that are keys of other tables: friction, speed, mesh, a threshold, the factor of a surface; harmonics."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -1,7 +1,5 @@
 """[scene] of a study: the scene that its model names, its parameters, its files, and wear before its history begins."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -77,7 +75,7 @@ class Worn(Section):
             remedy = "give one cycle count in scene.worn.cycle for each state, or one state without a count"
             yield Wrong("depth", found, remedy)
 
-    def states(self) -> tuple[Worn, ...]:
+    def states(self) -> tuple["Worn", ...]:
         """Each state alone, without its count."""
         return tuple(self.model_copy(update={"depth": (each,), "cycle": ()}) for each in self.depth)
 
@@ -241,7 +239,7 @@ def read_worn(table: object, source: str, folder: Path) -> Worn:
         return Worn(depth=depth.tolist(), cycle=given.cycle, result=given.result)
 
 
-def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:
+def _depths_in(dataset: "xr.Dataset", point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:
     """Depths (n_states, n_contact), m, of a point of a result at cycle counts."""
     if "wear_depth" not in dataset:
         raise UserError(source, "scene.worn.result", None, "give a result with wear_depth among its variables")

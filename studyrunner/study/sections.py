@@ -1,7 +1,5 @@
 """The tables of a study file but [scene] and [scatter]: their keys, what each key takes, its default."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
@@ -139,7 +137,7 @@ class WearSection(Section):
         factors = {f"{_OF_SURFACE}{label}": factor for label, factor in (self.surfaces or {}).items()}
         return own | {name: factor for name, factor in factors.items() if name.isidentifier()}
 
-    def with_numbers(self, values: Mapping[str, float]) -> WearSection:
+    def with_numbers(self, values: Mapping[str, float]) -> "WearSection":
         """With other values of `numbers`."""
         own = {label: values.get(f"{_OF_SURFACE}{label}", factor) for label, factor in (self.surfaces or {}).items()}
         return self.model_copy(update={"threshold": values.get("threshold", self.threshold), "surfaces": own or None})

@@ -1,7 +1,5 @@
 """The study: what a study file says, checked, frozen and with every default filled in; the three kinds of study."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -127,14 +125,14 @@ class Study(Section):
     scatter: ScatterSection | None = None
     loading: sections.LoadingSection | None = None
     mission: tuple[sections.MissionBlock, ...] = ()
-    block_studies: tuple[Study, ...] = Field((), exclude=True)
+    block_studies: tuple["Study", ...] = Field((), exclude=True)
     follow: FollowedFrequency | None = Field(None, exclude=True)
     source: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
     archived: Archived | None = Field(None, exclude=True)
     solver_axes: tuple[str, ...] = Field((), exclude=True)
     scene_axes: tuple[SceneAxis, ...] = Field((), exclude=True)
-    variants: tuple[Study, ...] = Field((), exclude=True)
+    variants: tuple["Study", ...] = Field((), exclude=True)
 
     @property
     def kind(self) -> Kind:

@@ -1,7 +1,5 @@
 """Reads a study: finds the file, applies the overrides, checks all of it; and writes the effective study as TOML."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import re

@@ -3,8 +3,6 @@
 By hand: `tomli_w` gives each value of a list a line of its own, and axes have up to 100 000 values.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """The summary of a result: for the command, the page and notebooks; as data, and in at most nine lines."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -73,7 +71,6 @@ class Summary:
         return tuple(f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in self.rows)
 
     def __str__(self) -> str:
-        """The summary as text."""
         return "\n".join(self.lines)
 
 

@@ -3,8 +3,6 @@
 Only results are in it: a history that was not computed to the end, or is known to a factor of two only, has no number.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Mapping

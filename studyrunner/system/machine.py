@@ -1,7 +1,5 @@
 """The machine: files as a run writes them, objects that ranks map, faults, and a hash of the software that computes."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import functools

@@ -5,8 +5,6 @@ exception; then the next call of `raise_ending` raises it again, until `begin_en
 `signal` of Python defers a signal or keeps a lost one, and its streams raise an error where nobody reads.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os
@@ -141,7 +139,7 @@ def keep_talking() -> None:
             setattr(sys, name, io.TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=True))
 
 
-def last_error(stream: TextIO) -> OSError | None:
+def last_error(stream: "TextIO") -> OSError | None:
     """Why something that was written to a stream did not arrive; None where it did, or where nobody can know."""
     buffer = getattr(stream, "buffer", None)
     return buffer.error if isinstance(buffer, _Patient) else None

@@ -1,7 +1,5 @@
 """Progress of a run on stderr: a bar with the time left on a terminal, a plain line now and then elsewhere."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable
@@ -99,7 +97,7 @@ class ProgressDisplay:
         return time.monotonic() - self._began
 
 
-def _new_bar() -> Progress | None:
+def _new_bar() -> "Progress | None":
     """A bar on stderr; None where it is no terminal that shows one."""
     from rich.console import Console  # where it is used: it takes a while to load
     from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn

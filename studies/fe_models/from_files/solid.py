@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from solver.model import FloatArray, IntArray
+from solver.model import IntArray
 from studies.fe_models.deck.contents import Deck
 from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import MaterialTable, Parameters
@@ -92,11 +92,11 @@ def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotatio
     own = None if speed is not None and given is not None else rotation_of_deck(deck, units)
     of_study = of_sector = rotation = None
     if given is not None:
-        of_study = _axis(np.array(given.point), np.array(given.direction))
+        of_study = np.array(given.point), np.array(given.direction) / np.linalg.norm(given.direction)
     if deck.cyclic is not None:
         n_sectors = n_sectors or deck.cyclic.n_sectors
         start, end = deck.cyclic.axis * units.length
-        of_sector = _axis(start, end - start)
+        of_sector = start, (end - start) / np.linalg.norm(end - start)
     missing = SceneError("axis", "missing", "give {point, direction} of the axis: the deck has none")
     if speed or (speed is None and own is not None):
         axis = of_study or (None if own is None else (own.point, own.axis)) or of_sector
@@ -112,11 +112,6 @@ def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotatio
     if axis is None:
         raise missing
     return rotation, CyclicAxis(n_sectors, *axis)
-
-
-def _axis(point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A point, and the unit vector along a direction."""
-    return point, direction / np.linalg.norm(direction)
 
 
 def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:

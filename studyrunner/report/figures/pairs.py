@@ -1,7 +1,5 @@
 """Contact pairs on their surfaces: numbers, wear depth and pressure, also over a scar (Figs. 3, 5, 10, 11, 12)."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any

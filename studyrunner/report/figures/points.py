@@ -1,7 +1,5 @@
 """All points of a study at once: trends along its axes, what samples say, how points ended, how right they are."""
 
-from __future__ import annotations
-
 import itertools
 import textwrap
 from collections.abc import Collection

@@ -1,7 +1,5 @@
 """Error against run time of the numerical settings that a file compares; the CSV file of the figure has all of them."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping

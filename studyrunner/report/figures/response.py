@@ -1,7 +1,5 @@
 """How the joint vibrates: response over frequency (Fig. 9 of the paper), modes, loops of pairs (Figs. 13 to 15)."""
 
-from __future__ import annotations
-
 import textwrap
 from dataclasses import dataclass
 from typing import Any

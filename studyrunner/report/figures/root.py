@@ -1,7 +1,5 @@
 """Pictures of the root: where it wears, slips and opens; the sector with its frequencies (Fig. 2)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib as mpl

@@ -2,8 +2,6 @@
 missions by block, with the vibration of each block.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
