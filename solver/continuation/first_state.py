@@ -61,17 +61,16 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
         return rest
     quiet, unstable = case.joint(omega, 0.0), False
 
-    def balance_at(load_factor: float, before: State) -> Balance:
-        joint = case.joint(omega, load_factor * excitation_amplitude)
-        return Balance(joint, before.history, first=before.evaluation.predicted_t)
+    def balance_at(load_factor: float, history: FloatArray, first: FloatArray | None = None) -> Balance:
+        return Balance(case.joint(omega, load_factor * excitation_amplitude), history, first=first)
 
-    whole = Balance(case.joint(omega, excitation_amplitude), rest.history)
+    whole = balance_at(1.0, rest.history)
     sliding = sliding_start(whole, rest)
     slid = None if sliding is None else run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
     if slid is not None and run.is_stable(whole.joint, slid.evaluation):
         return slid
     for fraction in (0.0, *RELIEF):
-        relieved = Balance(quiet, relieved_history(quiet, rest, fraction))
+        relieved = balance_at(0.0, relieved_history(quiet, rest, fraction))
         begun = run.state(relieved, rest.evaluation.predicted_h, 0.0) if fraction else rest
         if begun is None:
             continue

@@ -106,7 +106,7 @@ def follow_naturally(
     while state.parameter != target:
         ahead = min(done + fraction, 1.0)
         reach = target if ahead == 1.0 else start.parameter + ahead * whole
-        balance = balance_at(reach, state)
+        balance = balance_at(reach, state.history, state.evaluation.predicted_t)
         most = MOST_ITERATIONS if fraction <= 2.0 * shortest else NEAR_ITERATIONS
         if (found := run.state(balance, state.evaluation.predicted_h, reach, most)) is not None:
             state, done, fraction = found, ahead, min(2.0 * fraction, longest)
@@ -139,7 +139,13 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
         before = state.evaluation.history
         shift = joint.law.origin(state.evaluation.displacement_h[:, 1:, 0] - before)
 
-        def balance_at(part: float, _: State, before: FloatArray = before, shift: FloatArray = shift) -> Balance:
+        def balance_at(
+            part: float,
+            _: FloatArray,
+            __: FloatArray | None = None,
+            before: FloatArray = before,
+            shift: FloatArray = shift,
+        ) -> Balance:
             return Balance(joint, before + part * shift, worn)
 
         moved, arrived = follow_naturally(balance_at, State(state.evaluation, before, 0.0), 1.0, run)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -16,6 +16,13 @@ from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC, Resolution
 from solver.structure.condensation import SingularStructureError, build_structure
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
 from solver.structure.joint import Case, Joint
+
+
+class BalanceAt(Protocol):
+    """Balances over a parameter."""
+
+    def __call__(self, parameter: float, history: FloatArray, first: FloatArray | None = None, /) -> Balance:
+        """The balance at a value for a tangential history (n_contact, 2), m; first: as in `Balance`."""
 
 
 @packable
@@ -38,10 +45,6 @@ class Failure(Ended):
 
     outcome: Outcome
     message: str
-
-
-BalanceAt = Callable[[float, State], Balance]
-"""The balance at a value of a parameter, to which a joint comes from a state before."""
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:

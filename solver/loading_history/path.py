@@ -173,9 +173,9 @@ class LoadingPath(Path[State]):
     def joint_of(self, state: State) -> Joint:  # noqa: D102
         return self.joint_at(state.parameter)
 
-    def balance_at(self, parameter: float, before: State) -> Balance:
-        """Unworn balance at a value of the parameter, to which the joint comes slowly from a state before."""
-        return Balance(self.joint_at(parameter), before.history, first=before.evaluation.predicted_t)
+    def balance_at(self, parameter: float, history: FloatArray, first: FloatArray | None = None) -> Balance:
+        """Unworn balance at a value of the parameter. history (n_contact, 2): m. first: as in `Balance`."""
+        return Balance(self.joint_at(parameter), history, first=first)
 
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""
@@ -190,10 +190,11 @@ class LoadingPath(Path[State]):
         for place, state in enumerate(states):
             others = np.delete(at, place)
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
-        return self._stable(self.balance_at(target, start), begin, target, run)
+        balance = self.balance_at(target, start.history, start.evaluation.predicted_t)
+        return self._stable(balance, begin, target, run)
 
     def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:  # noqa: D102
-        return self._stable(Balance(self.joint_of(state), history), predicted_h, state.parameter, run)
+        return self._stable(self.balance_at(state.parameter, history), predicted_h, state.parameter, run)
 
     def _stable(self, balance: Balance, predicted_h: FloatArray, parameter: float, run: Run) -> State | None:
         """Stable state of a balance near a predicted force (n_rel, m), N; None where not found."""

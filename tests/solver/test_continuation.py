@@ -34,8 +34,8 @@ def wall(omega):
     """Vibro-impact along the excitation amplitude: balances, a state found from nothing, and the motion of the mass."""
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
 
-    def balance_at(amplitude, history):
-        return Balance(case.joint(omega, amplitude), history)
+    def balance_at(amplitude, history, first=None):
+        return Balance(case.joint(omega, amplitude), history, first=first)
 
     def first(amplitude):
         found = first_point(case, omega, amplitude)
