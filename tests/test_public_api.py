@@ -4,7 +4,6 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,6 @@ from fretwear import (
     Block,
     FrequencyResponse,
     Outcome,
-    SceneError,
     SolverSettings,
     Study,
     UserError,
@@ -32,7 +30,6 @@ from fretwear import (
     integrate_mission,
     march_wear,
     open_result,
-    read_scene,
     read_study,
     response_curve,
     run_study,
@@ -227,8 +224,6 @@ def test_friction_is_one_number_or_one_of_each_pair_or_that_of_the_model():
     assert given.worn_volume[-1] > 0.0
     np.testing.assert_array_equal(given.response[0], other[0])
     np.testing.assert_array_equal(given.wear_depth, taken.wear_depth)
-    with pytest.raises(ValueError, match=r"^friction_coefficient is given twice: the scene has one of each pair"):
-        frequency_response(own, *at, 0.4)
 
 
 def test_results_are_datasets_files_pictures_and_five_lines(tmp_path):
@@ -273,64 +268,3 @@ def test_a_point_that_fails_is_one_point():
     assert history.outcome is Outcome.TIME_LIMIT
     assert history.cycles.tolist() == [0.0, 1e4]
     assert "time_limit" in repr(history)
-
-
-# --- what is refused ---
-
-MATRICES = {"mass": np.eye(2), "damping": None, "stiffness": [[2.0, -1.0], [-1.0, 2.0]], "contact_dofs": [[0, 1, -1]]}
-MATRICES |= {"area": 1.0, "load_harmonic": [0.0, 1.0]}
-HISTORY = {"model": slider(), "frequency": 150.0, "excitation_amplitude": 10.0, "friction_coefficient": 0.5}
-HISTORY |= {"wear_coefficient": 1e-11, "cycles": 1e4}
-STUDY = {"study": "sdof_slider"}
-SCENE = partial(build_scene, "sdof_slider")
-REFUSED = [
-    (build_model, MATRICES, {"mass": [[1.0, 0.0]]}, "mass: give shape (2, 2)"),
-    (build_model, MATRICES, {"mass": [[1.0], [0.0, 1.0]]}, "mass: give rows"),
-    (build_model, MATRICES, {"stiffness": [[2.0, -1.0], [0.0, 2.0]]}, "stiffness: give a symmetric matrix"),
-    (build_model, MATRICES, {"stiffness": [[2.0, 1.0j], [-1.0j, 2.0]]}, "stiffness: give real numbers"),
-    (build_model, MATRICES, {"damping": [[np.nan, 0.0], [0.0, 1.0]]}, "damping: give finite numbers"),
-    (build_model, MATRICES, {"contact_dofs": [0, 1, -1]}, "contact_dofs: give shape"),
-    (build_model, MATRICES, {"contact_dofs": [[0, 2, -1]]}, "contact_dofs: give whole numbers from -1 to 1"),
-    (build_model, MATRICES, {"contact_dofs": [[0, 0, -1]]}, "contact_dofs: give each displacement to one pair"),
-    (build_model, MATRICES, {"contact_dofs": [[-1, -1, -1]]}, "contact_dofs: give every pair a displacement"),
-    (build_model, MATRICES, {"contact_dofs": [[-1, 1, -1]]}, "normal_load: give pair 0 more than 0 N"),
-    (build_model, MATRICES, {"area": 0.0}, "area: give a positive area"),
-    (build_model, MATRICES, {"load_harmonic": [1.0]}, "load_harmonic: give shape (2,)"),
-    (build_model, MATRICES, {"response": [2]}, "response: give whole numbers from 0 to 1"),
-    (build_model, MATRICES, {"response": []}, "response: give at least one displacement"),
-    (build_model, MATRICES, {"surface": "left"}, "surface: give 1 texts"),
-    (march_wear, HISTORY, {"model": "sdof_slider"}, "model: give what build_scene, read_scene or build_model gives"),
-    (march_wear, HISTORY, {"frequency": 0.0}, "frequency: give values above 0"),
-    (march_wear, HISTORY, {"frequency": [1.0, 2.0]}, "frequency: give one number"),
-    (march_wear, HISTORY, {"excitation_amplitude": -1.0}, "excitation_amplitude: give values of at least 0"),
-    (march_wear, HISTORY, {"friction_coefficient": np.nan}, "friction_coefficient: give finite numbers"),
-    (march_wear, HISTORY, {"friction_coefficient": [[0.5]]}, "friction_coefficient: give one number, or a list"),
-    (march_wear, HISTORY, {"friction_coefficient": [0.5, 0.4]}, "friction_coefficient has shape (2,)"),
-    (march_wear, HISTORY, {"friction_coefficient": None}, "friction_coefficient is missing"),
-    (march_wear, HISTORY, {"cycles": [0.0, 2.0, 2.0]}, "cycles: give ascending counts"),
-    (march_wear, HISTORY, {"sweep": "sideways"}, "sweep: give one of up, down, ramp"),
-    (march_wear, HISTORY, {"scheme": "euler", "step": 1.0}, "scheme: give one of explicit, implicit"),
-    (march_wear, HISTORY, {"scheme": "implicit"}, "step: give the length of a step"),
-    (march_wear, HISTORY, {"settings": SolverSettings(harmonics=5, samples=10)}, "settings.samples: give more than 10"),
-    (march_wear, HISTORY, {"law": "energy"}, "law: give WearLaw(...)"),
-    (march_wear, HISTORY, {"until": 1e-6}, "until: give WearTarget(...)"),
-    (read_study, STUDY, {"overrides": {"slow_time.cycle": 3}}, "sdof_slider: slow_time.cycle = 3: unknown key"),
-    (read_study, STUDY, {"overrides": {"study.name.x": 3}}, "overrides: study.name.x = 3:"),
-    (run_study, {}, {"study": "sdof_slider", "output": Path("none/out.nc")}, 'run_study: output = "none/out.nc"'),
-    (run_study, {}, {"study": read_study("sdof_slider"), "overrides": SMALL}, "run_study: overrides"),
-    (run_study, {}, {"study": "nothing"}, "nothing: the study: "),
-    (partial(build_scene, "nothing"), {}, {}, 'model: no bundled scene is called "nothing"'),
-    (SCENE, {}, {"friction_coefficient": 0.3}, "friction_coefficient: 0.3; give it to the solver"),
-    (SCENE, {}, {"mas": 1.0}, "mas: unknown parameter; give one of contact_stiffness, mass"),
-    (SCENE, {}, {"mass": -1.0}, "mass: -1.0; give a number above 0"),
-    (SCENE, {}, {"mass": "1"}, "mass: 1; give a number"),
-    (read_scene, {}, {"path": Path(__file__)}, "model: test_public_api.py"),
-]
-
-
-@pytest.mark.parametrize(("function", "right", "change", "message"), REFUSED)
-def test_what_is_wrong_is_said_in_one_line(function, right, change, message, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises((ValueError, UserError, SceneError), match=f"^{re.escape(message)}"):
-        function(**(right | change))
-    assert not list(tmp_path.iterdir())

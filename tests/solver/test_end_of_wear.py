@@ -172,19 +172,6 @@ def test_a_constant_load_wears_without_end_at_the_rate_of_its_path():
     assert np.isfinite(found.worn_volume).all()
 
 
-@pytest.mark.parametrize(
-    ("cycles", "more", "key"),
-    [
-        (np.inf, {"scheme": "explicit", "step": 10.0}, "scheme"),
-        (1e5, {"scheme": "final"}, "scheme"),
-        (np.inf, {"outputs": 1}, "outputs"),
-    ],
-)
-def test_what_cannot_be_integrated_to_the_end_is_named(cycles, more, key):
-    with pytest.raises(ValueError, match=f"^{key}"):
-        march_model(build_scene("sdof_slider"), 160.0, 10.0, 0.5, 1e-11, cycles, **more)
-
-
 @pytest.mark.slow
 def test_a_travelling_wave_whose_last_state_is_unstable_only_with_few_samples_is_stable():
     model = build_scene("dovetail_sector", mesh=1, nodal_diameter=3)

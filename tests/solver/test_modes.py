@@ -185,19 +185,6 @@ def test_what_has_no_mode_says_so():
     assert "the mode is followed down to the amplitude" in found.message[0]
 
 
-def test_wrong_arguments_are_named():
-    for wrong, said in (
-        ({"amplitude": 0.0}, "amplitude: "),
-        ({"sweep": "left"}, "sweep: "),
-        ({"mode": 0}, "mode: "),
-        ({"wear_depth": [1e-6, 1e-6]}, "wear_depth: "),
-        ({"wear_depth": -1e-6}, "wear_depth: "),
-        ({"settings": SolverSettings(harmonics=5, samples=8)}, "settings.samples"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            backbone(foot(), **{"amplitude": 1e-6, "friction_coefficient": 0.5, **wrong})
-
-
 @pytest.mark.slow
 def test_the_dovetail_softens_and_damps_and_its_forced_resonance_agrees():
     model = dovetail(21)

@@ -208,20 +208,3 @@ def test_of_two_in_the_range_the_first_that_the_sweep_meets_is_followed(word):
     assert second > 214.0
     assert up.outcome is Outcome.CONVERGED
     assert float(alone.excitation_frequency[0]) == first
-
-
-@pytest.mark.parametrize(
-    ("word", "more", "said"),
-    [
-        ("resonnance", {}, "frequency"),
-        ("resonance", {"between": None}, "between: give"),
-        ("resonance", {"between": (215.0, 205.0)}, "between: give the lowest"),
-        ("resonance", {"between": (205.0, np.nan)}, "between: give finite"),
-        (210.0, {}, "between: leave it out"),
-        ("resonance", {"sweep": "ramp"}, "sweep: give"),
-        ("resonance", {"scheme": "final"}, "scheme: the scheme"),
-    ],
-)
-def test_wrong_input_is_named(word, more, said):
-    with pytest.raises(ValueError, match=said):
-        march_wear(scene("sdof_slider"), word, 10.0, 0.5, WEAR, np.inf, **({"between": BETWEEN} | more))

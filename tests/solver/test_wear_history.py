@@ -7,7 +7,6 @@ import pytest
 
 from solver import frequency_response
 from solver import march_wear as march_model
-from solver.contact.wear_law import WearLaw, WearTable
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.results.state_report import LOOP_PHASES
@@ -132,14 +131,6 @@ def test_a_march_goes_on_from_a_depth():
     error = whole.wear_depth_error[-1, 0] + rest.wear_depth_error[-1, 0]
     assert depth == pytest.approx(whole.wear_depth[-1, 0], abs=error)
     assert error < 1e-2 * depth
-
-
-def test_a_law_that_depends_on_the_depth_is_refused():
-    law = WearLaw("table", table=WearTable((0.0, 1e6), (0.0, 1e-5), ((1.0, 1.0), (1.0, 1.0))))
-    with pytest.raises(ValueError, match="wear_depth: give another law"):
-        march_model(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [4e4], law=law, wear_depth=0.0)
-    with pytest.raises(ValueError, match="wear_depth: give a depth, m, for each of 1 pairs, not 2"):
-        march_model(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [4e4], wear_depth=[0.0, 0.0])
 
 
 # --- where pairs slide or stick again ---

@@ -9,48 +9,10 @@ import pytest
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.meshes import read_mesh_file
 from studies.scene_error import SceneError
-from tests.studies.fe_models.decks import write
+from tests.studies.fe_models.decks import SECTOR, write
 
 needs_ansys = pytest.mark.skipif(importlib.util.find_spec("ansys") is None, reason="ansys-mapdl-reader is not there")
-
-
-GMSH_41 = """\
-$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$PhysicalNames
-2
-2 1 "under"
-3 2 "Block"
-$EndPhysicalNames
-$Entities
-0 0 1 1
-1 0 0 0 1 1 0 1 1 0
-1 0 0 0 1 1 1 1 2 0
-$EndEntities
-$Nodes
-1 5 1 5
-3 1 0 5
-1
-2
-3
-4
-5
-0 0 0
-1 0 0
-0 1 0
-0 0 1
-1 1 1
-$EndNodes
-$Elements
-2 3 1 3
-2 1 2 1
-1 1 2 3
-3 1 4 2
-2 1 2 3 4
-3 2 3 4 5
-$EndElements
-"""
+GMSH_41 = SECTOR.with_name("two_tetrahedra.msh").read_text(encoding="ascii")
 
 
 def test_gmsh_41_and_what_is_no_mesh(tmp_path):
