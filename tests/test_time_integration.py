@@ -1,15 +1,13 @@
-"""The plain time integration of the benchmarks: closed forms, free decay against nonlinear modes, travelling waves."""
+"""The plain time integration of the benchmarks: closed forms, and free decay against nonlinear modes."""
 
 import numpy as np
 import pytest
 
-from solver import SolverSettings, backbone, build_model, frequency_response
+from solver import SolverSettings, backbone, build_model
 from tests.benchmarks import time_integration as in_time
 from tests.benchmarks.free_decay import decay_of, free_decay
 from tests.references import den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
-from tests.rings import ring_of_sectors
-from tests.solver.models import cyclic_model, glued_frequency, scene
-from tests.solver.reconstruction import harmonic_structure
+from tests.solver.models import scene
 
 MASS, STIFFNESS, FREQUENCY, FORCE = 0.1, 1.6e5, 160.0, 10.0
 OMEGA = 2.0 * np.pi * FREQUENCY
@@ -58,26 +56,6 @@ def test_wear_of_a_slider_follows_its_differential_equation():
     assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
 
 
-def decaying(model, place, pull, frequency, periods):
-    """Free decay of a displacement that is let go at `pull`, m: amplitude, frequency, Hz, damping ratio by cycle."""
-    structure = in_time.build(model, 0.5, frequency, 0.0, 200)
-    rest = in_time.at_rest(model, structure, model.contact.gap)
-    begun = rest.x.copy()
-    begun[:, place] += pull
-    signal = free_decay(structure, rest._replace(x=begun), model.contact.gap, periods)[:, place]
-    return structure, decay_of(signal, structure.step)
-
-
-def test_a_mass_on_rigid_ground_loses_four_limits_in_each_cycle():
-    model, limit = scene("sdof_slider", normal_stiffness=0.0), 5.0 / STIFFNESS
-    natural = np.sqrt(STIFFNESS / MASS) / (2.0 * np.pi)
-    _, (amplitude, frequency, damping) = decaying(model, 0, 30.0 * limit, natural, 6)
-    np.testing.assert_allclose(np.diff(amplitude), -2.0 * limit, rtol=0.03)
-    np.testing.assert_allclose(frequency, natural, rtol=2e-3)
-    exact = np.log((amplitude + 2.0 * limit) / (amplitude - 2.0 * limit))
-    np.testing.assert_allclose(damping, exact / np.hypot(exact, 2.0 * np.pi), rtol=0.03)
-
-
 @pytest.mark.slow
 def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_two_amplitudes():
     """As far as a mode of periodic motion describes a decay: the amplitude changes within a cycle."""
@@ -88,36 +66,12 @@ def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_two_amplitudes():
     modal = np.array([2e-4, 8e-4])
     mode = backbone(model, modal, 0.5, settings=SolverSettings(harmonics=7, samples=128))
     tips = abs(mode.response[:, 0])
-    _, (amplitude, frequency, damping) = decaying(model, 2, 1.5 * float(tips[-1]), float(mode.frequency[0]), 90)
+    structure = in_time.build(model, 0.5, float(mode.frequency[0]), 0.0, 200)
+    rest = in_time.at_rest(model, structure, model.contact.gap)
+    pulled = rest._replace(x=rest.x + 1.5 * tips[-1] * np.eye(3)[2])
+    signal = free_decay(structure, pulled, model.contact.gap, 90)[:, 2]
+    amplitude, frequency, damping = decay_of(signal, structure.step)
     for place, tip in enumerate(tips.tolist()):
         seen, damped = (np.interp(tip, amplitude[::-1], of[::-1]) for of in (frequency, damping))
         assert seen == pytest.approx(mode.frequency[place], rel=2e-3)
         assert damped == pytest.approx(mode.damping_ratio[place], rel=0.05)
-
-
-@pytest.mark.parametrize(("n_sectors", "nodal_diameter", "n_sectors_apart"), [(6, 2, 3), (7, 3, 7), (5, 2, 5)])
-def test_a_ring_moves_in_each_wave_as_the_sector_of_this_harmonic(n_sectors, nodal_diameter, n_sectors_apart):
-    model = cyclic_model(3, ("3d", "one_tangent"), n_sectors, nodal_diameter, n_sectors_apart)
-    ring = ring_of_sectors(model)
-    assert ring.contact.n_contact == n_sectors_apart * model.contact.n_contact
-    for harmonic in range(n_sectors_apart):
-        one = harmonic_structure(model, harmonic)
-        shape = np.array([1.0, 1j]) @ np.random.default_rng(harmonic).standard_normal((2, len(one.mass)))
-        wave = np.exp(2j * np.pi * harmonic * nodal_diameter / n_sectors * np.arange(n_sectors_apart))
-        for name in ("mass", "damping", "stiffness"):
-            moved = getattr(ring.linear[0], name) @ np.kron(wave, shape)
-            np.testing.assert_allclose(moved, np.kron(wave, getattr(one, name) @ shape), rtol=1e-9, atol=1e-6)
-
-
-@pytest.mark.slow
-def test_a_travelling_wave_in_time_is_the_periodic_state_of_its_sector():
-    model = cyclic_model(5, ("3d", "3d"), 6, 2, 21)
-    frequency, force = 0.93 * glued_frequency(model), 20.0
-    found = frequency_response(model, np.array([frequency]), force, 0.4)
-    ring = ring_of_sectors(model)
-    structure, motion = in_time.loaded(ring, 0.4, in_time.ramp(frequency, force, 60), 240)
-    work = motion.work.reshape(3, 2)
-    np.testing.assert_allclose(work, work[[0]].repeat(3, axis=0), rtol=1e-3)
-    tip = in_time.first_harmonic(structure, motion, ring.linear[0].response)
-    assert np.linalg.norm(tip - found.response[0]) <= (found.response_error[0] + 5e-3) * np.linalg.norm(tip)
-    assert (motion.work > 0.0).all()

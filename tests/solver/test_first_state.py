@@ -7,7 +7,7 @@ import pytest
 
 from solver.continuation.first_state import solve_static_state
 from solver.continuation.natural import ratchets
-from solver.harmonic_balance.state import Failure, State
+from solver.harmonic_balance.state import Failure
 from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -20,7 +20,7 @@ from studies.finite_element.reduced_joint import build_fe_scene
 from studies.finite_element.solid_mesh import Material
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, mean_motion
 from studies.finite_element.surfaces import surface_of_faces
-from tests.random_decks import equilibrium_possible, law_errors, random_deck, run_deck
+from tests.random_decks import equilibrium_possible, random_deck, run_deck, static_forces
 from tests.random_scenes import random_scene
 from tests.solver.models import branch_states, dovetail, scene
 from tests.studies.fe_models.sectors import faces_where
@@ -29,16 +29,6 @@ from tests.studies.fe_models.solid_meshes import block, joined
 SETTINGS = SolverSettings(harmonics=3, samples=64)
 OMEGA = 2.0 * np.pi * 211.5
 PRESS = 200.0  # N on each pair: with it the glued dovetail pulls nowhere
-
-
-def static_forces(model, friction):
-    """Contact forces (n_contact, 3), N, of the static state, in which all laws of contact hold."""
-    joint = build_case(model, friction, OMEGA, SETTINGS).joint(OMEGA, 0.0)
-    point = solve_static_state(joint, Run(1e-9))
-    assert isinstance(point, State), f"no static state at a friction coefficient of {friction}"
-    errors = law_errors(joint, point)
-    assert max(errors.values()) < 1e-7, errors
-    return point.evaluation.force_h[:, :, 0]
 
 
 def stacked(force, direction=(0.0, 0.0, -1.0), interference=None, edge=False):

@@ -24,12 +24,12 @@ from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
 from tests.mpi.launching import results
+from tests.random_decks import static_forces
 from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import write_matrix_input, write_punch
 from tests.studies.fe_models.plates import Plates
 from tests.studies.fe_models.sectors import faces_where
 from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, needs_ccx, node_set, run_ccx
-from tests.studies.static_contact import solve_static_contact
 from tests.studyrunner.small_studies import LAP_JOINT, ROOT_OF_A_DECK, UNWORN, compute, same_values
 
 STIFFNESSES = (1e11, 1e13)
@@ -350,7 +350,7 @@ def test_static_forces_are_those_of_the_contact_of_calculix():
     paste("ccx -i job")
     printed = Path("job.dat").read_text().split("normal force (+ = tension) and shear force (size)")[1]
     _, normal, shear = map(float, printed.split()[:3])
-    force = solve_static_contact(build_study_scene(read_study("blade_root")), 0.4)
+    force = static_forces(build_study_scene(read_study("blade_root")), 0.4)
     flank = force[:18].sum(axis=0)
     assert flank[0] == pytest.approx(-normal, rel=2e-3)
     assert np.hypot(*flank[1:]) == pytest.approx(shear, rel=3e-3)
