@@ -227,7 +227,7 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
 
 
 def static_forces(model: ReducedModel, friction: float) -> FloatArray:
-    """Contact forces (n_contact, 3), N, of the static state, in which all laws of contact hold: compression positive."""
+    """Contact forces (n_contact, 3), N, of the static state, in which all laws hold: compression positive."""
     joint = build_case(model, friction, OMEGA, SolverSettings()).joint(OMEGA, 0.0)
     point = solve_static_state(joint, Run(1e-9))
     assert isinstance(point, State), f"no static state at a friction coefficient of {friction}"
