@@ -18,7 +18,6 @@ import studies
 import studyrunner
 from fretwear import (
     Block,
-    FrequencyResponse,
     Outcome,
     SolverSettings,
     Study,
@@ -34,7 +33,6 @@ from fretwear import (
     response_curve,
     run_study,
 )
-from studies.scenes.sdof_slider import DenHartogSlider
 from studyrunner.cli import main
 from tests.solver.models import OMEGA, random_model
 from tests.studyrunner.faked_runs import Solver
@@ -162,21 +160,6 @@ def slider(**changes):
     """The mass of Den Hartog's case from matrices: 0.1 kg on 1.6e5 N/m, pressed by 10 N."""
     given = {"load_harmonic": [1.0], "normal_load": 10.0, "response_names": ["mass"]} | changes
     return build_model([[0.1]], None, [[1.6e5]], [[-1, 0, -1]], 1e-4, **given)
-
-
-def test_the_response_is_that_of_den_hartog():
-    curve = frequency_response(slider(), FREQUENCIES, 10.0, 0.5)
-    assert isinstance(curve, FrequencyResponse)
-    assert curve.frequency.tolist() == FREQUENCIES
-    for place, frequency in enumerate(FREQUENCIES):
-        exact = DenHartogSlider(0.1, 1.6e5, 10.0, 2.0 * np.pi * frequency)
-        first, largest = (float(value(np.array(5.0))) for value in (exact.first_harmonic, exact.amplitude))
-        assert abs(curve.response[place, 0]) == pytest.approx(first, rel=1e-2)
-        assert curve.response_peak[place, 0] == pytest.approx(largest, rel=1e-2)
-    assert (curve.response_error < 1e-2).all()
-    assert curve.outcome == (Outcome.CONVERGED,) * 2
-    assert curve.message == ("", "")
-    assert curve.branch.tolist() == [0, 0]
 
 
 @pytest.mark.slow

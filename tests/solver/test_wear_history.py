@@ -105,32 +105,12 @@ def test_a_start_that_failed_is_a_history_of_nan_with_its_outcome():
         assert totals == {name: getattr(history, name) for name in totals}
 
 
-def test_only_the_product_of_wear_coefficient_and_cycles_matters():
-    slow = march(8000.0, "adaptive")
-    fast = march(800.0, "adaptive", CYCLES / 10, wear=10 * WEAR)
-    for name in ("wear_depth", "worn_volume", "mean_pressure", "slip_range", "response", "response_peak"):
-        one, other = getattr(slow, name), getattr(fast, name)
-        assert np.abs(one - other).max() <= 1e-9 * np.abs(one).max(), name
-    assert fast.wear_rate == pytest.approx(10 * slow.wear_rate, rel=1e-9, abs=0.0)
-
-
 def test_a_response_at_a_depth_is_that_of_less_normal_force():
     """The spring of the slider presses by 10 N less 1e5 N/m times the depth."""
     worn = frequency_response(scene("sdof_slider"), 150.0, 10.0, 0.5, settings=FEW, wear_depth=[4e-5])
     less = frequency_response(scene("sdof_slider", normal_load=6.0), 150.0, 10.0, 0.5, settings=FEW)
     np.testing.assert_allclose(worn.response, less.response, rtol=1e-7)
     assert set(worn.outcome) == {Outcome.CONVERGED}
-
-
-def test_a_march_goes_on_from_a_depth():
-    model = scene("sdof_slider")
-    whole = march_model(model, 160.0, 10.0, 0.5, WEAR, [0.0, 2e4, 4e4], settings=FEW)
-    rest = march_model(model, 160.0, 10.0, 0.5, WEAR, [2e4], settings=FEW, wear_depth=whole.wear_depth[1])
-    assert rest.outcome is Outcome.CONVERGED
-    depth = whole.wear_depth[1, 0] + rest.wear_depth[-1, 0]
-    error = whole.wear_depth_error[-1, 0] + rest.wear_depth_error[-1, 0]
-    assert depth == pytest.approx(whole.wear_depth[-1, 0], abs=error)
-    assert error < 1e-2 * depth
 
 
 # --- where pairs slide or stick again ---

@@ -62,7 +62,7 @@ def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
     blade = tuple(group for group in model.mesh.groups if group.part == "blade")
     mass = assemble_mass(replace(model.mesh, groups=blade))
     pull = centrifugal_load(mass, model.mesh.coordinates, model.rotation).reshape(-1, 3).sum(axis=0)[0]
-    for friction_coefficient in (0.5, 1e-6):
+    for friction_coefficient in (0.5, 1e-6, 1000.0):
         force = static_forces(at_rest, friction_coefficient).reshape(2, 24, 3).sum(axis=1)
         assert np.all(force[:, 0] > 0.0)
         assert np.sqrt(0.5) * (force[:, 0] + force[:, 2]).sum() == pytest.approx(pull, rel=1e-6)

@@ -24,6 +24,10 @@ def test_scenes_are_possible_structures(name, values):
     check_model(build_scene(name, **values), n_harmonics=21)
 
 
+DAMPER = {"rim_radius": 0.1, "platform_gap": 0.02, "damper_half_width": 0.1, "platform_thickness": 0.002}
+DAMPER["damper_height"] = 0.1
+
+
 @pytest.mark.parametrize(
     ("name", "values", "key"),
     [
@@ -31,6 +35,8 @@ def test_scenes_are_possible_structures(name, values):
         ("cylinder_on_flat", {"depth": 1e-9}, "depth"),
         ("sphere_on_flat", {"R": 1e308}, "model"),
         ("dovetail_sector", {"mesh": 1, "young_modulus": 1e-300}, "model"),
+        *(("shrouded_sector", {key: value}, key) for key, value in {"blade_thickness": 0.2, "rim_radius": 0.1}.items()),
+        *(("underplatform_damper", {key: value}, key) for key, value in DAMPER.items()),
     ],
 )
 def test_numbers_far_from_what_can_be_are_refused(name, values, key):
