@@ -226,7 +226,7 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
     return exists, Outcome.CONVERGED, law_errors(joint, point)
 
 
-def static_forces(model: ReducedModel, friction: float) -> FloatArray:
+def static_forces(model: ReducedModel, friction: float | None) -> FloatArray:
     """Contact forces (n_contact, 3), N, of the static state, in which all laws hold: compression positive."""
     joint = build_case(model, friction, OMEGA, SolverSettings()).joint(OMEGA, 0.0)
     point = solve_static_state(joint, Run(1e-9))

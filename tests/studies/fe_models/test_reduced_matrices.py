@@ -17,7 +17,7 @@ from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
 from studies.scene import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scene_file import read_scene, write_scene
-from tests.studies.fe_models.matrix_files import REDUCED
+from tests.studies.fe_models.matrix_files import REDUCED, node_table
 from tests.studies.shrouded_ring import stubby
 
 N, D, N_MODES = 6, 2, 12
@@ -69,17 +69,9 @@ class Sector:
 
     def table(self):
         """The table of the nodes."""
-        area, normals = self.first.areas_and_normals(self.mesh.coordinates)
         groups = {"LEFT": self.left, "RIGHT": self.right, "TIP": self.tip}
         groups |= {"LEADING": self.first.nodes, "TRAILING": self.second.nodes}
-        lines = ["node,x,y,z,sets,area,normal_x,normal_y,normal_z,gap"]
-        for node in self.nodes:
-            sets = " ".join(name for name, members in groups.items() if node in members)
-            where = np.flatnonzero(self.first.nodes == node)
-            more = [area[where[0]], *normals[where[0]], -PARAMETERS.interference] if len(where) else [""] * 5
-            place = [repr(float(x)) for x in self.mesh.coordinates[node]]
-            lines.append(",".join(map(str, [self.mesh.numbers[node], *place, sets, *more])))
-        return "\n".join(lines) + "\n"
+        return node_table(self.mesh, self.nodes, groups, self.first, -PARAMETERS.interference)
 
     def recovery_table(self, rows):
         """Weights of the quantity in MPa with the labels of their rows, those of the nodes in another order."""
