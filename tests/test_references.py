@@ -5,12 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.references import (
-    StopsOccurError,
     coulomb_orbit,
-    den_hartog_amplitude,
-    slider_amplitude,
     slider_orbit,
-    slider_wear_depth,
     vibro_impact_orbit,
 )
 
@@ -20,21 +16,6 @@ VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
 
 def phases(orbit):
     return {segment.phase for segment in orbit.segments}
-
-
-@pytest.mark.parametrize("ratio", [0.3, 0.55, 0.8, 0.95, 1.05, 1.5, 2.3])
-@pytest.mark.parametrize("friction", [0.05, 0.3, 0.6, 0.9])
-def test_den_hartog_and_the_event_driven_slider_agree_on_amplitude_and_on_stops(ratio, friction):
-    mass, stiffness, force = 0.1, 1.6e5, 10.0
-    omega = ratio * np.sqrt(stiffness / mass)
-    orbit = slider_orbit(mass, 0.0, stiffness, force, friction * force, omega)
-    if "stick" in phases(orbit):
-        with pytest.raises(StopsOccurError):
-            den_hartog_amplitude(mass, stiffness, force, friction * force, omega)
-    else:
-        amplitude = den_hartog_amplitude(mass, stiffness, force, friction * force, omega)
-        assert orbit.path(0, ("forward", "backward")) / 4 == pytest.approx(amplitude, rel=1e-10, abs=0)
-        assert np.abs(orbit.sample(64)[0]).max() <= amplitude * (1 + 1e-10)
 
 
 @pytest.mark.parametrize("case", [(0.7, 0.1, 0.6), (0.4, 0.02, 0.5), (1.2, 0.3, 0.3)])
@@ -83,16 +64,3 @@ def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega, kn
     period = orbit.system.period
     end = solve_ivp(rate, (0, period), start, method="DOP853", rtol=1e-11, atol=1e-13, max_step=period / 400).y[:, -1]
     assert end == pytest.approx(start, rel=1e-7)
-
-
-def test_wear_with_den_hartog_has_its_closed_solution():
-    # X = A sqrt(1 - b^2 N^2) makes N' = -c N sqrt(1 - b^2 N^2): artanh(sqrt(1 - b^2 N^2)) grows linearly in cycles.
-    mass, stiffness, force, friction = 0.1, 1.6e5, 10.0, 0.5
-    omega = 2 * np.pi * 160
-    ratio = omega / np.sqrt(stiffness / mass)
-    full = force / stiffness / (1 - ratio**2)
-    b = friction / force * np.tan(np.pi / (2 * ratio)) / ratio * (1 - ratio**2)
-    cycles = np.linspace(0, 1e5, 6)
-    depth = slider_wear_depth(cycles, lambda limit: slider_amplitude(mass, 0.0, stiffness, force, limit, omega))
-    grown = np.arctanh(np.sqrt(1 - (10 * b) ** 2)) + 1.1e-11 / 1e-4 * 1e5 * 4 * full * cycles
-    assert depth == pytest.approx((10 - np.sqrt(1 - np.tanh(grown) ** 2) / abs(b)) / 1e5, rel=1e-9, abs=1e-18)
