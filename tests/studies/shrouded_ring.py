@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from studies.finite_element import surfaces
-from studies.finite_element.reduced_joint import build_fe_scene
 from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
-from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions
+from studies.finite_element.structure import FeModel, JointDefinition
 from studies.scenes import shrouded_sector
 
 
@@ -47,14 +46,3 @@ def whole_ring(model: FeModel, joint: JointDefinition) -> tuple[FeModel, JointDe
         tips[j, own[j]] = joint.load.reshape(-1, 3) @ axis.pitch(j).T
     named = {f"tip{j}": tip.ravel() for j, tip in enumerate(tips)}
     return FeModel(ring), JointDefinition(tuple(contacts), held, named["tip0"], named)
-
-
-def reduced_ring(model: FeModel, joint: JointDefinition, nodal_diameter: int, n_modes: int, damping: float):
-    """Reduced model of the ring under a travelling wave of unit forces. damping: over the stiffness, s."""
-    n = joint.cut.axis.n_sectors
-    whole = build_fe_scene(*whole_ring(model, joint), ReductionOptions(0, n_modes), 1).model
-    linear = whole.linear[0]
-    phases = np.exp(2j * np.pi * nodal_diameter * np.arange(n) / n)
-    return replace(
-        whole, linear={0: replace(linear, load_harmonic=phases @ linear.response, damping=damping * linear.stiffness)}
-    )

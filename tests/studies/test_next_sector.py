@@ -1,22 +1,16 @@
 """Contact with the neighbouring sector: the sector alone against all sectors of the ring."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
 from solver import SolverSettings
-from solver.contact.coulomb import SLIP
-from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
-from solver.model import needed_nodal_diameters
-from solver.structure.fourier import from_complex, to_complex
-from solver.structure.joint import build_case
-from solver.structure.penalty import Penalty
 from studies.finite_element.reduced_joint import prepare_model
 from studies.scenes import underplatform_damper
-from tests.studies.shrouded_ring import reduced_ring, stubby, whole_ring
+from tests.studies.shrouded_ring import stubby, whole_ring
 
 N = 6
 STUBBY = stubby(N)
@@ -77,38 +71,3 @@ def test_a_wedge_is_pressed_by_its_centrifugal_force(friction):
     # 1 %: the sides are turned to each other by the angle of the pitch
     least, most = (0.5 * force / (np.cos(roof) + sign * friction * np.sin(roof)) for sign in (1.0, -1.0))
     assert 0.99 * least < sides[0] < 1.01 * most
-
-
-@pytest.mark.slow
-def test_a_wave_of_the_sector_is_one_of_the_ring():
-    """A slipping state: turned from sector to sector, with the phase of the wave, it balances the ring as well.
-
-    The wave turns backwards. The static friction that a state keeps of its history depends on where a period begins,
-    and is left out.
-    """
-    diameter, folded, settings = N - 1, 1, SolverSettings(harmonics=3, samples=96)
-    parameters = STUBBY.model_copy(update={"interference": 5e-4, "nodal_diameter": folded, "stuck_modes": 60})
-    model = replace(parameters.build(3), nodal_diameter=diameter)
-    assert set(model.linear) == set(needed_nodal_diameters(diameter, N, 3)) | {folded}
-    first = frequencies_of_sector(*SECTORS[0])[folded][0]
-    ((_, start),) = follow_branch(model, 0.3, 30.0, np.array([0.98 * first]), "up", settings)
-    state, resolution, sector = start.state, start.resolution, build_case(model, 0.3, start.penalty_omega, settings)
-    assert resolution == sector.resolution
-
-    def turned(values_h):
-        phases = np.exp(2j * np.pi * diameter * np.arange(N)[:, None] * np.array(resolution.orders) / N)
-        parts = [from_complex(values_h[..., 0], phase * to_complex(values_h)) for phase in phases]
-        return np.concatenate(parts)
-
-    damping = parameters.loss_factor / (2.0 * np.pi * first)
-    ring = reduced_ring(*parameters.define_sector(), diameter, 360, damping)
-    penalty = Penalty(*(np.tile(getattr(sector.penalty, each.name), N) for each in fields(Penalty)))
-    case = replace(build_case(ring, 0.3, start.penalty_omega, settings), penalty=penalty)
-    history = np.tile(state.start_history, (N, 1))
-    balance = Balance(case.joint(state.omega, 30.0), history, np.zeros(len(history)))
-    motion, force = turned(state.displacement_h), turned(state.contact_force_h)
-    found = balance.evaluate(balance.predict(motion, force))
-    assert (found.status_t == SLIP).mean() > 1e-3
-    vibrating = np.abs(force[:, :, 1:]).max()
-    np.testing.assert_allclose(found.force_h[:, :, 1:], force[:, :, 1:], atol=1e-8 * vibrating)
-    assert np.abs(found.residual[:, 1:]).max() < 1e-6 * vibrating
