@@ -9,18 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given
-from hypothesis import settings as asked
-from hypothesis import strategies as st
 
 from solver import build_model
 from solver.accuracy.certificate import certify
-from solver.continuation.first_state import solve_first_state
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State
+from solver.harmonic_balance.state import Failure
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
-from solver.newton.run import Run
 from solver.outcome import COMPLETE, Outcome
 from solver.results.state_report import evaluated
 from solver.settings import Scheme, SolverSettings
@@ -245,26 +239,6 @@ def test_no_end_can_be_without_a_sentence(outcome):
 
 
 # --- random scenes ---
-
-
-@pytest.mark.slow
-@asked(max_examples=12, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
-@given(st.integers(0, 399), st.sampled_from([2.0**-20, 2.0**-3, 2.0, 2.0**10]))
-def test_loads_gaps_and_motion_scale_together(seed, scale):
-    """By powers of two, that is without round-off."""
-    drawn = random_scene(seed)
-    model, omega = drawn.model, 2.0 * np.pi * drawn.frequency_hz
-    case = build_case(model, drawn.friction, omega, SETTINGS)
-    point = solve_first_state(case, omega, drawn.amplitude, Run(SETTINGS.tolerance))
-    assume(isinstance(point, State))
-    at = point.evaluation
-    linear = replace(model.linear[0], load_static=scale * model.linear[0].load_static)
-    contact = replace(model.contact, gap=scale * model.contact.gap, normal_load=scale * model.contact.normal_load)
-    scaled = build_case(replace(model, linear={0: linear}, contact=contact), drawn.friction, omega, SETTINGS)
-    balance = Balance(scaled.joint(omega, scale * drawn.amplitude), scale * at.history, scale * at.wear_depth)
-    other = balance.evaluate(balance.predict(scale * at.displacement_h, scale * at.force_h))
-    assert other.scaled_residual() <= 2.0 * SETTINGS.tolerance
-    assert np.abs(other.slip_work - scale**2 * at.slip_work).max() <= 1e-6 * scale**2 * at.slip_work.max()
 
 
 @pytest.mark.slow

@@ -8,9 +8,12 @@ from scipy.spatial import ConvexHull
 
 from solver import SolverSettings
 from solver.loading_history.start_states import follow_branch
+from studies.finite_element import surfaces
 from studies.finite_element.reduced_joint import prepare_model
+from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
+from studies.finite_element.structure import FeModel, JointDefinition
 from studies.scenes import underplatform_damper
-from tests.studies.shrouded_ring import stubby, whole_ring
+from tests.studies.fe_models.sectors import stubby
 
 N = 6
 STUBBY = stubby(N)
@@ -32,6 +35,36 @@ def opened(model, joint):
     coordinates[contact.first.nodes] -= 3e-4 * contact.first.areas_and_normals(coordinates)[1]
     contact = replace(contact, tolerance=1e-3)
     return replace(model, mesh=replace(model.mesh, coordinates=coordinates)), replace(joint, contacts=(contact,))
+
+
+def whole_ring(model, joint):
+    """The ring of a sector, without symmetry: nodes of the cut faces are common, contacts join neighbours."""
+    mesh, axis = model.mesh, joint.cut.axis
+    n, size = axis.n_sectors, mesh.n_nodes
+    node = np.arange(n * size).reshape(n, size)
+    for j in range(n):
+        node[j][joint.cut.right] = node[(j + 1) % n][joint.cut.left]
+    used, own = np.unique(node, return_inverse=True)
+    own = own.reshape(n, size)
+    coordinates = np.concatenate([axis.turned(mesh.coordinates, j) for j in range(n)])[used]
+    groups = tuple(
+        ElementGroup(each.kind, own[j][each.nodes], each.numbers + 10000 * j, each.material, f"{each.part}{j}")
+        for j in range(n)
+        for each in mesh.groups
+    )
+    ring = SolidMesh(coordinates, np.arange(len(used)) + 1, groups)
+    held = np.zeros((len(used), 3), dtype=bool)
+    for j in range(n):
+        held[own[j]] |= joint.held
+    contacts = []
+    for each in joint.contacts:
+        for j in range(n):
+            first = surfaces.surface_of_nodes(ring, f"first {j}", own[j][each.first.nodes])
+            second = surfaces.surface_of_nodes(ring, f"second {j}", own[(j + each.sector) % n][each.second.nodes])
+            contacts.append(replace(each, first=first, second=second, sector=0, label=f"{each.name}{j}"))
+    tip = np.zeros((len(used), 3))
+    tip[own[0]] = joint.load.reshape(-1, 3)
+    return FeModel(ring), JointDefinition(tuple(contacts), held, tip.ravel(), {"tip": tip.ravel()})
 
 
 def frequencies_of_sector(model, joint):

@@ -17,7 +17,7 @@ from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
 from studies.scene import stuck_frequencies
 from studies.scene_error import SceneError
 from tests.studies.fe_models.matrix_files import REDUCED, node_table
-from tests.studies.shrouded_ring import stubby
+from tests.studies.fe_models.sectors import stubby
 
 N, D, N_MODES = 6, 2, 12
 PARAMETERS = stubby(N)
