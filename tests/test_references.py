@@ -1,14 +1,21 @@
-"""The references against each other, against closed forms and against a general integrator."""
+"""The references, and the time integration of the benchmarks, against closed forms and a general integrator."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from solver import SolverSettings, backbone, build_model
+from tests.benchmarks import time_integration as in_time
+from tests.benchmarks.free_decay import decay_of, free_decay
 from tests.references import (
     coulomb_orbit,
+    den_hartog_amplitude,
+    slider_amplitude,
     slider_orbit,
+    slider_wear_depth,
     vibro_impact_orbit,
 )
+from tests.solver.models import scene
 
 TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2)
 VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
@@ -64,3 +71,73 @@ def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega, kn
     period = orbit.system.period
     end = solve_ivp(rate, (0, period), start, method="DOP853", rtol=1e-11, atol=1e-13, max_step=period / 400).y[:, -1]
     assert end == pytest.approx(start, rel=1e-7)
+
+
+# --- the time integration of the benchmarks ---
+
+MASS, STIFFNESS, FREQUENCY, FORCE = 0.1, 1.6e5, 160.0, 10.0
+OMEGA = 2.0 * np.pi * FREQUENCY
+
+
+def test_the_differences_are_exact_for_the_excitation():
+    weights = in_time.fitted_weights(3.0, 0.02)
+    times = 0.7 - 0.02 * np.arange(3)
+    assert weights @ np.cos(3.0 * times) == pytest.approx(-3.0 * np.sin(2.1), rel=1e-9)
+    assert weights.sum() == pytest.approx(0.0, abs=1e-9)
+    # those of a short step are the usual ones
+    np.testing.assert_allclose(0.02 * in_time.fitted_weights(1e-2, 0.02), [1.5, -2.0, 0.5], rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_a_mass_on_rigid_ground_moves_as_in_den_hartogs_closed_form():
+    """Of first order, with some noise: the mass turns on whole steps."""
+    model = scene("sdof_slider", normal_stiffness=0.0)
+    path = 4.0 * den_hartog_amplitude(MASS, STIFFNESS, FORCE, 5.0, OMEGA)
+    first = abs(slider_orbit(MASS, 0.0, STIFFNESS, FORCE, 5.0, OMEGA).harmonic(0))
+    errors = []
+    for n_steps in (200, 3200):
+        structure = in_time.build(model, 0.5, FREQUENCY, FORCE, n_steps)
+        motions = [in_time.at_rest(model, structure, model.contact.gap)]
+        for _ in range(40):
+            motions.append(in_time.one_period(structure, motions[-1], model.contact.gap))
+        found = np.mean([abs(in_time.first_harmonic(structure, motion, np.eye(1))[0]) for motion in motions[-8:]])
+        work = np.mean([motion.work[0] for motion in motions[-8:]])
+        errors.append(max(abs(found / first - 1.0), abs(work / (10.0 * path) - 1.0)))
+    assert errors[0] < 1e-2
+    assert errors[1] < min(0.4 * errors[0], 2e-3)
+
+
+@pytest.mark.slow
+def test_wear_of_a_slider_follows_its_differential_equation():
+    model = scene("sdof_slider", damping=8.0)
+    structure = in_time.build(model, 0.5, FREQUENCY, FORCE, 400)
+    gap = model.contact.gap
+    motion = in_time.settle(structure, in_time.at_rest(model, structure, gap), gap, work_change=5e-3)
+    # the mount of the closing displacement is massless
+    for part in (np.full(1, 0.0), np.full(1, 1e-9)):
+        assert in_time.at_rest(model, structure, part).force[0] == pytest.approx(10.0 - 1e5 * part[0], rel=1e-6)
+    *_, (cycle, depth, _) = in_time.wear(model, structure, motion, 1.1e-11, 600.0, 1e5)
+    exact = slider_wear_depth([0.0, 1e5], lambda limit: slider_amplitude(MASS, 8.0, STIFFNESS, FORCE, limit, OMEGA))
+    assert cycle == pytest.approx(1e5)
+    assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
+
+
+@pytest.mark.slow
+def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_two_amplitudes():
+    """As far as a mode of periodic motion describes a decay: the amplitude changes within a cycle."""
+    # of the stiffness of the tip a twelfth goes over the foot, which sticks up to 25 N
+    stiffness = np.array([[1e7, 0.0, 0.0], [0.0, 4e5, -2e5], [0.0, -2e5, 2.2e6]])
+    load = {"load_static": [50.0, 0.0, 0.0], "load_harmonic": [0.0, 0.0, 1.0], "response": [2]}
+    model = build_model(np.diag([1e-3, 1e-3, 0.2]), 1e-6 * stiffness, stiffness, [[0, 1, -1]], 1e-4, **load)
+    modal = np.array([2e-4, 8e-4])
+    mode = backbone(model, modal, 0.5, settings=SolverSettings(harmonics=7, samples=128))
+    tips = abs(mode.response[:, 0])
+    structure = in_time.build(model, 0.5, float(mode.frequency[0]), 0.0, 200)
+    rest = in_time.at_rest(model, structure, model.contact.gap)
+    pulled = rest._replace(x=rest.x + 1.5 * tips[-1] * np.eye(3)[2])
+    signal = free_decay(structure, pulled, model.contact.gap, 90)[:, 2]
+    amplitude, frequency, damping = decay_of(signal, structure.step)
+    for place, tip in enumerate(tips.tolist()):
+        seen, damped = (np.interp(tip, amplitude[::-1], of[::-1]) for of in (frequency, damping))
+        assert seen == pytest.approx(mode.frequency[place], rel=2e-3)
+        assert damped == pytest.approx(mode.damping_ratio[place], rel=0.05)

@@ -1,4 +1,4 @@
-"""What is reported of states and histories: time signals, energy, fretting loops, outcomes."""
+"""What is reported of states and histories: time signals, contact forces, fretting loops, outcomes."""
 
 import math
 from dataclasses import replace
@@ -19,7 +19,7 @@ from solver.structure.joint import build_case
 from studies import build_scene
 from studies.scenes.half_space import composite_modulus
 from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
-from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
+from tests.solver.reconstruction import full_motion, pair_period, series
 from tests.studyrunner.faked_runs import history
 
 # --- states ---
@@ -43,12 +43,12 @@ def periodic(kinds):
 
 
 @pytest.mark.parametrize("kinds", KINDS)
-def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds):
+def test_the_contact_force_is_that_of_the_plain_law(kinds):
+    """From what the state stores; `test_whole_response` has the equation of motion."""
     joint, point, state = periodic(kinds)
     model, penalty = joint.model, joint.penalty
-    motion = full_motion(model, state)
     assert not penalty.inertial.any()
-    # the contact force from the plain law alone, from what the state stores
+    assert point.evaluation.slip_work.any()
     moved = state.displacement_h.copy()
     moved[:, 0, 0] -= model.contact.gap + point.evaluation.wear_depth
     eps = np.column_stack([penalty.normal, penalty.tangential, penalty.tangential])
@@ -68,10 +68,6 @@ def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds):
     exact = many @ build_basis(all_orders(SETTINGS.harmonics), many.shape[1]).analysis
     kink = np.abs(np.diff(predicted_t[:, 0])).max()
     assert np.abs(state.contact_force_h[:, 0] - exact).max() < 4 * kink / SETTINGS.samples
-    forces[:, 0] = series(state.contact_force_h[:, 0], SETTINGS.samples)
-    work, viscous, friction = motion.excitation_work(), motion.viscous_work(), contact_work(state, forces)
-    assert friction > 0.01 * work
-    assert work == pytest.approx(viscous + friction, rel=1e-6, abs=0.0)
 
 
 @pytest.mark.parametrize("kinds", KINDS)
