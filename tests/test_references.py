@@ -21,10 +21,6 @@ TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1
 VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
 
 
-def phases(orbit):
-    return {segment.phase for segment in orbit.segments}
-
-
 @pytest.mark.parametrize("case", [(0.7, 0.1, 0.6), (0.4, 0.02, 0.5), (1.2, 0.3, 0.3)])
 def test_slider_with_damping_balances_its_energy(case):
     omega, damping, friction = case
@@ -61,7 +57,7 @@ def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase():
 @pytest.mark.parametrize(("omega", "known"), [(1.2, 0.1146716), (1.5, 0.1889205)])
 def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega, known):
     orbit = vibro_impact_orbit(*VIBRO_IMPACT, omega, begin=0.85)
-    assert phases(orbit) == {"open", "closed"}
+    assert {segment.phase for segment in orbit.segments} == {"open", "closed"}
     assert abs(orbit.harmonic(0)) == pytest.approx(known, rel=3e-7)
 
     def rate(time, y):

@@ -4,8 +4,6 @@ Nothing here passes through the condensed structure, the kernels or the penalty 
 Eqs. (11)-(15) in the convention of the project.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from solver.model import ComplexArray, FloatArray, LinearModel, ReducedModel
@@ -47,24 +45,11 @@ def series(values_h: FloatArray, n_samples: int) -> FloatArray:
     return total
 
 
-@dataclass(frozen=True)
-class FullMotion:
-    """Motion of the whole structure that has the relative displacements of a state.
+def full_motion(model: ReducedModel, state: PeriodicState) -> list[ComplexArray]:
+    """Complex amplitudes (n_displacements,), m, of each harmonic of the whole structure, from a state.
 
-    displacement[n] (n_displacements,): complex amplitudes of harmonic n, m.
+    The relative displacements are given: a static structure may be free to slide.
     """
-
-    model: ReducedModel
-    state: PeriodicState
-    displacement: tuple[ComplexArray, ...]
-
-    def response(self, harmonic: int = 1) -> ComplexArray:
-        """Complex amplitudes (n_response,) of the responses, m."""
-        return harmonic_structure(self.model, harmonic).response @ self.displacement[harmonic]
-
-
-def full_motion(model: ReducedModel, state: PeriodicState) -> FullMotion:
-    """Motion of the whole structure; relative displacements are given: a static structure may be free to slide."""
     exists = model.contact.dofs >= 0
     relative, moved = model.contact.dofs[exists], []
     for n in range((state.displacement_h.shape[2] + 1) // 2):
@@ -77,7 +62,7 @@ def full_motion(model: ReducedModel, state: PeriodicState) -> FullMotion:
         if inner.size:
             whole[inner] = np.linalg.solve(matrix[np.ix_(inner, inner)], (load - matrix @ whole)[inner])
         moved.append(whole)
-    return FullMotion(model, state, tuple(moved))
+    return moved
 
 
 # --- the contact law once more, slow and plain ---

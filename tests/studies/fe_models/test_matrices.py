@@ -13,8 +13,8 @@ from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.finite_element.solid_mesh import assemble_stiffness
 from studies.model_check import check_model
 from studies.scene_error import SceneError
+from tests.studies.fe_models.decks import mutate
 from tests.studies.fe_models.matrix_files import REDUCED, chain, write_calculix, write_matrix_input, write_punch
-from tests.studies.fe_models.mutations import mutate
 from tests.studies.fe_models.solid_meshes import block, deck_lines, needs_ccx, run_ccx
 
 FORMATS = {
