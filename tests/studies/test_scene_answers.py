@@ -33,6 +33,7 @@ def test_den_hartog_holds_where_the_reference_does_and_has_its_amplitude(ratio, 
     mass, stiffness, force = 0.1, 1.6e5, 10.0
     omega = ratio * np.sqrt(stiffness / mass)
     own = DenHartogSlider(mass, stiffness, force, omega)
+    assert own.amplitude(np.array(0.0)) == pytest.approx(force / abs(stiffness - mass * omega**2), rel=1e-12)
     orbit = slider_orbit(mass, 0.0, stiffness, force, friction_force, omega)
     assert own.holds(friction_force) == ("stick" not in {segment.phase for segment in orbit.segments})
     try:

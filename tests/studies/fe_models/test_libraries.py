@@ -21,11 +21,11 @@ def test_gmsh_41_and_what_is_no_mesh(tmp_path):
     sets = {name: nodes.tolist() for name, nodes in deck.node_sets.items()}
     assert sets == {"UNDER": [1, 2, 3], "BLOCK": [1, 2, 3, 4, 5]}
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
-    with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):
+    with pytest.raises(SceneError, match=r"^model: mesh.med "):
         read_mesh_file(tmp_path / "mesh.med")
-    with pytest.raises(SceneError, match=r"there is no file none.cdb"):
+    with pytest.raises(SceneError, match=r"^model: .*none.cdb"):
         read_mesh_file(tmp_path / "none.cdb")
-    with pytest.raises(SceneError, match=r"mesh.msh is damaged, or of a kind that meshio does not know; write it"):
+    with pytest.raises(SceneError, match=r"^model: mesh.msh "):
         read_mesh_file(write(tmp_path, GMSH_41.replace("1 5 1 5", "1 5 x 5"), "mesh.msh"))
 
 

@@ -170,38 +170,38 @@ def test_tables_of_nodes_and_matrices_give_the_complex_matrices_of_each_nodal_di
 
 
 @pytest.mark.parametrize(
-    ("changes", "sentence"),
+    ("changes", "key"),
     [
-        ({"nodal_diameter": 4}, r"nodal_diameter: 4; use at most n_sectors // 2 = 3"),
-        ({"n_sectors": None}, r"n_sectors: missing; give the number of sectors with next_sector"),
-        ({"next_sector": ["TIP"]}, r'next_sector: no contact has the name "TIP"; give one of LEADING-TRAILING'),
-        ({"n_sectors": 7, "cut_faces": ["LEFT", "RIGHT"]}, r"n_sectors: cut faces are 60 degrees apart, 7 sectors"),
-        ({"n_sectors": 7}, r"contact: 8 of 8 nodes of LEADING are farther than .* after a turn by one sector"),
-        ({"contact": [["TRAILING", "LEADING"]]}, r"contact: 8 nodes of TRAILING have no area or normal, as node"),
-        ({"rotation_speed": 3000.0}, r"rotation_speed: the model is a table of nodes;"),
-        ({"matrices": None, "recovery": None}, r"matrices: missing; give the matrices of the nodes of nodes.csv"),
+        ({"nodal_diameter": 4}, "nodal_diameter: 4"),
+        ({"n_sectors": None}, "n_sectors: missing"),
+        ({"next_sector": ["TIP"]}, 'next_sector: no contact has the name "TIP"'),
+        ({"n_sectors": 7, "cut_faces": ["LEFT", "RIGHT"]}, "n_sectors: cut faces are 60 degrees apart"),
+        ({"n_sectors": 7}, "contact: 8 of 8 nodes of LEADING"),
+        ({"contact": [["TRAILING", "LEADING"]]}, "contact: 8 nodes of TRAILING"),
+        ({"rotation_speed": 3000.0}, "rotation_speed: "),
+        ({"matrices": None, "recovery": None}, "matrices: missing"),
     ],
-)  # fmt: skip
-def test_mistakes_are_named(tmp_path, changes, sentence):
-    with pytest.raises(SceneError, match=sentence):
+)
+def test_mistakes_are_named(tmp_path, changes, key):
+    with pytest.raises(SceneError, match=f"^{key}"):
         model_of(write(tmp_path), **changes)
 
 
 @pytest.mark.parametrize(
-    ("file", "old", "new", "sentence"),
+    ("kind", "file", "old", "new", "key"),
     [
-        ("nodes.csv", r"\Z", "7777,0.3,0.0,0.0,,,,,,\n", r"matrices: 1 nodes of nodes.csv have no row in job.mat"),
-        ("nodes.csv", ",sets", ",set", r"model: nodes.csv has no column sets"),
-        ("stress.csv", r"\Z", "1,7,1.0\n", r"recovery: stress.csv: node 1 with dof 7 is no row"),
-        ("stress.csv", r"\Z", "0,0,1.0\n", r"recovery: stress.csv: node 0 with dof 0 is no row"),
-        ("stress.csv", r"root \[MPa\]", "tip", r"recovery: stress.csv: a response has the name tip as well"),
-        ("stress.csv", r".*\n\Z", "", rf"{N_MODES - 1} rows of node 0 and dof 0, job_stiffness.hb has {N_MODES}; give"),
+        ("mat", "nodes.csv", r"\Z", "7777,0.3,0.0,0.0,,,,,,\n", "matrices: 1 nodes of nodes.csv .* node 7777"),
+        ("mat", "nodes.csv", ",sets", ",set", "model: nodes.csv .* sets"),
+        ("mat", "stress.csv", r"\Z", "1,7,1.0\n", "recovery: stress.csv: node 1 with dof 7"),
+        ("mat", "stress.csv", r"\Z", "0,0,1.0\n", "recovery: stress.csv: node 0 with dof 0"),
+        ("mat", "stress.csv", r"root \[MPa\]", "tip", "recovery: stress.csv: .* tip"),
+        ("one triangle", "stress.csv", r".*\n\Z", "", f"recovery: stress.csv: {N_MODES - 1} rows"),
     ],
 )
-def test_tables_that_do_not_fit_are_named(tmp_path, file, old, new, sentence):
-    path = write(tmp_path, "one triangle" if ".hb" in sentence else "mat") / file
+def test_tables_that_do_not_fit_are_named(tmp_path, kind, file, old, new, key):
+    path = write(tmp_path, kind) / file
     path.write_text(re.sub(old, new, path.read_text(), count=1))
-    with pytest.raises(SceneError, match=sentence):
+    with pytest.raises(SceneError, match=f"^{key}"):
         model_of(tmp_path)
 
 
