@@ -210,7 +210,7 @@ def test_a_sliding_that_is_prescribed_wears_as_archard_says(name, values, load):
         history = march_wear(model, 20.0, 1.0, MU, 1e-13, [0.0, 1e-4 / sliding], sweep="ramp")
         assert history.outcome is Outcome.CONVERGED
         assert history.worn_volume[-1] == pytest.approx(4.0 * 1e-13 * load * 1e-4, rel=1e-3)
-    with pytest.raises(SceneError, match="sliding: 1e-06; give stroke or sliding, not both"):
+    with pytest.raises(SceneError, match=r"^sliding: 1e-06;"):
         build_scene(name, sliding=1e-6, stroke=1e-5)
 
 

@@ -103,7 +103,7 @@ def test_matrices_of_calculix_give_the_scene_of_the_mesh(folder, capsys):
     shown = capsys.readouterr().out
     assert "speed      4774.65 rpm about (0, 0, 1); the stiffness holds 4774.65 rpm" in shown
     assert "sector.sti sha256:" in shown
-    with pytest.raises(UserError, match=r"rotation_speed = 3000 rpm, the stiffness holds 4774.65 rpm"):
+    with pytest.raises(UserError, match=r"rotation_speed = 3000 rpm, .* 4774.65 rpm"):
         scene_of("wear.toml", "scene.matrices=sector", "scene.rotation_speed=3000")
 
 

@@ -49,10 +49,10 @@ def test_names_of_files(tmp_path):
     assert [path.suffix for path in find_matrix_files(job)] == [".sti", ".mas", ".dof"]
     assert find_matrix_files(tmp_path / "job.mas") == find_matrix_files(job)
     write_matrix_input(tmp_path, *chain())
-    with pytest.raises(SceneError, match=r"there are job.sti and job_STIF1.mtx; give the name of one"):
+    with pytest.raises(SceneError, match=r"^matrices: .*job.sti and job_STIF1.mtx;"):
         read_matrices(job)
     assert read_matrices(tmp_path / "job_MASS1.mtx").code == "abaqus"
-    with pytest.raises(SceneError, match=r"there is no other.sti, .*other_STIF1.mtx"):
+    with pytest.raises(SceneError, match=r"^matrices: .* other.sti, .*other_STIF1.mtx"):
         read_matrices(tmp_path / "other")
 
 
@@ -132,11 +132,11 @@ def test_a_boundary_that_is_not_symmetric_beside_stiff_modes(tmp_path, name):
             (tmp_path / folder / part).mkdir(parents=True)
             write(tmp_path / folder / part, given | {"load": named["load"]}, rows)
         read_matrices(tmp_path / folder / "right" / "job")
-        with pytest.raises(SceneError, match="the matrix is not symmetric between dof 1 of node 1 and dof 2 of node 1"):
+        with pytest.raises(SceneError, match=" dof 1 of node 1 and dof 2 of node 1"):
             read_matrices(tmp_path / folder / "wrong" / "job")
-    with pytest.raises(ValueError, match=rf"{name}: give a symmetric matrix: the entries at \(0, 1\) and"):
+    with pytest.raises(ValueError, match=rf"^{name}: .* \(0, 1\) "):
         build_model(*wrong.values(), [[0, 1, 2]], 1.0, load_harmonic=np.eye(n)[0])
-    with pytest.raises(SceneError, match=f"{name}: not symmetric: .* at 0, 1 but .* at 1, 0"):
+    with pytest.raises(SceneError, match=f"^{name}: .* 0, 1 .* 1, 0"):
         check_model(replace(model, linear={0: replace(model.linear[0], **{name: matrix})}))
 
 
