@@ -176,7 +176,10 @@ class ContactPair(PiecewiseLinear):
         return PairPhase(flow, guards, nothing, nothing, place)
 
     def next_phase(self, name: str, y: FloatArray) -> tuple[str, FloatArray]:
-        """The first other phase whose guards are positive at once; which ones there are says the event."""
+        """The phase after an event, and y with the event exactly on its switch.
+
+        It is the first other phase whose guards are positive at once; which ones there are says the event.
+        """
         phase = self.phases[name]
         y, others = y.copy(), [other for other in self.phases if other != name]
         values = np.abs(phase.guards @ y)
@@ -213,6 +216,7 @@ class ContactPair(PiecewiseLinear):
         return True
 
     def phase_at(self, name: str, y: FloatArray) -> str:
+        """Phase of a state near one of the phase `name`, away from the switches."""
         if self.tangent is None:
             return self._likely_phase(y)
         if name in SLIDING and not self.elastic:
@@ -220,6 +224,7 @@ class ContactPair(PiecewiseLinear):
         return name
 
     def fixed(self, name: str) -> list[int]:
+        """Indices of y that cannot vary in a phase."""
         if self.elastic:
             return [2 * self.n - 1] if name == "stick" else [2 * self.n - 1, self._place]
         return [self.n + self._place] if name == "stick" else []

@@ -9,7 +9,6 @@ The period map is closed by Newton's method after a transient. Made for textbook
 """
 
 import contextlib
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -51,31 +50,15 @@ class Segment:
     duration: float
 
 
-class PiecewiseLinear(ABC):
-    """Oscillator with n displacements under a force of the angular frequency omega, rad/s."""
+class PiecewiseLinear:
+    """Oscillator with n displacements under a force of the angular frequency omega, rad/s.
+
+    phases: by name; in "stick" nothing need move. What a kind of oscillator adds has `ContactPair`.
+    """
 
     omega: float
-
-    @property
-    @abstractmethod
-    def n(self) -> int: ...
-
-    @property
-    @abstractmethod
-    def phases(self) -> Mapping[str, Phase]:
-        """By name; in "stick" nothing need move."""
-
-    @abstractmethod
-    def next_phase(self, name: str, y: FloatArray) -> tuple[str, FloatArray]:
-        """The phase after an event, and y with the event exactly on its switch."""
-
-    @abstractmethod
-    def phase_at(self, name: str, y: FloatArray) -> str:
-        """Phase of a state near one of the phase `name`, away from the switches."""
-
-    @abstractmethod
-    def fixed(self, name: str) -> list[int]:
-        """Indices of y that cannot vary in a phase."""
+    n: int
+    phases: Mapping[str, Phase]
 
     @property
     def period(self) -> float:
@@ -190,10 +173,10 @@ class Orbit:
     start_time: float
     residual: float
 
-    def multipliers(self, step: float = 1e-6) -> NDArray[np.complex128]:
-        """Floquet multipliers (2 n,), largest first, by differences of the period map; step: over the largest state."""
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers (2 n,), largest first, by differences of the period map."""
         y, name, system = self.segments[0].start, self.segments[0].phase, self.system
-        length, columns = step * np.abs(y[: 2 * system.n]).max(), []
+        length, columns = 1e-6 * np.abs(y[: 2 * system.n]).max(), []
         for moved in length * np.eye(y.size)[: 2 * system.n]:
             ends = [system.advance(system.phase_at(name, at), at, system.period)[1] for at in (y + moved, y - moved)]
             columns.append((ends[0] - ends[1])[: 2 * system.n] / (2.0 * length))

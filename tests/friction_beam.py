@@ -1,4 +1,4 @@
-"""The virtual friction beam of nonlinear modal testing, and its mode by a plain harmonic balance.
+"""The virtual friction beam of nonlinear modal testing.
 
 A clamped steel beam with an elastic friction element (a spring of 1.3e6 N/m that slips at 1 N): Scheel, Peter, Leine
 and Krack, "A phase resonance approach for modal testing of structures with nonlinear dissipation", Journal of Sound and
@@ -46,61 +46,3 @@ def friction_beam(**place):
     return build_model(
         *grown, [[-1, len(load) - 1, -1]], 1e-4, load_harmonic=load, normal_load=LIMIT, response=[len(load) - 3]
     )
-
-
-def plain_mode(amplitudes, orders=tuple(range(1, 20, 2)), n_samples=512):
-    """Frequency, Hz, and damping ratio at ascending modal amplitudes, m sqrt(kg): extended periodic motion concept.
-
-    Unknowns are the odd harmonics of the motion at the friction element, the frequency and the damping ratio.
-    """
-    mass, damping, stiffness, place = matrices()
-    unit, number = np.eye(len(mass))[place], np.array(orders)
-    phases = 2.0 * np.pi * np.arange(n_samples) / n_samples
-    waves = np.exp(1j * np.outer(number, phases))
-
-    def force_of(moved):
-        signal, force, seen = np.real(moved @ waves), 0.0, np.zeros(n_samples)
-        # the second period is periodic
-        for sample in range(2 * n_samples):
-            step = signal[sample % n_samples] - signal[sample % n_samples - 1]
-            force = min(max(force + SPRING * step, -LIMIT), LIMIT)
-            seen[sample % n_samples] = force
-        return 2.0 / n_samples * (waves.conj() @ seen)
-
-    def residual(unknown, amplitude):
-        moved = amplitude * (unknown[: number.size] + 1j * unknown[number.size : -2])
-        omega, ratio = 300.0 * unknown[-2], 0.01 * unknown[-1]
-        force, left = force_of(moved), []
-        for place, order in enumerate(orders):
-            rate = order * omega
-            full = stiffness + 1j * rate * (damping - 2.0 * ratio * omega * mass) - rate**2 * mass
-            if order > 1:
-                left.append((moved[place] + np.linalg.solve(full, unit)[unit > 0.0][0] * force[place]) / amplitude)
-                continue
-            # the first harmonic of all displacements follows from that of the element, by all equations but one
-            kept = unit == 0.0
-            shape = np.zeros(len(unit), complex)
-            shape[~kept] = moved[0]
-            shape[kept] = -np.linalg.solve(full[np.ix_(kept, kept)], full[np.ix_(kept, ~kept)][:, 0] * moved[0])
-            left.append((full[~kept] @ shape + force[0])[0] / (1e6 * amplitude))
-            size = np.vdot(shape, mass @ shape).real / amplitude**2
-        left = np.array(left)
-        return np.concatenate([left.real, left.imag, [size - 1.0, moved[0].imag / amplitude]])
-
-    squares, shapes = scipy.linalg.eigh(stiffness + SPRING * np.outer(unit, unit), mass)
-    unknown = np.concatenate(
-        [[abs(shapes[place, 0])], np.zeros(2 * number.size - 1), [np.sqrt(squares[0]) / 300.0, 0.8]]
-    )
-    found = []
-    for amplitude in amplitudes:
-        for _ in range(20):
-            here = residual(unknown, amplitude)
-            if np.abs(here).max() < 1e-9:
-                break
-            moved = unknown + 1e-7 * np.eye(unknown.size)
-            slopes = np.array([residual(one, amplitude) - here for one in moved]) / 1e-7
-            unknown = unknown - np.linalg.solve(slopes.T, here)
-        else:
-            raise ArithmeticError(amplitude)
-        found.append([300.0 * unknown[-2] / (2.0 * np.pi), 0.01 * unknown[-1]])
-    return np.array(found).T

@@ -224,3 +224,13 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
     if isinstance(point, Failure):
         return exists, point.outcome, {}
     return exists, Outcome.CONVERGED, law_errors(joint, point)
+
+
+def static_forces(model: ReducedModel, friction: float | None) -> FloatArray:
+    """Contact forces (n_contact, 3), N, of the static state, in which all laws hold: compression positive."""
+    joint = build_case(model, friction, OMEGA, SolverSettings()).joint(OMEGA, 0.0)
+    point = solve_static_state(joint, Run(1e-9))
+    assert isinstance(point, State), f"no static state at a friction coefficient of {friction}"
+    errors = law_errors(joint, point)
+    assert max(errors.values()) < 1e-7, errors
+    return point.evaluation.force_h[:, :, 0]

@@ -168,11 +168,11 @@ def _matrices(
     inner, relative = np.setdiff1d(np.arange(n), pairs.dofs), pairs.dofs[pairs.dofs >= 0]
     mass, stiffness = np.zeros((n, n)), np.zeros((n, n))
     if inner.size:
-        mass[np.ix_(inner, inner)] = m0 * _definite(random, inner.size)
-        stiffness[np.ix_(inner, inner)] = k0 * _definite(random, inner.size)
+        mass[np.ix_(inner, inner)] = m0 * definite(random, inner.size)
+        stiffness[np.ix_(inner, inner)] = k0 * definite(random, inner.size)
     if random.random() < 0.5:
         # neighbours on one elastic body: closing and sliding are coupled
-        stiffness[np.ix_(relative, relative)] += 0.3 * k0 * _definite(random, relative.size)
+        stiffness[np.ix_(relative, relative)] += 0.3 * k0 * definite(random, relative.size)
     for row, mount in zip(pairs.dofs, pairs.mounts, strict=True):
         joint = k0 * log_uniform(random, 0.3, 30.0)
         ground = k0 * log_uniform(random, 0.01, 1.0)
@@ -189,9 +189,13 @@ def _matrices(
     return mass, stiffness
 
 
-def _definite(random: np.random.Generator, size: int) -> FloatArray:
+def definite(random: np.random.Generator, size: int, complex_values: bool = False) -> np.ndarray:
+    """Positive definite matrix with eigenvalues of about 0.5 to 4."""
     root = random.normal(size=(size, size)) / np.sqrt(size)
-    return root @ root.T + 0.5 * np.eye(size)
+    if complex_values:
+        root = root + 1j * random.normal(size=(size, size)) / np.sqrt(size)
+    matrix = root @ root.conj().T + 0.5 * np.eye(size)
+    return (matrix + matrix.conj().T) / 2
 
 
 def _motion(full: np.ndarray, load: np.ndarray, held: np.ndarray) -> np.ndarray:

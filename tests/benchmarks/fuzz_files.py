@@ -22,8 +22,7 @@ from studyrunner import cli
 from studyrunner.report import cli as report
 from tests.benchmarks.frame import arguments
 from tests.mpi.launching import options
-from tests.studies.fe_models.decks import CUBES
-from tests.studies.fe_models.mutations import mutate
+from tests.studies.fe_models.decks import CUBES, mutate
 from tests.studyrunner.small_studies import LAP_JOINT, SLIDER
 
 PATIENCE = 60

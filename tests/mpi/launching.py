@@ -13,7 +13,7 @@ import uuid
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import pytest
 import xarray as xr
@@ -140,15 +140,9 @@ def _text_of(file: IO[bytes]) -> str:
     return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode("utf-8", "replace")
 
 
-def run_to_end(
-    n_ranks: int,
-    arguments: Sequence[str],
-    folder: Path,
-    environment: Mapping[str, str] | None = None,
-    disturb: Callable[[Running], object] = lambda _: None,
-) -> Ended:
-    """Python with these arguments under mpiexec, or alone for 0 ranks."""
-    return run_command([*launcher(n_ranks), sys.executable, *arguments], folder, environment, disturb)
+def run_to_end(n_ranks: int, arguments: Sequence[str], *given: Any, **more: Any) -> Ended:
+    """Python with these arguments under mpiexec, or alone for 0 ranks; given, more: as of `run_command`."""
+    return run_command([*launcher(n_ranks), sys.executable, *arguments], *given, **more)
 
 
 def run_here(arguments: Sequence[str], folder: Path, environment: Mapping[str, str] | None = None) -> int:

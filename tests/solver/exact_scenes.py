@@ -8,8 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from solver import build_model
 from solver.loading_history.start_states import follow_branch
-from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
@@ -18,6 +19,7 @@ from solver.structure.joint import Joint, build_case
 from tests.cantilever import FRICTION, Cantilever
 from tests.contact_pair import ContactPair
 from tests.event_driven import Orbit
+from tests.random_scenes import log_uniform as _spread
 from tests.solver.models import march_wear
 
 
@@ -30,18 +32,10 @@ class Scene(ContactPair):
     @property
     def model(self) -> ReducedModel:
         """The same for the solver; its responses are those of the masses."""
-        rows = np.eye(len(self.mass))[np.diag(self.mass) > 0.0]
-        load = np.asarray(self.load_harmonic, complex) / self.excitation
-        linear = LinearModel(self.mass, self.damping, self.stiffness, self.load_static, load, rows)
-        contact = ContactInterface(
-            dofs=np.array([[-1 if index is None else index for index in (self.normal, self.tangent, None)]], np.int64),
-            area=np.ones(1),
-            gap=np.array([self.gap]),
-            normal_load=np.array([self.normal_load]),
-            position=np.full((1, 3), np.nan),
-            surface=("pair",),
-        )
-        return ReducedModel({0: linear}, contact, tuple(f"mass {index}" for index in range(len(rows))))
+        dofs = [-1 if index is None else index for index in (self.normal, self.tangent, None)]
+        loads = {"load_static": self.load_static, "load_harmonic": np.asarray(self.load_harmonic) / self.excitation}
+        more = loads | {"gap": self.gap, "normal_load": self.normal_load, "response": self.massive}
+        return build_model(self.mass, self.damping, self.stiffness, [dofs], 1.0, **more)
 
     def orbit_next_to(self, joint: Joint, displacement_h: FloatArray) -> Orbit:
         """The exact motion next to a state, given by its relative displacements. Raises NoPeriodicMotionError."""
@@ -104,10 +98,6 @@ def find(scene: Scene, settings: SolverSettings, sweep: str = "up") -> Found:
 
 
 # --- random scenes ---
-
-
-def _spread(random: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
 def _units(random: np.random.Generator) -> tuple[float, float, float]:

@@ -21,21 +21,12 @@ from solver.structure.joint import Case, build_case
 from solver.wear.history import integrate_together
 from solver.wear.wearing_joint import WearRequest, steps_of
 from studies.scenes import build_scene, scene_parameters
-from tests.random_scenes import COMPONENTS
+from tests.random_scenes import COMPONENTS, definite
 
 STIFFNESS = 1e7  # N/m
 MASS = 5.0  # kg
 PRELOAD = 100.0  # N on a pair
 OMEGA = 600.0  # rad/s, below the first natural frequencies of the random models
-
-
-def definite(random: np.random.Generator, size: int, complex_values: bool = False) -> np.ndarray:
-    """Positive definite matrix with eigenvalues of about 0.5 to 4."""
-    root = random.normal(size=(size, size)) / np.sqrt(size)
-    if complex_values:
-        root = root + 1j * random.normal(size=(size, size)) / np.sqrt(size)
-    matrix = root @ root.conj().T + 0.5 * np.eye(size)
-    return (matrix + matrix.conj().T) / 2
 
 
 def random_contact(random: np.random.Generator, kinds: Sequence[str], n_inner: int) -> ContactInterface:
@@ -180,13 +171,12 @@ def march_wear(
     cycles: FloatArray | ToTheEnd,
     settings: SolverSettings,
     *,
-    largest_depth: float | None = None,
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
     **asked: Any,
 ) -> WearHistory:
     """The history from a start state; asked: what else `WearRequest` has."""
-    wanted = WearRequest(wear_coefficient, steps_of(scheme, step, settings.rtol, largest_depth), cycles, **asked)
+    wanted = WearRequest(wear_coefficient, steps_of(scheme, step, settings.rtol, None), cycles, **asked)
     return next(integrate_together(model, friction_coefficient, settings, start, (wanted,), keep, resume))
 
 

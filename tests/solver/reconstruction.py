@@ -4,8 +4,6 @@ Nothing here passes through the condensed structure, the kernels or the penalty 
 Eqs. (11)-(15) in the convention of the project.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from solver.model import ComplexArray, FloatArray, LinearModel, ReducedModel
@@ -47,38 +45,11 @@ def series(values_h: FloatArray, n_samples: int) -> FloatArray:
     return total
 
 
-@dataclass(frozen=True)
-class FullMotion:
-    """Motion of the whole structure that has the relative displacements of a state.
+def full_motion(model: ReducedModel, state: PeriodicState) -> list[ComplexArray]:
+    """Complex amplitudes (n_displacements,), m, of each harmonic of the whole structure, from a state.
 
-    displacement[n] (n_displacements,): complex amplitudes of harmonic n, m.
+    The relative displacements are given: a static structure may be free to slide.
     """
-
-    model: ReducedModel
-    state: PeriodicState
-    displacement: tuple[ComplexArray, ...]
-
-    def excitation_work(self) -> float:
-        """Work of the excitation over a period, J."""
-        load = self.state.excitation_amplitude * harmonic_structure(self.model, 1).load_harmonic
-        return float(np.pi * np.imag(self.displacement[1].conj() @ load))
-
-    def viscous_work(self) -> float:
-        """What the damping takes over a period, J."""
-        total = 0.0
-        for n in range(1, len(self.displacement)):
-            moved = self.displacement[n]
-            damping = harmonic_structure(self.model, n).damping
-            total += np.pi * n**2 * self.state.omega * float(np.real(moved.conj() @ damping @ moved))
-        return total
-
-    def response(self, harmonic: int = 1) -> ComplexArray:
-        """Complex amplitudes (n_response,) of the responses, m."""
-        return harmonic_structure(self.model, harmonic).response @ self.displacement[harmonic]
-
-
-def full_motion(model: ReducedModel, state: PeriodicState) -> FullMotion:
-    """Motion of the whole structure; relative displacements are given: a static structure may be free to slide."""
     exists = model.contact.dofs >= 0
     relative, moved = model.contact.dofs[exists], []
     for n in range((state.displacement_h.shape[2] + 1) // 2):
@@ -91,17 +62,7 @@ def full_motion(model: ReducedModel, state: PeriodicState) -> FullMotion:
         if inner.size:
             whole[inner] = np.linalg.solve(matrix[np.ix_(inner, inner)], (load - matrix @ whole)[inner])
         moved.append(whole)
-    return FullMotion(model, state, tuple(moved))
-
-
-def contact_work(state: PeriodicState, force_t: FloatArray) -> float:
-    """Work over a period, J, that contact forces (n_contact, 3, N), N, take from the motion of a state."""
-    rate_h = np.zeros_like(state.displacement_h)
-    for n in range(1, (rate_h.shape[2] + 1) // 2):
-        rate_h[..., 2 * n - 1] = n * state.omega * state.displacement_h[..., 2 * n]
-        rate_h[..., 2 * n] = -n * state.omega * state.displacement_h[..., 2 * n - 1]
-    n_samples = force_t.shape[2]
-    return float((force_t * series(rate_h, n_samples)).sum() * 2.0 * np.pi / state.omega / n_samples)
+    return moved
 
 
 # --- the contact law once more, slow and plain ---

@@ -19,7 +19,7 @@ from solver.wear.jump import creeps, free_slide
 from solver.wear.problem import WearProblem
 from studies import build_scene
 from tests.references import vibro_impact_orbit
-from tests.solver.models import assert_same, branch_states, dovetail, march_wear
+from tests.solver.models import assert_same, branch_states, march_wear
 
 # --- the branch with impacts ends, the mass falls on the other one ---
 
@@ -148,37 +148,17 @@ def test_a_root_that_begins_to_slide_all_over_wears_on():
 # --- interrupted histories ---
 
 
-def from_every_stop(model, friction, start, wear, step, scheme, end, settings):
-    """A history, which goes on to the same bits from some of the places where it was saved, the counts of these places,
-    and how many histories it takes.
-    """
-    asked, kept = (model, friction, start, wear, step, scheme, np.linspace(0.0, end, 5), settings), list[Packed]()
-    whole = march_wear(*asked, keep=kept.append)
-    places = [unpack(progress) for progress in kept]
-    # within the history itself, one that it is compared with, and the reference solution: from the last one backwards
-    stages = {len(at): [n for n, other in enumerate(places) if len(other) == len(at)] for at in places}
-    for found in stages.values():
-        for n in found[:: -max(1, len(found) // 2)][:2]:
-            assert_same(march_wear(*asked, resume=kept[n]), whole)
-    own = [solution.state.cycle for at in places if len(at) == 1 for solution in at.values()]
-    return whole, own, len(stages)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("adaptive", 1.0)])
-def test_a_history_goes_on_to_the_same_numbers(scheme, step, monkeypatch):
-    monkeypatch.setattr(WearProblem, "iterations_per_save", 8)
-    model, settings = dovetail(7), SolverSettings(rtol=3e-2)
-    (start,) = branch_states(model, 0.5, 0.5, [2 * np.pi * 213.0], settings)
-    whole, own, n_stages = from_every_stop(model, 0.5, start, 1.1e-11, step, scheme, 8e3, settings)
-    assert whole.outcome is Outcome.CONVERGED
-    assert whole.worn_volume[-1] > 0.0
-    assert len(own) >= 3
-    assert n_stages == (2 if scheme == "adaptive" else 3)
-
-
 @pytest.mark.slow
 def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
+    """To the same bits, from some of the places where it was saved."""
     monkeypatch.setattr(WearProblem, "iterations_per_save", 30)
-    whole, own, _ = from_every_stop(worn_wall(), 1e-3, wall_start(), 1e-7, 1.0, "adaptive", 1000.0, IMPACT)
+    cycles, kept = np.linspace(0.0, 1000.0, 5), list[Packed]()
+    asked = worn_wall(), 1e-3, wall_start(), WALL_WEAR, 1.0, "adaptive", cycles, IMPACT
+    whole = march_wear(*asked, keep=kept.append)
+    places = [unpack(progress) for progress in kept]
+    # within the history itself, and within the reference solution: from the last one backwards
+    for stage in ([n for n, at in enumerate(places) if len(at) == length] for length in {len(at) for at in places}):
+        for n in stage[:: -max(1, len(stage) // 2)][:2]:
+            assert_same(march_wear(*asked, resume=kept[n]), whole)
+    own = [solution.state.cycle for at in places if len(at) == 1 for solution in at.values()]
     assert min(own) < whole.jump_cycle < max(own)

@@ -9,18 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given
-from hypothesis import settings as asked
-from hypothesis import strategies as st
 
 from solver import build_model
 from solver.accuracy.certificate import certify
-from solver.continuation.first_state import solve_first_state
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State
+from solver.harmonic_balance.state import Failure
 from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
-from solver.newton.run import Run
 from solver.outcome import COMPLETE, Outcome
 from solver.results.state_report import evaluated
 from solver.settings import Scheme, SolverSettings
@@ -135,6 +129,7 @@ def run_converged(case):
 
 
 BASES = {"elastic": elastic(), "block": block(), "slider": slider()}
+RESONANT = slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6)))
 # a first step that wears all load off is no answer
 OR_TOO_LONG = (*COMPLETE, Outcome.STEP_TOO_LONG)
 
@@ -152,7 +147,8 @@ def extreme_cases():
             yield f"{name}, friction {other}, explicit", replace(base, friction=other, scheme="explicit"), OR_TOO_LONG
         yield f"{name}, wear 1e2, explicit", replace(base, wear=1e2 * base.wear, scheme="explicit"), OR_TOO_LONG
         yield f"{name}, wear 1e4", replace(base, wear=1e4 * base.wear), OR_TOO_LONG
-        yield f"{name}, 50 times the load", replace(base, amplitude=50.0 * base.amplitude), COMPLETE
+        for times in (50.0, 1e-4):
+            yield f"{name}, {times} times the load", replace(base, amplitude=times * base.amplitude), COMPLETE
     held = 2.0 * np.pi * glued_frequency(elastic().model)
     free = scaled(elastic(), "damping", 0.0)
     yield "no damping, at a resonance of the held structure", replace(free, omega=held), None
@@ -184,12 +180,6 @@ def test_a_blade_that_is_unseated_or_hardly_loaded_has_states(amplitude):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("base", BASES)
-def test_so_small_a_load_is_held_by_friction(base):
-    assert not run_converged(replace(BASES[base], amplitude=1e-4 * BASES[base].amplitude)).wear_depth.any()
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1e-8, 1e4])
 def test_contact_stiffness_ratio(ratio):
     history = run_converged(block((1e7, 1e7 * ratio)))
@@ -201,17 +191,8 @@ def test_contact_stiffness_ratio(ratio):
 
 def test_friction_alone_bounds_an_undamped_resonance():
     # more than pi/4 of the force: Den Hartog; the work of the force is then less than what friction takes
-    case = replace(slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6))), friction=0.9)
-    history = run_converged(replace(case, settings=SolverSettings(11, 256)))
+    history = run_converged(replace(RESONANT, friction=0.9, settings=SolverSettings(11, 256)))
     assert history.response_peak[0, 0] < 10.0 / 1.6e5 * 20.0
-
-
-@pytest.mark.parametrize("friction", [0.0, 0.7])
-def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction):
-    start, history = run(replace(slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6))), friction=friction))
-    if start.outcome is Outcome.CONVERGED:
-        # round-off in the frequency is a detuning: then the motion is beyond all bounds that matter
-        assert history.response_peak.max() > 1e3 * 10.0 / 1.6e5
 
 
 def test_gaps_never_reached():
@@ -233,59 +214,37 @@ def test_hundreds_of_pairs():
 
 
 FEW = SolverSettings(3, 64)
-WITHOUT_STATE = {
-    Outcome.CERTIFICATE_FAILED: Case(scene("vibro_impact", 3), 1.0, amplitude=2e3, settings=FEW),
-    Outcome.START_FAILED: scaled(elastic(), "stiffness", -1.0),
-    Outcome.TIME_LIMIT: replace(elastic(), settings=replace(SETTINGS, time_limit=1e-9)),
-    Outcome.UNSETTLED: replace(block(ground=0.0, lift=0.3), amplitude=1e3, settings=FEW),
-}
+WITHOUT_STATE = [
+    (Outcome.CERTIFICATE_FAILED, Case(scene("vibro_impact", 3), 1.0, amplitude=2e3, settings=FEW)),
+    # an undamped resonance that nothing bounds: of friction below pi/4 of the force
+    *((Outcome.CERTIFICATE_FAILED, replace(RESONANT, friction=friction)) for friction in (0.0, 0.7)),
+    (Outcome.START_FAILED, scaled(elastic(), "stiffness", -1.0)),
+    (Outcome.TIME_LIMIT, replace(elastic(), settings=replace(SETTINGS, time_limit=1e-9))),
+    (Outcome.UNSETTLED, replace(block(ground=0.0, lift=0.3), amplitude=1e3, settings=FEW)),
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("outcome", WITHOUT_STATE)
-def test_where_there_is_no_state_a_sentence_says_why(outcome):
-    start, history = run(WITHOUT_STATE[outcome])
+@pytest.mark.parametrize(("outcome", "case"), WITHOUT_STATE)
+def test_where_there_is_no_state_a_sentence_says_why(outcome, case):
+    start, history = run(case)
     assert start.outcome is history.outcome is outcome
     assert start.message == history.message
 
 
-@pytest.mark.parametrize("outcome", Outcome)
+@pytest.mark.parametrize("outcome", [each for each in Outcome if each is not Outcome.CONVERGED])
 def test_no_end_can_be_without_a_sentence(outcome):
-    if outcome is not Outcome.CONVERGED:
-        with pytest.raises(ValueError, match=outcome.meaning):
-            Failure(outcome, "")
+    with pytest.raises(ValueError, match=outcome.meaning):
+        Failure(outcome, "")
 
 
 # --- random scenes ---
 
 
 @pytest.mark.slow
-@asked(max_examples=12, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
-@given(st.integers(0, 399), st.sampled_from([2.0**-20, 2.0**-3, 2.0, 2.0**10]))
-def test_loads_gaps_and_motion_scale_together(seed, scale):
-    """By powers of two, that is without round-off."""
-    drawn = random_scene(seed)
-    model, omega = drawn.model, 2.0 * np.pi * drawn.frequency_hz
-    case = build_case(model, drawn.friction, omega, SETTINGS)
-    point = solve_first_state(case, omega, drawn.amplitude, Run(SETTINGS.tolerance))
-    assume(isinstance(point, State))
-    at = point.evaluation
-    linear = replace(model.linear[0], load_static=scale * model.linear[0].load_static)
-    contact = replace(model.contact, gap=scale * model.contact.gap, normal_load=scale * model.contact.normal_load)
-    scaled = build_case(replace(model, linear={0: linear}, contact=contact), drawn.friction, omega, SETTINGS)
-    balance = Balance(scaled.joint(omega, scale * drawn.amplitude), scale * at.history, scale * at.wear_depth)
-    other = balance.evaluate(balance.predict(scale * at.displacement_h, scale * at.force_h))
-    assert other.scaled_residual() <= 2.0 * SETTINGS.tolerance
-    assert np.abs(other.slip_work - scale**2 * at.slip_work).max() <= 1e-6 * scale**2 * at.slip_work.max()
-
-
-@pytest.mark.slow
 def test_some_scenes_are_solved():
     """Of scene 16 few harmonics do not show an impact. The benchmark runs 1000 scenes, of which some take minutes."""
     records = [run_scene(random_scene(seed)) for seed in (16, *range(119, 124))]
-    for record in records:
-        assert solved(record)
-        assert "NaN" not in record["march"]
-        assert record["march"] != "wear falls"
+    assert all(map(solved, records)), records
     assert any(record.get("slips", False) for record in records)
     assert any(record.get("opens", False) for record in records)

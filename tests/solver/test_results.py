@@ -1,4 +1,4 @@
-"""What is reported of states and histories: time signals, energy, fretting loops, outcomes."""
+"""What is reported of states and histories: time signals, contact forces, fretting loops, outcomes."""
 
 import math
 from dataclasses import replace
@@ -7,7 +7,6 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver import march_wear as march_model
 from solver.accuracy.certificate import certify
 from solver.arguments import worn_model
 from solver.outcome import Outcome
@@ -17,9 +16,8 @@ from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from solver.structure.joint import build_case
 from studies import build_scene
-from studies.scenes.half_space import composite_modulus
 from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
-from tests.solver.reconstruction import contact_work, full_motion, pair_period, series
+from tests.solver.reconstruction import full_motion, harmonic_structure, pair_period, series
 from tests.studyrunner.faked_runs import history
 
 # --- states ---
@@ -43,12 +41,12 @@ def periodic(kinds):
 
 
 @pytest.mark.parametrize("kinds", KINDS)
-def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds):
+def test_the_contact_force_is_that_of_the_plain_law(kinds):
+    """From what the state stores; `test_whole_response` has the equation of motion."""
     joint, point, state = periodic(kinds)
     model, penalty = joint.model, joint.penalty
-    motion = full_motion(model, state)
     assert not penalty.inertial.any()
-    # the contact force from the plain law alone, from what the state stores
+    assert point.evaluation.slip_work.any()
     moved = state.displacement_h.copy()
     moved[:, 0, 0] -= model.contact.gap + point.evaluation.wear_depth
     eps = np.column_stack([penalty.normal, penalty.tangential, penalty.tangential])
@@ -68,10 +66,6 @@ def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds):
     exact = many @ build_basis(all_orders(SETTINGS.harmonics), many.shape[1]).analysis
     kink = np.abs(np.diff(predicted_t[:, 0])).max()
     assert np.abs(state.contact_force_h[:, 0] - exact).max() < 4 * kink / SETTINGS.samples
-    forces[:, 0] = series(state.contact_force_h[:, 0], SETTINGS.samples)
-    work, viscous, friction = motion.excitation_work(), motion.viscous_work(), contact_work(state, forces)
-    assert friction > 0.01 * work
-    assert work == pytest.approx(viscous + friction, rel=1e-6, abs=0.0)
 
 
 @pytest.mark.parametrize("kinds", KINDS)
@@ -79,11 +73,11 @@ def test_the_report_is_that_of_the_time_signals(kinds):
     joint, point, state = periodic(kinds)
     model, at = joint.model, point.evaluation
     report = report_state(joint, at, certify(joint, at))
-    motion = full_motion(model, state)
-    assert report["response"] == pytest.approx(motion.response(), rel=1e-8, abs=0.0)
-    static = np.real(model.linear[0].response @ motion.displacement[0])
+    responses = [harmonic_structure(model, n).response @ moved for n, moved in enumerate(full_motion(model, state))]
+    assert report["response"] == pytest.approx(responses[1], rel=1e-8, abs=0.0)
+    static = np.real(responses[0])
     phase = 2 * np.pi * np.arange(FINE_SAMPLES) / FINE_SAMPLES
-    waves = sum(np.real(motion.response(n)[:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
+    waves = sum(np.real(responses[n][:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
     assert report["response_peak"] == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
     assert report["mean_pressure"] == pytest.approx(
         state.contact_force_h[:, 0, 0] / model.contact.area, rel=1e-12, abs=0.0
@@ -169,10 +163,6 @@ def test_the_outcome_is_that_of_the_counts_that_are_judged(rows, changed, outcom
 
 # --- contacts that reach an edge where the bodies go on ---
 
-EDGE = SolverSettings(harmonics=3, samples=32)
-A_LINE = np.sqrt(4.0 * 1.2e5 * 6e-3 / (np.pi * composite_modulus(200e9, 0.3)))
-A_POINT = np.cbrt(0.75 * 100.0 * 10e-3 / composite_modulus(200e9, 0.3))
-
 
 def test_load_or_wear_at_the_edge_is_found_at_its_first_count():
     contact = replace(build_scene("cylinder_on_flat", strips=6).contact, edge=np.array([False, False, True]))
@@ -193,17 +183,3 @@ def test_load_or_wear_at_the_edge_is_found_at_its_first_count():
     assert first_cut_off(contact, cycles, gone, middle) == 30.0
     gone[3] = np.nan
     assert math.isnan(first_cut_off(contact, cycles, gone, middle))
-
-
-@pytest.mark.parametrize(
-    ("name", "values"),
-    [
-        ("cylinder_on_flat", {"strips": 12, "half_width": 0.9 * A_LINE}),
-        ("sphere_on_flat", {"patches": 4, "half_width": 0.9 * A_POINT}),
-    ],
-)
-def test_pairs_that_do_not_hold_the_unworn_contact_cut_it_off_at_once(name, values):
-    found = march_model(build_scene(name, **values), 20.0, 1.0, 0.6, 1e-13, [0.0], sweep="ramp", settings=EDGE)
-    assert found.outcome is Outcome.CONTACT_CUT_OFF
-    assert found.cut_off_cycle == 0.0
-    assert found.mean_pressure[0].min() > 0.0

@@ -125,18 +125,6 @@ def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multi
     assert read(states)[0][[3, 5, 6]].tolist() == [4000.0, 8000.0, 12_000.0]
 
 
-def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
-    # no error is refused, so that steps grow as they may
-    monkeypatch.setattr(control, "STEP_ERROR_FRACTION", 1e9)
-    states = states_of(Adaptive(1e-2), 3)
-    count, depth, rate = read(states)
-    h = np.diff(count)
-    assert depth[1] == pytest.approx(h[0] * rate[1], rel=1e-9)
-    w, grown = h[1:] / h[:-1], np.diff(depth)
-    expected = w**2 / (1 + 2 * w) * grown[:-1] + (1 + w) / (1 + 2 * w) * h[1:] * rate[2:]
-    assert grown[1:] == pytest.approx(expected, rel=1e-9)
-
-
 def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
     work = problem(Adaptive(1e-2))
     work.case = replace(work.case, settings=SolverSettings("auto", 512, rtol=1e-4))

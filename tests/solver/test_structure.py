@@ -11,12 +11,10 @@ from solver import frequency_response, march_wear, with_contact_stiffness
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS as LARGEST
 from solver.compliant_contact import TANGENTIAL_RATIO
 from solver.model import needed_nodal_diameters
-from solver.settings import Resolution, SolverSettings
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, condense, frequency_slope
 from solver.structure.fourier import build_basis, from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
-from solver.structure.joint import build_case
 from solver.structure.penalty import build_penalty
 from studies import build_scene
 from tests.references import den_hartog_amplitude, slider_wear_depth
@@ -159,24 +157,6 @@ def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness():
     assert (penalty.normal > largest * 1e-3).all()
 
 
-def test_the_motion_of_a_marched_mass_is_that_of_newtons_law_as_the_steps_get_short():
-    model = scene("sdof_slider")
-    errors = []
-    for samples in (32, 64, 128):
-        case = build_case(model, 0.4, OMEGA, SolverSettings(), Resolution((1, 3, 5), samples))
-        joint, penalty = case.joint(OMEGA, 60.0), case.penalty
-        correction = np.random.default_rng(5).normal(size=(1, 3, 7))
-        moved, force = to_complex(joint.law.motion(correction))[0, 1], to_complex(correction)[0, 1]
-        rates = 1j * OMEGA * np.array([1, 3, 5])
-        exact = force / (rates * (rates * penalty.mass[0] + penalty.drag[0]))
-        errors.append(np.abs(moved / exact - 1.0).max())
-        assert joint.law.motion(correction)[0, 1, 0] == pytest.approx(correction[0, 1, 0] / penalty.mean[0], rel=1e-12)
-    # the trapezoidal rule: its error falls with the square of the step
-    assert errors[0] < 0.1
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
-    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
-
-
 # --- springs in series with the pairs ---
 
 SOFT = 2e11  # N/m3; with the areas of the models about their stiffness
@@ -234,9 +214,3 @@ def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series():
     history = march_wear(build_scene("sdof_slider", **springs), 160.0, 10.0, 0.5, 1.1e-14, cycles)
     assert expected[-1] > 0.3 * 10.0 / 5e10
     assert history.wear_depth[:, 0] == pytest.approx(expected, rel=5e-3)
-
-
-@pytest.mark.parametrize("wrong", [0.0, np.nan, 1e23])
-def test_a_contact_stiffness_that_cannot_be_is_said(wrong):
-    with pytest.raises(ValueError, match="give a positive number, at most 1e"):
-        with_contact_stiffness(random_model(1, KINDS, 4), wrong)

@@ -11,7 +11,7 @@ from solver.contact.wear_law import ARCHARDS_WORK, PairFactors, WearingWork, Wea
 from solver.settings import SolverSettings
 from tests.solver.models import random_balance, random_model
 from tests.solver.test_balance import jacobian_by_differences
-from tests.solver.worn_slider import AREA, END, FRICTION, WEAR, exact_depths, march
+from tests.solver.worn_slider import AREA, END, exact_depths, march
 
 # of the slider, whose pressure falls from 1e5 Pa to nothing while 1e-4 m wear off
 TABLE = WearTable((2e4, 5e4, 9e4), (0.0, 1e-5, 6e-5), ((0.8, 0.2, 0.5), (1.0, 0.6, 0.4), (0.4, 0.8, 0.9)))
@@ -84,14 +84,6 @@ def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name):
     assert np.abs(dense - differences).max() < 1e-7 * np.abs(differences).max()
     plain = replace(balance, wearing=ARCHARDS_WORK).linearise(at).dense(np.arange(joint.contact.n_contact))
     assert np.abs(plain - differences).max() > 1e-4 * np.abs(differences).max()
-
-
-def test_by_energy_the_joint_wears_as_by_archard_with_friction_times_the_coefficient():
-    energy, archard = march(1.0, "adaptive", law=WearLaw("energy")), march(1.0, "adaptive", wear=FRICTION * WEAR)
-    for name in ("wear_depth", "wear_rate", "worn_volume", "step_limit", "mean_pressure"):
-        assert getattr(energy, name) == pytest.approx(getattr(archard, name), rel=1e-12, abs=0.0)
-    assert energy.newton_iterations == archard.newton_iterations
-    assert energy.error_estimate == pytest.approx(archard.error_estimate, rel=1e-9)
 
 
 def exact_depth(law):

@@ -156,14 +156,10 @@ def test_curves_and_balances_without_a_state_say_why():
     assert np.isfinite(doubled.residual(np.zeros(doubled.size))).all()
 
 
-def test_wrong_arguments_are_named():
-    model, settings = scene("vibro_impact"), SolverSettings(harmonics=3)
-    for frequency, amplitude in ((0.2, 0.02), ((0.2, 0.25, 0.3), 0.02), ((0.2, 0.2), 0.02), (0.2, (0.02, np.nan))):
-        with pytest.raises(ValueError, match=r"frequency|excitation_amplitude"):
-            response_curve(model, frequency, amplitude, 0.0, settings=settings)
-    balance = balance_of(model, 0.15, 0.001, 0.0, settings=settings)
+def test_unknowns_that_cannot_be_are_refused():
+    balance = balance_of(scene("vibro_impact"), 0.15, 0.001, 0.0, settings=SolverSettings(harmonics=3))
     for wrong in (balance.state[:-1], np.full(balance.size, np.nan), balance.state.reshape(1, -1)):
-        with pytest.raises(ValueError, match="z: give 7 finite numbers"):
+        with pytest.raises(ValueError, match=r"^z: "):
             balance.residual(wrong)
 
 

@@ -1,10 +1,9 @@
-"""Cylinder and sphere on a flat: compliances, contact, stick zone, wear and width against closed forms."""
+"""Cylinder and sphere on a flat: contact, stick zone, wear and width against closed forms."""
 
 import math
 
 import numpy as np
 import pytest
-from scipy.integrate import dblquad, quad
 
 from solver import march_wear
 from solver.outcome import Outcome
@@ -14,7 +13,7 @@ from studies.scene import ExpectedWear
 from studies.scene_error import SceneError
 from studies.scenes import scene_parameters
 from studies.scenes.cylinder_on_flat import line_worn_depth
-from studies.scenes.half_space import composite_modulus, patch_compliance, round_up, strip_compliance, worn_edge
+from studies.scenes.half_space import composite_modulus, round_up, worn_edge
 from studies.scenes.sphere_on_flat import point_worn_depth
 from tests.studies.half_space_twin import compliances, limit_depth, pressed, solve_pressed
 
@@ -26,45 +25,6 @@ POINT = {"R": 10e-3, "P": 100.0}
 A_LINE = float(np.sqrt(4.0 * LINE["P"] * LINE["R"] / (np.pi * MODULUS)))
 A_POINT = float(np.cbrt(0.75 * POINT["P"] * POINT["R"] / MODULUS))
 CYLINDER, SPHERE = (scene_parameters(name)() for name in ("cylinder_on_flat", "sphere_on_flat"))
-
-
-def test_strips_move_as_the_integral_over_their_traction_says():
-    edges = np.array([0.0, 0.5, 1.1, 1.4, 2.3]) * 1e-3
-    found = strip_compliance(edges, 1e11, 0.01, 0.05)
-    assert np.linalg.eigvalsh(found)[0] > 0.0
-    assert np.array_equal(found, found.T)
-    middle, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
-
-    def mean(i, j):
-        at = [middle[i]] if i == j else None
-        own, _ = quad(lambda s: np.log(0.05 / abs(middle[i] - s)), edges[j], edges[j + 1], points=at)
-        image, _ = quad(lambda s: np.log(0.05 / abs(middle[i] + s)), edges[j], edges[j + 1])
-        return float((own + image) / width[j] / 2.0)
-
-    for i, j in ((0, 0), (0, 3), (2, 1), (3, 3)):
-        expected = 2.0 / (np.pi * 1e11 * 0.01) * 0.5 * (mean(i, j) + mean(j, i))
-        assert found[i, j] == pytest.approx(expected, rel=1e-9)
-
-
-def test_patches_move_as_the_integrals_of_boussinesq_and_cerruti_say():
-    width, position = 2e-4, np.array([[1e-4, 1e-4], [5e-4, 3e-4]])
-    normal, tangential = patch_compliance(position, width, E, NU)
-    expected_normal = expected_tangential = 0.0
-    kernels = (lambda y, x: 1.0 / np.hypot(x, y), lambda y, x: x**2 / np.hypot(x, y) ** 3)
-    for image in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
-        dx, dy = position[1] - np.array(image) * position[0]
-        bounds = dx - width / 2, dx + width / 2, dy - width / 2, dy + width / 2
-        one, other = (dblquad(kernel, *bounds)[0] / width**2 / 4.0 for kernel in kernels)
-        expected_normal += one / (np.pi * MODULUS)
-        expected_tangential += ((1.0 - NU) * one + NU * other) / (np.pi * SHEAR)
-    assert normal[0, 1] == pytest.approx(expected_normal, rel=1e-8)
-    assert tangential[0, 1] == pytest.approx(expected_tangential, rel=1e-8)
-    # a square under uniform pressure, its middle: Johnson, Eq. (3.25), and three images far away
-    far = patch_compliance(np.array([[1.0, 1.0]]), width, E, NU)[0][0, 0]
-    own = 4.0 * np.arcsinh(1.0) * width / (np.pi * MODULUS * width**2) / 4.0
-    assert far == pytest.approx(own, rel=1e-4)
-    for each in (normal, tangential):
-        assert np.linalg.eigvalsh(each)[0] > 0.0
 
 
 def observed_order(errors):
@@ -250,7 +210,7 @@ def test_a_sliding_that_is_prescribed_wears_as_archard_says(name, values, load):
         history = march_wear(model, 20.0, 1.0, MU, 1e-13, [0.0, 1e-4 / sliding], sweep="ramp")
         assert history.outcome is Outcome.CONVERGED
         assert history.worn_volume[-1] == pytest.approx(4.0 * 1e-13 * load * 1e-4, rel=1e-3)
-    with pytest.raises(SceneError, match="sliding: 1e-06; give stroke or sliding, not both"):
+    with pytest.raises(SceneError, match=r"^sliding: 1e-06;"):
         build_scene(name, sliding=1e-6, stroke=1e-5)
 
 

@@ -1,23 +1,19 @@
 """Contact with the neighbouring sector: the sector alone against all sectors of the ring."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
 from solver import SolverSettings
-from solver.contact.coulomb import SLIP
-from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
-from solver.model import needed_nodal_diameters
-from solver.structure.fourier import from_complex, to_complex
-from solver.structure.joint import build_case
-from solver.structure.penalty import Penalty
+from studies.finite_element import surfaces
 from studies.finite_element.reduced_joint import prepare_model
-from studies.scene_error import SceneError
+from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
+from studies.finite_element.structure import FeModel, JointDefinition
 from studies.scenes import underplatform_damper
-from tests.studies.shrouded_ring import reduced_ring, stubby, whole_ring
+from tests.studies.fe_models.sectors import stubby
 
 N = 6
 STUBBY = stubby(N)
@@ -41,6 +37,36 @@ def opened(model, joint):
     return replace(model, mesh=replace(model.mesh, coordinates=coordinates)), replace(joint, contacts=(contact,))
 
 
+def whole_ring(model, joint):
+    """The ring of a sector, without symmetry: nodes of the cut faces are common, contacts join neighbours."""
+    mesh, axis = model.mesh, joint.cut.axis
+    n, size = axis.n_sectors, mesh.n_nodes
+    node = np.arange(n * size).reshape(n, size)
+    for j in range(n):
+        node[j][joint.cut.right] = node[(j + 1) % n][joint.cut.left]
+    used, own = np.unique(node, return_inverse=True)
+    own = own.reshape(n, size)
+    coordinates = np.concatenate([axis.turned(mesh.coordinates, j) for j in range(n)])[used]
+    groups = tuple(
+        ElementGroup(each.kind, own[j][each.nodes], each.numbers + 10000 * j, each.material, f"{each.part}{j}")
+        for j in range(n)
+        for each in mesh.groups
+    )
+    ring = SolidMesh(coordinates, np.arange(len(used)) + 1, groups)
+    held = np.zeros((len(used), 3), dtype=bool)
+    for j in range(n):
+        held[own[j]] |= joint.held
+    contacts = []
+    for each in joint.contacts:
+        for j in range(n):
+            first = surfaces.surface_of_nodes(ring, f"first {j}", own[j][each.first.nodes])
+            second = surfaces.surface_of_nodes(ring, f"second {j}", own[(j + each.sector) % n][each.second.nodes])
+            contacts.append(replace(each, first=first, second=second, sector=0, label=f"{each.name}{j}"))
+    tip = np.zeros((len(used), 3))
+    tip[own[0]] = joint.load.reshape(-1, 3)
+    return FeModel(ring), JointDefinition(tuple(contacts), held, tip.ravel(), {"tip": tip.ravel()})
+
+
 def frequencies_of_sector(model, joint):
     prepared = prepare_model(replace(model, rotation=None), joint)
     return [prepared.frequencies(k, 4) for k in range(N // 2 + 1)]
@@ -54,24 +80,6 @@ def test_stuck_frequencies_of_all_waves_are_those_of_the_ring(sector):
     twice = [each for k, each in enumerate(found) for _ in range(1 if k in (0, N // 2) else 2)]
     ring = prepare_model(*whole_ring(*sector)).frequencies(0, 10)
     np.testing.assert_allclose(np.sort(np.concatenate(twice))[:10], ring, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("usual", "changes"),
-    [
-        (STUBBY, {"blade_thickness": 0.2, "rim_radius": 0.1}),
-        (
-            DAMPED,
-            {"rim_radius": 0.1, "platform_gap": 0.02, "damper_half_width": 0.1}
-            | {"platform_thickness": 0.002, "damper_height": 0.02},
-        ),
-    ],
-)
-def test_impossible_sectors_are_refused(usual, changes):
-    for key, value in changes.items():
-        with pytest.raises(SceneError) as caught:
-            usual.model_copy(update={key: value}).define_sector()
-        assert caught.value.key == key
 
 
 def wedge_force(parameters):
@@ -96,38 +104,3 @@ def test_a_wedge_is_pressed_by_its_centrifugal_force(friction):
     # 1 %: the sides are turned to each other by the angle of the pitch
     least, most = (0.5 * force / (np.cos(roof) + sign * friction * np.sin(roof)) for sign in (1.0, -1.0))
     assert 0.99 * least < sides[0] < 1.01 * most
-
-
-@pytest.mark.slow
-def test_a_wave_of_the_sector_is_one_of_the_ring():
-    """A slipping state: turned from sector to sector, with the phase of the wave, it balances the ring as well.
-
-    The wave turns backwards. The static friction that a state keeps of its history depends on where a period begins,
-    and is left out.
-    """
-    diameter, folded, settings = N - 1, 1, SolverSettings(harmonics=3, samples=96)
-    parameters = STUBBY.model_copy(update={"interference": 5e-4, "nodal_diameter": folded, "stuck_modes": 60})
-    model = replace(parameters.build(3), nodal_diameter=diameter)
-    assert set(model.linear) == set(needed_nodal_diameters(diameter, N, 3)) | {folded}
-    first = frequencies_of_sector(*SECTORS[0])[folded][0]
-    ((_, start),) = follow_branch(model, 0.3, 30.0, np.array([0.98 * first]), "up", settings)
-    state, resolution, sector = start.state, start.resolution, build_case(model, 0.3, start.penalty_omega, settings)
-    assert resolution == sector.resolution
-
-    def turned(values_h):
-        phases = np.exp(2j * np.pi * diameter * np.arange(N)[:, None] * np.array(resolution.orders) / N)
-        parts = [from_complex(values_h[..., 0], phase * to_complex(values_h)) for phase in phases]
-        return np.concatenate(parts)
-
-    damping = parameters.loss_factor / (2.0 * np.pi * first)
-    ring = reduced_ring(*parameters.define_sector(), diameter, 360, damping)
-    penalty = Penalty(*(np.tile(getattr(sector.penalty, each.name), N) for each in fields(Penalty)))
-    case = replace(build_case(ring, 0.3, start.penalty_omega, settings), penalty=penalty)
-    history = np.tile(state.start_history, (N, 1))
-    balance = Balance(case.joint(state.omega, 30.0), history, np.zeros(len(history)))
-    motion, force = turned(state.displacement_h), turned(state.contact_force_h)
-    found = balance.evaluate(balance.predict(motion, force))
-    assert (found.status_t == SLIP).mean() > 1e-3
-    vibrating = np.abs(force[:, :, 1:]).max()
-    np.testing.assert_allclose(found.force_h[:, :, 1:], force[:, :, 1:], atol=1e-8 * vibrating)
-    assert np.abs(found.residual[:, 1:]).max() < 1e-6 * vibrating

@@ -75,12 +75,12 @@ def test_three_pairs_written_columns_first_are_refused(tmp_path):
     linear = LinearModel(*matrices, np.ones(9), np.ones(9, dtype=complex), np.eye(9)[:2])
     model = replace(with_pairs(dofs=np.arange(9).reshape(3, 3)), linear={0: linear}, response_names=("u0", "u1"))
     by_hand(path, model, turned=True)
-    with pytest.raises(SceneError, match=r"response/dofs: shape \(9, 2\); give shape \(2, 9\): MATLAB and Fortran"):
+    with pytest.raises(SceneError, match=r"^response/dofs: shape \(9, 2\); .* \(2, 9\)"):
         read_scene(path)
     for turned in (True, False):
         by_hand(path, model, turned=turned)
         changed(path, put("response/dofs", np.array([0, 1])))
-        with pytest.raises(SceneError, match=r'contact/dofs: 3 pairs, and nothing shows .* attribute rows = "pairs"'):
+        with pytest.raises(SceneError, match=r'^contact/dofs: 3 pairs, .* rows = "pairs"'):
             read_scene(path)
     changed(path, lambda file: file["contact/dofs"].attrs.update(rows="pairs"))
     assert read_scene(path).contact.dofs.tolist() == np.arange(9).reshape(3, 3).tolist()

@@ -25,83 +25,11 @@ FOLLOWED = SLIDER.replace("[150.0]", '"peak"\n[loading]\nbetween = [180.0, 230.0
 SAMPLES = SLIDER + "[scatter]\nsamples = 8\nfriction_coefficient = {normal = {std = 0.03}}\n"
 TO_THE_END = SLIDER.replace("cycles = 0", "cycles = inf")
 
-MISSIONS = """
-[study]
-name = "slider_missions"
-[scene]
-model = "sdof_slider"
-[axes]
-frequency = [160, 161]
-wear_coefficient = [1e-11, 2e-11]
-sweep = ["up", "down"]
-[slow_time]
-missions = 300
-outputs = 4
-[[mission]]
-name = "run-up"
-frequency = {start = 150, stop = 170, rate = 1.0}
-excitation_amplitude = 10.0
-[[mission]]
-name = "cruise"
-begin = "sweep"
-seconds = 10
-[[mission]]
-name = "heavy"
-normal_load = 12.0
-frequency = 155.0
-excitation_amplitude = 14.0
-cycles = 1000
-"""
-
-ROOT_OF_A_DECK = """
-[study]
-name = "wear"
-[scene]
-model = "sector.inp"
-units = "SI"
-load = {set = "TIP", direction = [0, 1, 0]}
-response = {tip = {set = "tip", direction = [0, 2, 0]}}
-preload = [{set = "TIP", direction = [-1, 0, 0], force = 1.1e5}]
-friction_coefficient = 0.1
-nodal_diameter = 3
-[axes]
-frequency = 300.0
-excitation_amplitude = 1000.0
-[slow_time]
-cycles = 1e4
-outputs = 3
-[solver]
-harmonics = 1
-samples = 64
-"""
-"""Of `SECTOR`, a deck of a few elements."""
-
-LAP_JOINT = """
-[study]
-name = "lap"
-[scene]
-model = "lap.inp"
-units = "SI"
-contact = [["UNDER", "OVER"]]
-clamp = ["GROUND"]
-load = {set = "TIP", direction = [0, 0, 1]}
-preload = [{set = "OVER", direction = [0, 0, -1], force = 500.0}]
-friction_coefficient = 0.3
-material = {young_modulus = 210e9, poisson_ratio = 0.3, density = 7800.0}
-retention_stiffness = 1e6
-retention_direction = [1, 0, 0]
-[axes]
-frequency = 300.0
-wear_coefficient = 1e-11
-excitation_amplitude = 20.0
-[slow_time]
-cycles = 1000
-outputs = 2
-[solver]
-harmonics = 1
-samples = 32
-"""
-"""Of `Plates`."""
+MISSIONS, ROOT_OF_A_DECK, LAP_JOINT = (
+    Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
+    for name in ("missions", "root_of_a_deck", "lap_joint")
+)
+"""Of the slider, of `SECTOR`, a deck of a few elements, and of `Plates`."""
 
 CHEAP = (
     *("axes.frequency=160", "axes.scheme=implicit", "axes.step=1000", "solver.harmonics=3", "solver.samples=32"),

@@ -66,17 +66,6 @@ def finished(folder):
     return folder
 
 
-@pytest.mark.parametrize("n_tasks", [1, 4, 7, 17])
-def test_a_run_that_stopped_anywhere_goes_on_there(n_tasks, folder):
-    with completion_of(folder) as completion:
-        first = compute(completion, n_tasks)
-    with completion_of(folder) as completion:
-        assert completion.n_points_finished == first[1]
-        second = compute(completion)
-    # a sweep gives all its states in one task here
-    assert (first[0] + second[0], first[1] + second[1]) == (6, 12)
-
-
 @pytest.mark.parametrize(
     ("change", "expected"),
     [

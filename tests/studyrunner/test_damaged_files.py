@@ -17,7 +17,7 @@ from studyrunner.result.opening import check_dataset
 from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
 from tests.benchmarks.fuzz_files import answer, write_whole_files
-from tests.studies.scene_models import poke
+from tests.studies.scene_models import changed, poke
 from tests.studyrunner.results import build_file, sample_file
 
 STUDY = '[study]\nname = "s"\n[scene]\nmodel = "scene.h5"\nfriction_coefficient = 0.5\n[axes]\nfrequency = [150.0]\n'
@@ -30,12 +30,10 @@ def made(tmp_path_factory):
     return path
 
 
-@pytest.fixture
-def folder(made, tmp_path, monkeypatch):
-    """The current folder, with a result file."""
-    shutil.copy(made, tmp_path)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+@pytest.fixture(autouse=True)
+def result(made, folder):
+    """A result file in the current folder."""
+    shutil.copy(made, folder)
 
 
 @pytest.fixture
@@ -64,16 +62,12 @@ def dataset(*variables):
     return lambda path: xr.Dataset(*variables).to_netcdf(path)
 
 
-def changed(change):
-    def apply(path):
-        with h5py.File(path, "r+") as file:
-            change(file)
-
-    return apply
+def change_of(change):
+    return lambda path: changed(path, change)
 
 
 def attribute(name, value, variable):
-    return changed(lambda file: file[variable].attrs.__setitem__(name, value))
+    return change_of(lambda file: file[variable].attrs.__setitem__(name, value))
 
 
 def study(text):
@@ -93,11 +87,11 @@ WRONG = {
     "NetCDF-3": written(b"CDF\x01" + bytes(100)),
     "other data": dataset({"a": ("x", [1.0])}),
     "no point": dataset({"outcome": ("frequency", np.zeros(0, np.int8))}, {"cycle": [0.0], "contact": [0]}),
-    "a frequency that is none": changed(poke("frequency", 0, np.nan)),
+    "a frequency that is none": change_of(poke("frequency", 0, np.nan)),
     "number of a dimension as text": attribute("_Netcdf4Dimid", "first", "frequency"),
     "scale as text": attribute("scale_factor", "x", "worn_volume"),
-    "cycles that do not rise": changed(poke("cycle", 1, 1e9)),
-    "a worn volume of 1e308": changed(poke("worn_volume", ..., 1e308)),
+    "cycles that do not rise": change_of(poke("cycle", 1, 1e9)),
+    "a worn volume of 1e308": change_of(poke("worn_volume", ..., 1e308)),
 }
 
 
@@ -168,7 +162,7 @@ def linked(file):
     ],
 )
 def test_a_result_that_is_run_again(change, words, folder, refused):
-    changed(change)(folder / "out.nc")
+    changed(folder / "out.nc", change)
     assert words in refused(["out.nc", "-o", "again.nc"])
 
 
@@ -185,7 +179,6 @@ def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("folder")
 def test_fuzzed_files():
     write_whole_files()
     found = [answer(1, number) for number in range(16)]

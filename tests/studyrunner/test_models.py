@@ -24,12 +24,12 @@ from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
 from tests.mpi.launching import results
+from tests.random_decks import static_forces
 from tests.studies.fe_models.decks import SECTOR
-from tests.studies.fe_models.matrix_files import write_matrix_input, write_punch
+from tests.studies.fe_models.matrix_files import node_table, write_matrix_input, write_punch
 from tests.studies.fe_models.plates import Plates
 from tests.studies.fe_models.sectors import faces_where
 from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, needs_ccx, node_set, run_ccx
-from tests.studies.static_contact import solve_static_contact
 from tests.studyrunner.small_studies import LAP_JOINT, ROOT_OF_A_DECK, UNWORN, compute, same_values
 
 STIFFNESSES = (1e11, 1e13)
@@ -103,7 +103,7 @@ def test_matrices_of_calculix_give_the_scene_of_the_mesh(folder, capsys):
     shown = capsys.readouterr().out
     assert "speed      4774.65 rpm about (0, 0, 1); the stiffness holds 4774.65 rpm" in shown
     assert "sector.sti sha256:" in shown
-    with pytest.raises(UserError, match=r"rotation_speed = 3000 rpm, the stiffness holds 4774.65 rpm"):
+    with pytest.raises(UserError, match=r"rotation_speed = 3000 rpm, .* 4774.65 rpm"):
         scene_of("wear.toml", "scene.matrices=sector", "scene.rotation_speed=3000")
 
 
@@ -175,15 +175,8 @@ def write_table_of_nodes(plates):
     whole, rows = plates.system()
     free = ~np.isin(rows[:, 0], plates.numbers["GROUND"])
     surface = surface_of_nodes(plates.mesh, "UNDER", plates.sets["UNDER"])
-    area, normals = surface.areas_and_normals(plates.mesh.coordinates)
-    lines = ["node,x,y,z,sets,area,normal_x,normal_y,normal_z"]
-    for row, number in enumerate(plates.mesh.numbers):
-        if number not in plates.numbers["GROUND"]:
-            sets = " ".join(name for name, rows in plates.sets.items() if row in rows)
-            contact = [[area[at], *normals[at]] for at in np.flatnonzero(surface.nodes == row)] or [[""] * 4]
-            place = map(repr, plates.mesh.coordinates[row].tolist())
-            lines.append(",".join(map(str, [number, *place, sets, *contact[0]])))
-    Path("nodes.csv").write_text("\n".join(lines) + "\n")
+    nodes = np.setdiff1d(np.arange(plates.mesh.n_nodes), plates.sets["GROUND"])
+    Path("nodes.csv").write_text(node_table(plates.mesh, nodes, plates.sets, surface))
     io.savemat("job.mat", {**{name: each[np.ix_(free, free)] for name, each in whole.items()}, "rows": rows[free]})
     tip = [f"{number},3,{2e3 / len(plates.sets['TIP'])!r}" for number in plates.numbers["TIP"]]
     Path("stress.csv").write_text("\n".join(["node,dof,end [MPa]", *tip]) + "\n")
@@ -350,7 +343,7 @@ def test_static_forces_are_those_of_the_contact_of_calculix():
     paste("ccx -i job")
     printed = Path("job.dat").read_text().split("normal force (+ = tension) and shear force (size)")[1]
     _, normal, shear = map(float, printed.split()[:3])
-    force = solve_static_contact(build_study_scene(read_study("blade_root")), 0.4)
+    force = static_forces(build_study_scene(read_study("blade_root")), None)
     flank = force[:18].sum(axis=0)
     assert flank[0] == pytest.approx(-normal, rel=2e-3)
     assert np.hypot(*flank[1:]) == pytest.approx(shear, rel=3e-3)

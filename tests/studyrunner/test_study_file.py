@@ -109,12 +109,6 @@ def test_the_effective_study_is_the_same_study(text, overrides):
     assert [each.scene for each in again.variants] == [each.scene for each in study.variants]
 
 
-@pytest.mark.parametrize("key", [1, "axes..step", "study.name.first"])
-def test_a_key_that_cannot_be_is_refused(key):
-    with pytest.raises(UserError, match=f"overrides: {key} = 2: give"):
-        read_study("sdof_slider", {key: 2})
-
-
 VALUES = (
     *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
     *("{}", "[[1]]", '""', '"auto"', '"\\u001b[2J"', "'../../x'", "[1, 'a']", "{start = 1, stop = 2, num = 1e9}", "="),

@@ -283,18 +283,6 @@ def results_of(integrated):
     return [build_result(task, task.integrated[0], integrated, place) for place in range(3)]
 
 
-def test_each_history_has_its_own_counts_and_rates_back():
-    task, found = shared_task(), results_of(history(COUNTS))
-    assert [result.place for result in found] == [0, 1, 2]
-    assert [{point[1] for point in points} for points in task.indices] == [{1}, {2}, {0}]
-    assert all(len(points) == 2 for points in task.indices)
-    assert [result.values["worn_volume"].tolist() for result in found] == [[0.0, 4.0], [0.0, 2.0], [0.0, 1.0]]
-    assert [result.values["harmonics_used"].tolist() for result in found] == [[3, 7], [3, 5], [3, 4]]
-    np.testing.assert_allclose([result.values["wear_rate"][-1] for result in found], [4.0, 0.4 * 2.0, 0.2 * 1.0])
-    np.testing.assert_allclose([result.values["step_limit"] for result in found], [250.0, 250.0 / 0.4, 250.0 / 0.2])
-    assert all(totals_of(result, "newton_iterations", "run_time", "branch") == [7, 0.5, 2] for result in found)
-
-
 @pytest.mark.parametrize(
     ("last", "outcomes", "lasts"),
     [

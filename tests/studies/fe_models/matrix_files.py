@@ -202,3 +202,15 @@ REDUCED = {
     "op4 many rows": partial(write_op4, binary=True, sparsely=True, many=True),
 }
 """Those of reduced matrices."""
+
+
+def node_table(mesh, nodes, sets, surface, gap="") -> str:
+    """The table of some nodes, rows of a mesh, with the names of their sets; of those of a surface the contact."""
+    area, normals = surface.areas_and_normals(mesh.coordinates)
+    lines = ["node,x,y,z,sets,area,normal_x,normal_y,normal_z,gap"]
+    for node in nodes:
+        names = " ".join(name for name, members in sets.items() if node in members)
+        contact = [[area[at], *normals[at], gap] for at in np.flatnonzero(surface.nodes == node)] or [[""] * 5]
+        place = map(repr, mesh.coordinates[node].tolist())
+        lines.append(",".join(map(str, [mesh.numbers[node], *place, names, *contact[0]])))
+    return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""A small bladed sector in any kind of element, meshes matching or not."""
+"""Small bladed sectors: one in any kind of element, meshes matching or not, and one with shrouds."""
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, mean_motion
 from studies.finite_element.surfaces import surface_of_faces
+from studies.scenes import shrouded_sector
 from tests.studies.fe_models.solid_meshes import block, joined
 
 N_SECTORS = 12
@@ -91,3 +92,9 @@ class Sector:
     def model(self, prestress=True):
         rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
         return FeModel(self.mesh, rotation if prestress else None)
+
+
+def stubby(n_sectors: int) -> shrouded_sector.Parameters:
+    """A sector with shrouds, at rest, with few elements."""
+    size = {"blade_thickness": 0.01, "rim_radius": 0.15, "blade_length": 0.08}
+    return shrouded_sector.Parameters(n_sectors=n_sectors, shroud_angle=20, rotation_speed=0.0, **size)

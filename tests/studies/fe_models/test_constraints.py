@@ -198,5 +198,5 @@ def test_moving_nodes_that_are_held_obliquely(tmp_path):
         alone = text.replace("115, 20, 25, 30", "115").replace("\nSUP, SLOW\n", "\nSLOW, SUP\n")
         np.testing.assert_allclose(own, of_calculix(tmp_path, alone), rtol=1e-6)
     for nodes in ("105, 110, 115", "115"):
-        with pytest.raises(SceneError, match=r"node 1\d5 of SUP is held in a direction in which the other"):
+        with pytest.raises(SceneError, match=r"node 1\d5 of SUP "):
             prepared_deck(tmp_path, text.replace("105, 110, 115, 20, 25, 30", nodes))

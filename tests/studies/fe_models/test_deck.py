@@ -195,9 +195,9 @@ def test_two_instances(tmp_path):
     assert sets["Z"] == sets["I1.N"] == [*range(1, 28)]
     assert sorted(deck.surfaces) == ["I1.TOP", "I2.TOP"]
     np.testing.assert_allclose(deck.coordinates[28], [0, 1, 1], atol=1e-12)  # 1, 0, 0: shifted, then turned
-    with pytest.raises(SceneError, match=r"\*CONTACT PAIR: 2 instances have TOP; write I1.TOP or I2.TOP"):
+    with pytest.raises(SceneError, match=r"\*CONTACT PAIR: .* TOP.* I1.TOP or I2.TOP"):
         read_deck(write(tmp_path, head + "*CONTACT PAIR, INTERACTION=I\nTOP, I1.TOP\n"))
-    with pytest.raises(SceneError, match=r"deck.inp has no nodes: no \*PART has an \*INSTANCE"):
+    with pytest.raises(SceneError, match=r"^model: deck.inp has no nodes"):
         read_deck(write(tmp_path, part))
 
 
@@ -215,9 +215,9 @@ def test_materials_at_a_temperature(tmp_path):
         f"{at}ALLN, 320.\n*STEP\n*STATIC\n*TEMPERATURE\nALLN, 50.\n",
     )
     for more in refused:
-        with pytest.raises(SceneError, match=r"line \d+: \*ELASTIC at several temperatures, of which none is given"):
+        with pytest.raises(SceneError, match=r"line \d+: \*ELASTIC "):
             prepared_deck(tmp_path, text + more)
-    with pytest.raises(SceneError, match=r"\*TEMPERATURE: it strains materials with \*EXPANSION"):
+    with pytest.raises(SceneError, match=r"line \d+: \*TEMPERATURE: .*\*EXPANSION"):
         read_deck(write(tmp_path, text.replace("*DENSITY", "*EXPANSION\n1e-5\n*DENSITY") + refused[-1]))
 
 
@@ -247,7 +247,7 @@ def test_a_contact_of_the_study_releases_a_tie(names, tmp_path):
     said = [text for text in loaded.deck.notes if text.startswith("*CONTACT PAIR SUP-SLOW is not in `contact` of")]
     assert len(said) == (names[0] == "NU")
     for text, given in ((both, {}), (both.replace("101, 115", "101, 114"), {**own, "contact": (("NU", "NL"),)})):
-        with pytest.raises(SceneError, match=r"SUP-SLOW is glued, and .* in contact has \d of its facets; remove one"):
+        with pytest.raises(SceneError, match=r"SUP-SLOW .* \d of its facets"):
             prepared_deck(tmp_path, text, **given)
 
 
@@ -265,7 +265,7 @@ def test_clearance_and_interference_are_gaps(text, gap, tmp_path):
     assert moved.count(", 4.9") == 15
     prepared, _ = prepared_deck(tmp_path, moved + text, gaps=True)
     np.testing.assert_allclose(prepared.pairs.gap, gap, atol=1e-12)
-    with pytest.raises(SceneError, match=r"gaps: deck.inp, line \d+: \*C.*, and the study lets the surfaces touch"):
+    with pytest.raises(SceneError, match=r"^gaps: deck.inp, line \d+: \*C"):
         prepared_deck(tmp_path, moved + text)
 
 

@@ -15,9 +15,8 @@ from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.finite_element.solid_mesh import Rotation
 from studies.finite_element.structure import FeModel, ReductionOptions
 from tests.studies.fe_models.decks import listed_frequencies
-from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
+from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z, stubby
 from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, needs_ccx, node_set, run_ccx
-from tests.studies.shrouded_ring import stubby
 
 pytestmark = needs_ccx
 

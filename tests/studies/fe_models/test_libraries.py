@@ -9,48 +9,10 @@ import pytest
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.meshes import read_mesh_file
 from studies.scene_error import SceneError
-from tests.studies.fe_models.decks import write
+from tests.studies.fe_models.decks import SECTOR, write
 
 needs_ansys = pytest.mark.skipif(importlib.util.find_spec("ansys") is None, reason="ansys-mapdl-reader is not there")
-
-
-GMSH_41 = """\
-$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$PhysicalNames
-2
-2 1 "under"
-3 2 "Block"
-$EndPhysicalNames
-$Entities
-0 0 1 1
-1 0 0 0 1 1 0 1 1 0
-1 0 0 0 1 1 1 1 2 0
-$EndEntities
-$Nodes
-1 5 1 5
-3 1 0 5
-1
-2
-3
-4
-5
-0 0 0
-1 0 0
-0 1 0
-0 0 1
-1 1 1
-$EndNodes
-$Elements
-2 3 1 3
-2 1 2 1
-1 1 2 3
-3 1 4 2
-2 1 2 3 4
-3 2 3 4 5
-$EndElements
-"""
+GMSH_41 = SECTOR.with_name("two_tetrahedra.msh").read_text(encoding="ascii")
 
 
 def test_gmsh_41_and_what_is_no_mesh(tmp_path):
@@ -59,11 +21,11 @@ def test_gmsh_41_and_what_is_no_mesh(tmp_path):
     sets = {name: nodes.tolist() for name, nodes in deck.node_sets.items()}
     assert sets == {"UNDER": [1, 2, 3], "BLOCK": [1, 2, 3, 4, 5]}
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
-    with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):
+    with pytest.raises(SceneError, match=r"^model: mesh.med "):
         read_mesh_file(tmp_path / "mesh.med")
-    with pytest.raises(SceneError, match=r"there is no file none.cdb"):
+    with pytest.raises(SceneError, match=r"^model: .*none.cdb"):
         read_mesh_file(tmp_path / "none.cdb")
-    with pytest.raises(SceneError, match=r"mesh.msh is damaged, or of a kind that meshio does not know; write it"):
+    with pytest.raises(SceneError, match=r"^model: mesh.msh "):
         read_mesh_file(write(tmp_path, GMSH_41.replace("1 5 1 5", "1 5 x 5"), "mesh.msh"))
 
 

@@ -13,8 +13,8 @@ from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.finite_element.solid_mesh import assemble_stiffness
 from studies.model_check import check_model
 from studies.scene_error import SceneError
+from tests.studies.fe_models.decks import mutate
 from tests.studies.fe_models.matrix_files import REDUCED, chain, write_calculix, write_matrix_input, write_punch
-from tests.studies.fe_models.mutations import mutate
 from tests.studies.fe_models.solid_meshes import block, deck_lines, needs_ccx, run_ccx
 
 FORMATS = {
@@ -49,10 +49,10 @@ def test_names_of_files(tmp_path):
     assert [path.suffix for path in find_matrix_files(job)] == [".sti", ".mas", ".dof"]
     assert find_matrix_files(tmp_path / "job.mas") == find_matrix_files(job)
     write_matrix_input(tmp_path, *chain())
-    with pytest.raises(SceneError, match=r"there are job.sti and job_STIF1.mtx; give the name of one"):
+    with pytest.raises(SceneError, match=r"^matrices: .*job.sti and job_STIF1.mtx;"):
         read_matrices(job)
     assert read_matrices(tmp_path / "job_MASS1.mtx").code == "abaqus"
-    with pytest.raises(SceneError, match=r"there is no other.sti, .*other_STIF1.mtx"):
+    with pytest.raises(SceneError, match=r"^matrices: .* other.sti, .*other_STIF1.mtx"):
         read_matrices(tmp_path / "other")
 
 
@@ -67,34 +67,34 @@ WRITERS = {
 
 
 @pytest.mark.parametrize(
-    ("end", "old", "new", "sentence"),
+    ("end", "old", "new"),
     [
-        (".sti", r"^1 2 (.*)", r"1 2 \1\n1 2 \1", "job.sti: 1 entries are given twice"),
-        (".sti", r"^1 2 (.*)", r"1 2 \1\n2 1 0.0", "job.sti: the matrix is not symmetric"),
-        (".sti", r"^2 2 .*", "2 2 x", "job.sti: a line is no row of numbers"),
-        (".dof", r"10.3\n", "", "job.sti: 9 rows for 8 dofs in job.dof"),
-        (".dof", r"10.3", "10.2", "job.dof: dof 2 of node 10 has two rows"),
-        ("_STIF1.mtx", r"^1,1, 1,1, .*", "1,1, 1,1, 1e36", "boundary conditions were active"),
-        ("_STIF1.mtx", r"^1,1, 1,1,", "0,1, 0,1,", "a node with the number 0"),
-        ("_STIF1.mtx", r"(?s).*", "1 1 2.5e9\n", "a line is no row of numbers .*FORMAT=MATRIX INPUT"),
-        (".pch", "KAAX           0       6       2", "KAAX           0       6       4", "in DMIG KAAX: it is complex"),
-        (".pch", "KAAX           0", "LAAX           0", "in DMIG KAAX: its header is missing"),
-        (".pch", "D[+]10", "D+10         1.0D+10", "has an imaginary part"),
-        (".pch", "GRID,1,,0.,0.,0.", "GRID,1,,0.,0.,0.,3", r"line 2: GRID 1 has displacements in the .*system 3"),
-        ("_mass.mtx", "real symmetric", "real skew-symmetric", "job_mass.mtx: its header says real skew-symmetric"),
-        ("_mass.mtx", "real symmetric", "pattern symmetric", "job_mass.mtx: its header says pattern symmetric"),
-        ("_stiffness.hb", "RSA", "RZA", "job_stiffness.hb: a matrix of type RZA; write a real symmetric one"),
-        ("_stiffness.hb", r" 0\nRSA", " 2\nRSA", "right-hand sides beside the matrix; write it without them"),
-        ("_stiffness.hb", r"(?s)[^\n]*\n$", "", "no Harwell-Boeing file, or damaged"),
+        (".sti", r"^1 2 (.*)", r"1 2 \1\n1 2 \1"),
+        (".sti", r"^1 2 (.*)", r"1 2 \1\n2 1 0.0"),
+        (".sti", r"^2 2 .*", "2 2 x"),
+        (".dof", r"10.3", "10.2"),
+        (".sti", r"^1 1 .*\n", "10 10 1.0\n"),
+        ("_STIF1.mtx", r"^1,1, 1,1, .*", "1,1, 1,1, 1e36"),
+        ("_STIF1.mtx", r"^1,1, 1,1,", "0,1, 0,1,"),
+        ("_STIF1.mtx", r"(?s).*", "1 1 2.5e9\n"),
+        (".pch", "KAAX           0       6       2", "KAAX           0       6       4"),
+        (".pch", "KAAX           0", "LAAX           0"),
+        (".pch", "D[+]10", "D+10         1.0D+10"),
+        (".pch", "GRID,1,,0.,0.,0.", "GRID,1,,0.,0.,0.,3"),
+        ("_mass.mtx", "real symmetric", "real skew-symmetric"),
+        ("_mass.mtx", "real symmetric", "pattern symmetric"),
+        ("_stiffness.hb", "RSA", "RZA"),
+        ("_stiffness.hb", r" 0\nRSA", " 2\nRSA"),
+        ("_stiffness.hb", r"(?s)[^\n]*\n$", ""),
     ],
-)  # fmt: skip
-def test_wrong_files(tmp_path, end, old, new, sentence):
+)
+def test_wrong_files_are_named(tmp_path, end, old, new):
     WRITERS[end](tmp_path, *chain())
     path = tmp_path / f"job{end}"
     changed = re.sub(old, new, path.read_text(), count=1, flags=re.MULTILINE)
     assert changed != path.read_text()
     path.write_text(changed)
-    with pytest.raises(SceneError, match=sentence):
+    with pytest.raises(SceneError, match=rf"^matrices: {path.name}: "):
         read_matrices(tmp_path / "job")
 
 
@@ -102,13 +102,13 @@ def test_wrong_files(tmp_path, end, old, new, sentence):
 def test_tables_without_their_rows_or_with_complex_numbers(tmp_path, kind):
     named, rows = chain()
     stiffness = named["stiffness"]
-    for matrix, of_rows, sentence in (
-        (stiffness, rows[:-1], "9 x 9 entries for 8 rows"),
-        (stiffness, np.ones_like(rows), "a dof has two rows"),
-        (stiffness * 1j, rows, "complex numbers; give .* nd/<k>"),
-    ):
+    for matrix, of_rows in ((stiffness, rows[:-1]), (stiffness, np.ones_like(rows)), (stiffness * 1j, rows)):
         REDUCED[kind](tmp_path, {**named, "stiffness": matrix}, of_rows)
-        with pytest.raises(SceneError, match=sentence):
+        with pytest.raises(SceneError, match=r"^matrices: job(\.mat|_stiffness\.mtx): "):
+            read_matrices(tmp_path / "job")
+    if kind == "mat":
+        io.savemat(tmp_path / "job.mat", {"other": 1.0})
+        with pytest.raises(SceneError, match=r"^matrices: job\.mat: "):
             read_matrices(tmp_path / "job")
 
 
@@ -132,18 +132,12 @@ def test_a_boundary_that_is_not_symmetric_beside_stiff_modes(tmp_path, name):
             (tmp_path / folder / part).mkdir(parents=True)
             write(tmp_path / folder / part, given | {"load": named["load"]}, rows)
         read_matrices(tmp_path / folder / "right" / "job")
-        with pytest.raises(SceneError, match="the matrix is not symmetric between dof 1 of node 1 and dof 2 of node 1"):
+        with pytest.raises(SceneError, match=" dof 1 of node 1 and dof 2 of node 1"):
             read_matrices(tmp_path / folder / "wrong" / "job")
-    with pytest.raises(ValueError, match=rf"{name}: give a symmetric matrix: the entries at \(0, 1\) and"):
+    with pytest.raises(ValueError, match=rf"^{name}: .* \(0, 1\) "):
         build_model(*wrong.values(), [[0, 1, 2]], 1.0, load_harmonic=np.eye(n)[0])
-    with pytest.raises(SceneError, match=f"{name}: not symmetric: .* at 0, 1 but .* at 1, 0"):
+    with pytest.raises(SceneError, match=f"^{name}: .* 0, 1 .* 1, 0"):
         check_model(replace(model, linear={0: replace(model.linear[0], **{name: matrix})}))
-
-
-def test_a_file_of_matlab_without_any_of_the_matrices(tmp_path):
-    io.savemat(tmp_path / "job.mat", {"other": 1.0})
-    with pytest.raises(SceneError, match=r"matrices: job.mat: no table of its rows"):
-        read_matrices(tmp_path / "job")
 
 
 @needs_ccx

@@ -1,5 +1,7 @@
-"""The bundled scene `dovetail_sector`."""
+"""The registry of scenes, the three textbook scenes against their equations, and the bundled dovetail sector."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -7,9 +9,82 @@ import pytest
 from scipy import linalg
 
 from solver.model import needed_nodal_diameters
+from studies import build_scene
 from studies.finite_element.solid_mesh import assemble_mass, centrifugal_load
+from studies.model_check import check_model
+from studies.scene_error import SceneError
+from studies.scenes import scene_help
 from studies.scenes.dovetail_sector import Parameters
-from tests.studies.static_contact import solve_static_contact
+from studyrunner.cli import main
+from tests.random_decks import static_forces
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        *((name, {}) for name in ("sdof_slider", "two_masses", "vibro_impact")),
+        *((name, values) for name in ("cylinder_on_flat", "sphere_on_flat") for values in ({}, {"stroke": 1e-6})),
+    ],
+)
+def test_scenes_are_possible_structures(name, values):
+    check_model(build_scene(name, **values), n_harmonics=21)
+
+
+DAMPER = {"rim_radius": 0.1, "platform_gap": 0.02, "damper_half_width": 0.1, "platform_thickness": 0.002}
+DAMPER["damper_height"] = 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "key"),
+    [
+        ("cylinder_on_flat", {"R": 1e308}, "model"),
+        ("cylinder_on_flat", {"depth": 1e-9}, "depth"),
+        ("sphere_on_flat", {"R": 1e308}, "model"),
+        ("dovetail_sector", {"mesh": 1, "young_modulus": 1e-300}, "model"),
+        *(("shrouded_sector", {key: value}, key) for key, value in {"blade_thickness": 0.2, "rim_radius": 0.1}.items()),
+        *(("underplatform_damper", {key: value}, key) for key, value in DAMPER.items()),
+    ],
+)
+def test_numbers_far_from_what_can_be_are_refused(name, values, key):
+    with pytest.raises(SceneError) as caught:
+        build_scene(name, **values)
+    assert caught.value.key == key
+
+
+def test_listing_the_scenes_imports_nothing_heavy():
+    code = "import sys, studies.scenes; sys.exit(bool({'numpy', 'scipy', 'pydantic', 'h5py'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# mass, damping, stiffness, constant and harmonic load of the exact motions of `tests.references`
+CHAIN = np.eye(2), [[0.04, -0.02], [-0.02, 0.02]], [[2.0, -1.0], [-1.0, 1.0]], [0.0, 0.0], [1.0, 0.0]
+WALL = np.diag([0.0, 1.0]), np.diag([0.0, 0.05]), [[100.0, -100.0], [-100.0, 101.0]], [0.0, 0.0], [0.0, 1.0]
+PRESSED = np.diag([0.0, 0.1]), np.zeros((2, 2)), np.diag([2e4, 1.6e5]), [8.0, 0.0], [0.0, 1.0]
+TEXTBOOK = {
+    "two_masses": ({}, CHAIN, [-1, 1, -1], (0.0, 14.4)),
+    "vibro_impact": ({}, WALL, [0, -1, -1], (0.1, 0.0)),
+    "sdof_slider": ({"normal_load": 8.0, "normal_stiffness": 2e4}, PRESSED, [0, 1, -1], (0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", TEXTBOOK)
+def test_a_textbook_scene_is_the_structure_of_its_exact_motion(name):
+    """The slider: closed, u_N = W, its spring leaves N_0 - k_N W to the contact."""
+    values, structure, dofs, (gap, normal_load) = TEXTBOOK[name]
+    model = build_scene(name, **values)
+    names = ("mass", "damping", "stiffness", "load_static", "load_harmonic")
+    for part, expected in zip(names, structure, strict=True):
+        np.testing.assert_allclose(getattr(model.linear[0], part), expected, rtol=1e-15, err_msg=part)
+    assert model.contact.dofs.tolist() == [dofs]
+    assert (model.contact.gap[0], model.contact.normal_load[0]) == (gap, normal_load)
+
+
+def test_the_command_says_what_a_scene_is(capsys):
+    assert main(["--scene-help", "two_masses"]) == 0
+    assert capsys.readouterr().out == scene_help("two_masses") + "\n"
+
+
+# --- the dovetail sector ---
 
 # Glued, nodal diameter 0, Hz, of 20-node elements.
 AT_REST = np.array([190.5, 377.9, 777.0, 1288.1, 1620.2, 2054.0])
@@ -62,8 +137,8 @@ def test_flanks_carry_the_centrifugal_force_of_the_blade(at_rest):
     blade = tuple(group for group in model.mesh.groups if group.part == "blade")
     mass = assemble_mass(replace(model.mesh, groups=blade))
     pull = centrifugal_load(mass, model.mesh.coordinates, model.rotation).reshape(-1, 3).sum(axis=0)[0]
-    for friction_coefficient in (0.5, 1e-6):
-        force = solve_static_contact(at_rest, friction_coefficient).reshape(2, 24, 3).sum(axis=1)
+    for friction_coefficient in (0.5, 1e-6, 1000.0):
+        force = static_forces(at_rest, friction_coefficient).reshape(2, 24, 3).sum(axis=1)
         assert np.all(force[:, 0] > 0.0)
         assert np.sqrt(0.5) * (force[:, 0] + force[:, 2]).sum() == pytest.approx(pull, rel=1e-6)
 
@@ -94,13 +169,6 @@ def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter, n_sect
     excited = model.linear[nodal_diameter]
     # Force and response are one and the same point and direction.
     assert np.allclose(excited.load_harmonic, excited.response[0].conj())
-
-
-def test_same_parameters_give_the_same_bits():
-    one, two = (Parameters(mesh=1, nodal_diameter=3).build(3) for _ in range(2))
-    for k in one.linear:
-        for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
-            assert np.array_equal(getattr(one.linear[k], name), getattr(two.linear[k], name))
 
 
 def test_loss_factor_is_exact_at_the_first_frequency(at_rest):
