@@ -119,6 +119,16 @@ def absolute(relative: ArrayLike, size: NDArray[np.float64]) -> NDArray[np.float
     return np.multiply(relative, size, out=whole, where=size > 0.0)
 
 
+def in_whole(parts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Error (...) of a sum from the errors (..., n) of its parts, with signs: their sum, or that of independent parts
+    where it is larger. Pairs of a symmetric joint err in twos: two equal ones count as one.
+    """
+    most = np.abs(parts).sum(axis=-1)
+    known = np.where(np.isinf(most)[..., None], 0.0, parts)
+    alone = np.minimum(math.sqrt(2.0) * np.linalg.norm(known, axis=-1), most)
+    return np.where(np.isinf(most), np.inf, np.maximum(np.abs(known.sum(axis=-1)), alone))
+
+
 class Ended:
     """How a computation ended. Raises ValueError where no sentence says why: only the program can make this mistake."""
 

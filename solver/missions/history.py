@@ -238,6 +238,7 @@ def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[
         "depth_rate": rates.sum(axis=1),
         "wear_rate": rates.sum(axis=1) @ area,
         "wear_rate_error": rate_error,
+        "resolution_error": rate_error,
         "local": np.maximum(absolute(values["local"] @ area, share) - first * (depth @ area), 0.0),
         "response": values["response"][:, chosen].reshape(n, -1),
         "response_peak": values["response_peak"][:, chosen].reshape(n, -1),

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from solver.model import FloatArray
-from solver.outcome import absolute
+from solver.outcome import absolute, in_whole
 from solver.settings import WearTarget
 from solver.wear.slow_time import Solution
 
@@ -107,10 +107,10 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
         return np.maximum(HISTORY_SAFETY * change(outputs), crossing(change(steps)))
 
     depth, volume = values["wear_depth"], values["wear_depth"] @ area
-    error = largest(lambda both: _apart(both, "wear_depth") @ area)
-    # the error of the start state remains, even where later states agree by chance; start state and steps have nothing
-    # to do with each other: the worst case is their sum
-    error = np.maximum(error, absolute(values["wear_rate_error"][0], volume) + values["local"])
+    error = largest(lambda both: _volume_apart(both, area))
+    # harmonics and steps have nothing to do with each other: the worst case is their sum, also where both solutions
+    # agree by chance; what the sweep leaves wrong is in their difference
+    error = np.maximum(error, absolute(values["resolution_error"][0], volume) + values["local"])
     # a pair that agrees with the reference solution better than the volume does so by chance (dovetail, 211.25 Hz: else
     # 5 of 24 deep pairs are outside of their errors, by seven times); the error of the volume is smaller than that of
     # its independent pairs by the root of the number of equal pairs that would share the volume
@@ -127,7 +127,7 @@ def error_of_given_steps(outputs: Compared, adaptive: HistoryError, area: FloatA
     """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter."""
     apart, other = _apart(outputs, "wear_depth"), outputs.other("wear_depth") @ area
     error = HistoryError(
-        _added(apart @ area, absolute(adaptive.worn_volume, other)),
+        _added(_volume_apart(outputs, area), absolute(adaptive.worn_volume, other)),
         _added(apart, adaptive.wear_depth),
         # both relative errors of the adaptive history are nearly those of this one: their values are as large
         _added(_response_change(outputs), adaptive.response),
@@ -221,6 +221,15 @@ def _apart(both: Compared, name: str) -> FloatArray:
     """Difference (n, ...) of a value; inf where the other solution has none, NaN beyond the end of the history."""
     own, other = both.values[name], both.other(name)
     return np.where(np.isnan(other) & ~np.isnan(own), np.inf, np.abs(own - other))
+
+
+def _volume_apart(both: Compared, area: FloatArray) -> FloatArray:
+    """Difference (n,) of the worn volumes, m3: of their sums, or, where pairs differ in both directions, so that the
+    sums agree by chance, that of independent pairs.
+    """
+    apart = _apart(both, "wear_depth") * area
+    signed = np.where(both.values["wear_depth"] >= both.other("wear_depth"), apart, -apart)
+    return in_whole(signed)
 
 
 def _response_change(both: Compared) -> FloatArray:

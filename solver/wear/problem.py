@@ -122,6 +122,7 @@ class WearProblem(WearingJoint):
         if isinstance(checked, Failure):
             return checked
         after, report = checked
+        report["resolution_error"] = report["wear_rate_error"]
         if state is None:
             after, by_sweep = self.with_first_length(after), self.sweep_error()
             report["response_error"] += by_sweep.response

@@ -23,7 +23,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
 from solver.model import FloatArray
 from solver.newton.run import MOST_ITERATIONS, Run
-from solver.outcome import Outcome, in_digits
+from solver.outcome import Outcome, in_digits, in_whole
 from solver.packing import packable
 from solver.results.history import PeriodicState, StartState
 from solver.results.state_report import evaluated
@@ -246,8 +246,8 @@ class WearingJoint:
         return self.with_rates(state)
 
     def sweep_error(self) -> Estimate:
-        """Errors of the start state by its sweep: the differences of vibration and wear rates, pair by pair, to the
-        state of the reference sweep; unknown where a reference sweep was lost.
+        """Errors of the start state by its sweep: the differences of vibration and wear rate to the state of the
+        reference sweep; unknown where a reference sweep was lost.
         """
         start, reference = self.start, self.start.reference
         if reference is None:
@@ -255,7 +255,7 @@ class WearingJoint:
             return UNKNOWN if lost else NOTHING
         own, other = self.unworn_state(), self.unworn_state(reference)
         whole = float(own.rates[-1])
-        rate = float(np.abs(own.rates - other.rates)[:-1].sum()) / whole if whole > 0.0 else 0.0
+        rate = float(in_whole((own.rates - other.rates)[:-1])) / whole if whole > 0.0 else 0.0
         return Estimate(vibration_change(own.at, other.at), rate)
 
     def with_rates(self, state: WearState) -> WearState:
