@@ -63,6 +63,10 @@ much longer. Dovetail, 48 pairs, 212.5 Hz, where a pair comes to rest or slips o
 of 5 harmonics, 0.071 with 9 and more; 45 % are told. With 27 the sweep of an underplatform damper, all pairs of which
 slip and open, is lost."""
 
+LARGEST_SHARE = 0.75
+"""Share of rtol: error of a state of a history by its harmonics up to which `HIGHEST_ABOVE` holds; the steps have the
+rest."""
+
 MOST_OF_NODE = 39
 """Highest harmonic of a node of a sweep: the point itself takes what it needs. With 235, the sweep of one friction
 oscillator takes more than 40 CPU s, with 39 less than 2; its point is as exact."""
@@ -103,7 +107,8 @@ def with_level_above(here: ResolvedState, run: Run, *, node: bool = False) -> Re
     Up to `HIGHEST_ABOVE`. node: as in `refine`; with the error of fewer harmonics.
     """
     above, settings = shifted(here.case.resolution, 1), here.case.settings
-    if above.highest > HIGHEST_ABOVE[node]:
+    enough = node or here.estimate.largest <= LARGEST_SHARE * settings.rtol
+    if above.highest > HIGHEST_ABOVE[node] and enough:
         return here
     search = _Search(run, run.budget.iterations, node)
     if settings.harmonics != "auto" or nothing_happens(here.point.evaluation) or not search.allows(here, above):

@@ -21,7 +21,7 @@ import numpy as np
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit, mean_normal_force, mean_normal_tangent
 from solver.contact.elastic_pairs import MOST_PERIODS, Period, by_columns, march_period, march_tangent, new_period
 from solver.contact.sliding_masses import Masses, march_masses, mass_slopes, mass_tangent, step_gains
-from solver.contact.slow_slide import INSIDE, Path, slide_along, slide_tangent
+from solver.contact.slow_slide import Path, slide_along, slide_tangent
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
@@ -276,14 +276,13 @@ def _scaled(values_h: FloatArray, factor: ComplexArray) -> FloatArray:
 def sample_tangents(law: ContactLaw, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:
     """A (n, n_contact, 3, 3) and B (n, n_contact, 2, 2) of all pairs as elastic ones, at every `stride`-th sample.
 
-    The normal state is predicted less contact force; the normal force is that at the sample, without the mean around. A
-    pair that has slid on the way from another state (`slow_slide`) goes on with the discs that it touches.
+    The normal state is predicted less contact force; the normal force is that at the sample, without the mean around.
     """
     predicted, status = at.predicted_t[:, :, ::stride], at.status_t[:, ::stride]
     limit = friction_limit(law.friction_coefficient[:, None], np.maximum(predicted[:, 0], 0.0))
     trial = predicted[:, 1:] - at.state_t[:, :, :-1:stride]
     size = np.hypot(trial[:, 0], trial[:, 1])
-    slips = ((status == SLIP) | touching_discs(law, at, stride)) & (limit > 0.0) & (size > 0.0)
+    slips = (status == SLIP) & (limit > 0.0) & (size > 0.0)
     inverse = np.divide(1.0, size, out=np.zeros_like(size), where=slips)
     unit, ratio = trial * inverse[:, None], np.where(slips, limit * inverse, status == STICK)
     carried = (np.eye(2)[:, :, None] - unit[:, :, None] * unit[:, None]) * ratio[:, None, None]
@@ -293,18 +292,6 @@ def sample_tangents(law: ContactLaw, at: Marched, stride: int = 1) -> tuple[Floa
     own[:, 1:, 0] = -(law.friction_coefficient * law.contact.has_normal)[:, None, None] * unit
     by_sample = 3, 0, 1, 2
     return np.ascontiguousarray(own.transpose(by_sample)), np.ascontiguousarray(carried.transpose(by_sample))
-
-
-def touching_discs(law: ContactLaw, at: Marched, stride: int) -> BoolArray:
-    """Samples (n_contact, n), of every `stride`-th one the nearest, whose discs a pair that has slid there touches."""
-    n_samples = at.status_t.shape[1]
-    touches = np.zeros((at.slid.size, n_samples // stride), bool)
-    if at.slid.any():
-        trial = at.predicted_t[at.slid, 1:] - at.state_t[at.slid, :, :-1]
-        limit = friction_limit(law.friction_coefficient[at.slid, None], at.predicted_t[at.slid, 0])
-        pair, sample = np.nonzero(np.hypot(trial[:, 0], trial[:, 1]) > (1.0 - 10.0 * INSIDE) * limit)
-        touches[np.flatnonzero(at.slid)[pair], (sample + stride // 2) // stride % touches.shape[1]] = True
-    return touches
 
 
 @dataclass(frozen=True)

@@ -122,11 +122,13 @@ class WearProblem(WearingJoint):
         if isinstance(checked, Failure):
             return checked
         after, report = checked
-        report["resolution_error"] = report["wear_rate_error"]
+        lost = math.isinf(self.by_sweep.wear_rate)
+        report["resolution_error"] = math.inf if lost else report["wear_rate_error"]
+        if state is None or lost:
+            report["response_error"] += self.by_sweep.response
+            report["wear_rate_error"] += self.by_sweep.wear_rate
         if state is None:
-            after, by_sweep = self.with_first_length(after), self.sweep_error()
-            report["response_error"] += by_sweep.response
-            report["wear_rate_error"] += by_sweep.wear_rate
+            after = self.with_first_length(after)
         if not after.resolutions or after.resolutions[-1][1] != after.resolution:
             after = replace(after, resolutions=(*after.resolutions, (after.cycle, after.resolution)))
         # local: sum of the local errors of the steps so far, m3

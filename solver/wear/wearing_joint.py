@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -245,7 +246,8 @@ class WearingJoint:
         )
         return self.with_rates(state)
 
-    def sweep_error(self) -> Estimate:
+    @cached_property
+    def by_sweep(self) -> Estimate:
         """Errors of the start state by its sweep: the differences of vibration and wear rate to the state of the
         reference sweep; unknown where a reference sweep was lost.
         """

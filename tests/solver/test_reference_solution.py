@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver.accuracy.resolved_state import UNKNOWN
 from solver.harmonic_balance.state import Failure
-from solver.outcome import Outcome
+from solver.outcome import Outcome, in_whole
 from solver.packing import Packed
 from solver.settings import SolverSettings
 from solver.wear import problem
@@ -131,11 +132,13 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
-def test_a_history_whose_state_has_no_other_to_compare_with_says_so(scheme):
-    found = replace(start()[1], response_error=np.inf, wear_rate_error=np.inf)
+@pytest.mark.parametrize("lost", [{"by_resolution": UNKNOWN}, {"reference": None, "outcome": Outcome.INACCURATE}])
+def test_a_history_whose_state_has_no_other_to_compare_with_says_so(scheme, lost):
+    """Neither with more harmonics, nor that of a reference sweep."""
+    found = replace(start()[1], response_error=np.inf, wear_rate_error=np.inf, message="lost", **lost)
     history = march_wear(start()[0], 0.5, found, WEAR, 4000.0, scheme, CYCLES[::4], GIVEN)
     assert history.outcome is Outcome.INACCURATE
-    assert "cannot be compared with that of more harmonics or samples: its error is not known" in history.message
+    assert "not known" in history.message
     assert history.worn_volume_error.tolist() == [0.0, np.inf, np.inf]
     assert np.isinf([*history.response_error, *history.wear_rate_error]).all()
     np.testing.assert_array_equal(history.wear_depth_error, np.where(history.wear_depth > 0.0, np.inf, 0.0))
@@ -157,6 +160,7 @@ def read(depth, rate=((1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), **other):
         "response_peak": np.ones((3, 1)),
         "response_error": np.full(3, 1e-3),
         "wear_rate_error": np.zeros(3),
+        "resolution_error": np.zeros(3),
     }
     return {name: np.array(value) for name, value in (values | other).items()}
 
@@ -189,6 +193,21 @@ def test_an_error_adds_up_what_differs_at_each_pair():
     assert (found.wear_depth[1:, 1] > apart[1:, 1]).all()
     assert found.response == pytest.approx(np.full(3, 1e-3))
     assert found.wear_rate == pytest.approx(np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("parts", "error"),
+    [
+        ([1.0] * 8, 8.0),
+        ([1.0, -1.0] * 4, 4.0),
+        ([1.0, -1.0], 2.0),
+        ([3.0, 1.0, -1.0], np.sqrt(22.0)),
+        ([1.0, np.inf, -np.inf], np.inf),
+        ([1.0, np.nan], np.nan),
+    ],
+)
+def test_pairs_that_err_in_both_directions_are_independent(parts, error):
+    assert in_whole(np.array([parts])) == pytest.approx([error], nan_ok=True)
 
 
 def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing():

