@@ -226,7 +226,7 @@ def describe_uncertain(volume: float, other: float, error: float, rtol: float, c
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
     volumes, others = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
     if abs(volume - other) < 0.5 * error * volume:
-        return f"{volumes}, {known}: {others}, but worn at other pairs or counts"
+        return f"{volumes}, {known}, by its harmonics, its steps, or pairs that wear otherwise: {others}"
     return f"{volumes}, but {others}: {known}"
 
 
