@@ -79,9 +79,9 @@ _SENTENCES = {
     Outcome.BRANCH_LOST: "The vibration could not be followed to this frequency or amplitude. A nonlinear mode may turn"
     " back before it (a fold), meet another mode, or end where the whole joint slides.",
     Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided.",
-    Outcome.INACCURATE: "The point was computed to the end, but the error of a vibration, a wear rate, a natural"
-    " frequency or a damping ratio is above rtol (see the variables of these errors), or it is not known, or the"
-    " stability of a vibration is not (see the variable message).",
+    Outcome.INACCURATE: "The point was computed to the end, but the error of a worn volume, a vibration, a wear rate, a"
+    " natural frequency or a damping ratio is above rtol (see the variables of these errors), or it is not known, or"
+    " the stability of a vibration is not (see the variable message).",
     Outcome.SENSITIVE: "The point was computed to the end, but its worn volume is not known: two computations of nearly"
     " the same case, with other steps and another start state, differ by more than half.",
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",

@@ -63,7 +63,9 @@ def test_points_end_at_their_target_each_at_its_own_count():
         assert words_of in message
     assert result.worn_volume.isel(cycle=-1).isnull().values.tolist() == [True, True, False]
     depth = result.wear_depth.isel(contact=0)
-    assert float(depth.isel(wear_coefficient=0).interp(cycle=counts[0])) == pytest.approx(1e-5, rel=1e-3)
+    # the history ends with the step in which it reaches its target, between two outputs
+    known = depth.isel(wear_coefficient=0).dropna("cycle").interp(cycle=counts[0], kwargs={"fill_value": "extrapolate"})
+    assert float(known) == pytest.approx(1e-5, rel=1e-3)
     assert (result.last_cycle[:2] >= result.cycles_to_target[:2]).all()
     # nothing wears, nothing is reached
     still = run(*SHORT, "axes.wear_coefficient=0", "slow_time.until={worn_volume=1e-12}")
