@@ -199,7 +199,9 @@ class SolverSection(Section):
     samples: Axis[_Samples | Literal["auto"]] = Field(
         (AUTO,), description="time samples in a period, more than twice the harmonics"
     )
-    tolerance: Axis[Fraction] = Field((1e-8,), description="of the scaled residual")
+    tolerance: Axis[Fraction] = Field(
+        (1e-8,), description="of the scaled residual, in adaptive histories at least rtol / 1000"
+    )
     rtol: Axis[Fraction] = Field((1e-2,), description="aim for the relative error of worn volume and response")
     shortcuts: bool = Field(True, description="whether points with the same history share one")
     time_limit: Positive | None = Field(None, description="s, CPU time that a start state or a wear history may take")

@@ -10,9 +10,10 @@ import pytest
 from solver import frequency_response
 from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.accuracy.resolved_state import left_out
-from solver.continuation.first_state import solve_static_state
-from solver.continuation.natural import ratchets
-from solver.harmonic_balance.state import Failure
+from solver.continuation.first_state import solve_static_state, state_at_rest
+from solver.continuation.natural import follow_naturally, ratchets
+from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import Failure, State
 from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.path import LoadingPath
@@ -64,6 +65,24 @@ def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep):
     # near the resonance of the coarse sector, where it slips
     alone, together = (starts(each, sweep)[212.5] for each in ([212.5], [211.1, 212.499, 212.5, 212.501]))
     assert_same_state(together, alone)
+
+
+@pytest.mark.slow
+def test_pairs_slide_with_a_rising_load_alike_in_one_step_and_in_many():
+    """Within 1.5 % of the slide, with one slide for each step 27 %."""
+    case, omega, run = build_case(dovetail(13), 0.5, OMEGA, SolverSettings(3, 64)), 1256.0, Run(1e-8)
+    rest = state_at_rest(case, omega, run)
+    assert isinstance(rest, State)
+
+    def balance_at(factor, history, first=None):
+        return Balance(case.joint(omega, 20.0 * factor), history, first=first)
+
+    one, many = (follow_naturally(balance_at, rest, 1.0, run, fine=fine) for fine in (1.0, 1.0 / 64.0))
+    assert one[1]
+    assert many[1]
+    slid = np.linalg.norm(many[0].history - rest.history)
+    assert slid > 5e-6
+    assert np.linalg.norm(one[0].history - many[0].history) < 0.03 * slid
 
 
 @pytest.mark.slow
