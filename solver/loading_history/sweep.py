@@ -46,7 +46,7 @@ STEPS_OF_REFERENCE = 2
 """Steps of a sweep in one step of its reference: the errors of both are of second order in the step, and their
 difference is three times the smaller one."""
 
-PARTS_TO_POINT = (1, 4)
+PARTS_TO_POINT = (1, 4, 16)
 """Parts of the way from the last node of a reference sweep to a point: more where the point is not found at once."""
 
 
