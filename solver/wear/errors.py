@@ -108,9 +108,13 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
 
     depth, volume = values["wear_depth"], values["wear_depth"] @ area
     error = largest(lambda both: _volume_apart(both, area))
-    # harmonics and steps have nothing to do with each other: the worst case is their sum, also where both solutions
-    # agree by chance; what the sweep leaves wrong is in their difference
-    error = np.maximum(error, absolute(values["resolution_error"][0], volume) + values["local"])
+    # harmonics, sweep and steps have nothing to do with each other: the worst case is their sum, also where both
+    # solutions agree by chance; what the sweep leaves wrong in the first rate acts on what this rate has worn
+    by_resolution = values["resolution_error"][0]
+    by_sweep = values["wear_rate_error"][0] - by_resolution if math.isfinite(by_resolution) else 0.0
+    worn_at_first = np.minimum(values["wear_rate"][0] * outputs.counts, volume)
+    at_start = absolute(by_resolution, volume) + absolute(by_sweep, worn_at_first)
+    error = np.maximum(error, at_start + values["local"])
     # a pair that agrees with the reference solution better than the volume does so by chance (dovetail, 211.25 Hz: else
     # 5 of 24 deep pairs are outside of their errors, by seven times); the error of the volume is smaller than that of
     # its independent pairs by the root of the number of equal pairs that would share the volume
