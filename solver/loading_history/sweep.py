@@ -12,16 +12,16 @@ fold and where each pair slips or opens within the period: such a state follows 
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Generic
 
 import numpy as np
 
 from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
-from solver.harmonic_balance.state import Failure, carried_history
+from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import FREE_STEP, Path, S, Step
-from solver.newton.run import SHORTEST_STEP, Budget, Run
+from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
 from solver.settings import Resolution
@@ -118,23 +118,13 @@ class Sweep(Generic[S]):
         return self.last if self.failure is None else None
 
     def reference_of(self, path: Path[S], state: S, run: Run) -> S | None:
-        """A state of a path with the tangential history that the reference sweep leaves; None where there is none."""
+        """State of a path, with its harmonics, to which the last reference node leads; None where it is not found."""
         if self.here is None or self.reference is None:
             return None
-        of, begin = self.path.at(self.reference.resolution), self.reference.states[-1].parameter
+        node = self.path.at(self.reference.resolution).move(self.reference.states[-1], path, run)
         # over states in between where the last part is too long
-        ways = (np.linspace(begin, state.parameter, n + 1)[1:].tolist() for n in PARTS_TO_POINT)
-        led = next(filter(None, (_through(of, self.reference.states, way, run.fresh()) for way in ways)), None)
-        if led is None:
-            return None
-        history = carried_history(of.case, path.joint_of(state), replace(led[-1].evaluation, history=led[-1].history))
-        own, fresh, here, done, part = state.evaluation.history, run.fresh(), state, 0.0, 1.0
-        # over states in between where the whole difference is too much at once
-        while done < 1.0 and part >= SHORTEST_STEP:
-            there = own + (done + part) * (history - own)
-            found = path.near(here, here.evaluation.predicted_h, there, fresh)
-            here, done, part = (here, done, 0.5 * part) if found is None else (found, done + part, part)
-        return here if done == 1.0 else None
+        ways = (np.linspace(node.parameter, state.parameter, n + 1)[1:].tolist() for n in PARTS_TO_POINT if node)
+        return next((found[-1] for way in ways if (found := _through(path, (node,), way, run.fresh()))), None)
 
     def begin(self, path: Path[S], state: S) -> bool:
         """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
