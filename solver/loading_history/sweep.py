@@ -121,10 +121,16 @@ class Sweep(Generic[S]):
         """State of a path, with its harmonics, to which the last reference node leads; None where it is not found."""
         if self.here is None or self.reference is None:
             return None
-        node = self.path.at(self.reference.resolution).move(self.reference.states[-1], path, run)
+        last: S = self.reference.states[-1]
+        node = self.path.at(self.reference.resolution).move(last, path, run)
+        if node is None:
+            return None
         # over states in between where the last part is too long
-        ways = (np.linspace(node.parameter, state.parameter, n + 1)[1:].tolist() for n in PARTS_TO_POINT if node)
-        return next((found[-1] for way in ways if (found := _through(path, (node,), way, run.fresh()))), None)
+        for n_parts in PARTS_TO_POINT:
+            way = np.linspace(node.parameter, state.parameter, n_parts + 1)[1:].tolist()
+            if found := _through(path, (node,), way, run.fresh()):
+                return found[-1]
+        return None
 
     def begin(self, path: Path[S], state: S) -> bool:
         """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
