@@ -29,7 +29,7 @@ BUNDLED = (
 )
 
 AUTOMATIC_HARMONICS_OF_A_WAVE = 39
-"""Harmonics whose nodal diameters a cyclic scene is built with where their number is automatic."""
+"""Fewest harmonics whose nodal diameters a cyclic scene is built with: automatic ones, and those that show an error."""
 
 
 def scene_parameters(model: str) -> "type[Scene]":

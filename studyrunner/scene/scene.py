@@ -18,7 +18,6 @@ from studies.scene import Progress, SurfaceMesh, as_scene, make_compliant, silen
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.study.mistakes import raise_wrong, scene_errors
-from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
 from studyrunner.values import Wrong
@@ -69,8 +68,7 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
 def harmonics_to_build(study: Study) -> int:
     """Number of harmonics that a scene is built for: the largest of the study, and those that show its error."""
     # two levels up: 1, 3, 5, 7, 9, 13, 19, 27...
-    shown = 2 * max(study.given_harmonics, default=0) + 3
-    return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.solver.harmonics else shown
+    return max(2 * max(study.given_harmonics, default=0) + 3, AUTOMATIC_HARMONICS_OF_A_WAVE)
 
 
 def model_key(study: Study) -> str:
