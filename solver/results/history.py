@@ -168,7 +168,7 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     last = int(rows[-1])
     at, error = history.cycles[last], float(history.worn_volume_error[last])
     volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
-    coarser = "with longer steps, fewer harmonics and a coarser sweep"
+    coarser = "with longer steps, other harmonics and a coarser sweep"
     uncertain = describe_uncertain(*volumes, error, rtol, coarser, history.reference_end)
     cut_off = describe_cut_off(history.cut_off_cycle / slower) if at >= history.cut_off_cycle else ""
     inaccurate = held = ""

@@ -5,10 +5,10 @@
     python -m tests.benchmarks.error_bars --mesh --loads 60 [--rtol 1e-1 1e-2 1e-3]
 
 The truth of a dovetail is the adaptive scheme with a tolerance of 1e-3 or a tenth, from the start state of a sweep in
-steps five times as fine; that of a random joint the same with 13 harmonics for its five. Automatic harmonics: with 13
-and 256 samples the truth of load 46 is 4 % off. Random loads are adaptive histories of mesh 1 near its resonance, 5e4
-to 6e5 cycles. Wanted: at least half the true error everywhere, in the median not more than ten times it. Differences below the error of the
-truth, or below `FLOOR` of the volume, do not count: the truth is not known better.
+steps five times as fine; that of a random joint the same with 13 harmonics for its five. Random loads are adaptive
+histories of mesh 1 near its resonance, 5e4 to 6e5 cycles. Truths have automatic harmonics: with 13 and 256 samples that
+of load 46 is 4 % off. Wanted: at least half the true error everywhere, in the median not more than ten times it.
+Differences below the error of the truth, or below `FLOOR` of the volume, do not count: the truth is not known better.
 
 Columns: relative errors of the worn volume at the end, and their ratio; the smallest ratio of volumes and of responses
 on the way; that of the depths of all pairs that have a tenth of the deepest; how many of these depths are outside of

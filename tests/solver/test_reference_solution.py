@@ -62,7 +62,7 @@ def test_the_error_holds_where_pairs_slide_for_long_in_one_direction():
 
 @pytest.mark.slow
 def test_the_error_of_given_harmonics_is_that_to_many_more():
-    """21.33 mm3 with 39 harmonics: 5, 9 and 13 are 4 % off, and within 2 % of each other, where 1.3 % was told for 5."""
+    """21.33 mm3 with 39 harmonics: 5, 9 and 13 are 4 % off and within 2 % of each other; 1.3 % was told for 5."""
     model, settings, cycles = dovetail(39), SolverSettings(harmonics=5, samples=64), np.linspace(0.0, 110544.436, 41)
     (found,) = branch_states(model, 0.49649125954, 1.0432086579, [2.0 * np.pi * 211.99756074784662], settings, "up")
     history = march_wear(model, 0.49649125954, found, 9.0354845e-12, 1000.0, "adaptive", cycles, settings)
