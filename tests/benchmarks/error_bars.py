@@ -2,31 +2,46 @@
 
     python -m tests.benchmarks.error_bars --mesh 1 2 --random 200
     python -m tests.benchmarks.error_bars --mesh 1 --diameter 3 7 --frequency -0.25 0.25
-    python -m tests.benchmarks.error_bars --mesh --loads 60 [--rtol 1e-1 1e-2 1e-3]
+    python -m tests.benchmarks.error_bars --mesh --loads 60 [--rtol 1e-1 1e-2 1e-3] [--records FILE.csv]
+    python -m tests.benchmarks.error_bars --mesh --records FILE.csv --picture FILE.png
 
-The truth of a dovetail is the adaptive scheme with a tolerance of 1e-3 or a tenth, from the start state of a sweep in
-steps five times as fine; that of a random joint the same with 13 harmonics for its five. Random loads are adaptive
-histories of mesh 1 near its resonance, 5e4 to 6e5 cycles. Truths have automatic harmonics: with 13 and 256 samples that
-of load 46 is 4 % off. Wanted: at least half the true error everywhere, in the median not more than ten times it.
-Differences below the error of the truth, or below `FLOOR` of the volume, do not count: the truth is not known better.
+The truth of a dovetail is the adaptive scheme with a tolerance of 1e-3, from the start state of a sweep in steps five
+times as fine; that of a random joint the same with 13 harmonics for its five. That of a random load has a third of the
+smallest `--rtol`, 1e-4 to 1e-3, and automatic harmonics: with 13 and 256 samples the truth of load 46 is 4 % off. Of
+histories with 1e-4 it tells the start state alone. Random loads are adaptive histories of mesh 1 near its resonance,
+5e4 to 6e5 cycles; `--loads 20 40` are those from 20 to 39. A file of records, which a new run replaces, has each row as
+soon as it is computed, and the last command shows what it has by then. Wanted: at least half the true error everywhere,
+in the median not more than ten times it. Differences below the error of the truth, or below `FLOOR` of the volume, do
+not count: the truth is not known better.
 
-Columns: relative errors of the worn volume at the end, and their ratio; the smallest ratio of volumes and of responses
-on the way; that of the depths of all pairs that have a tenth of the deepest; how many of these depths are outside of
-their errors. Frequencies of a travelling wave (`--diameter`) are offsets from the resonance of the glued structure, Hz.
+Columns: relative errors of the worn volume at the end: estimated, difference to the truth, of the truth; ratio of the
+first two; the smallest ratio of volumes and of responses on the way; that of the depths of all pairs that have a tenth
+of the deepest; how many of these depths are outside of their errors. CPU time and iterations are those of a point of a
+study, with its start state. Frequencies of a travelling wave (`--diameter`) are offsets from the resonance of the glued
+structure, Hz.
 
 At 212.5 Hz two pairs of mesh 2 come to rest at 15 000 cycles, or go on by a hair, by the harmonics of the sweep: 0.071
 mm3 with 9 to 27 given harmonics and 256 samples or more, 0.094 with nodes of 5 harmonics.
 """
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.markers import CARETDOWN
+from matplotlib.ticker import PercentFormatter
 
 from solver.loading_history import path
 from solver.model import FloatArray, ReducedModel
+from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
-from tests.benchmarks.frame import Table, arguments, measure
+from studyrunner.report.drawing import WIDTH, add_legend, line_style, set_log, style
+from studyrunner.units import show_percent
+from tests.benchmarks.frame import Table, arguments
 from tests.solver.models import branch_states, glued_frequency, march_wear, random_model, scene
 
 WEAR = 1.1e-11  # 1/Pa
@@ -36,7 +51,12 @@ OFFSETS = (-0.25, 0.25)  # Hz, from the resonance of the glued structure, of tra
 HARMONICS = 39  # whose nodal diameters the scene holds
 FLOOR = 2e-3
 KINDS = (("3d", "3d"), ("3d", "one_tangent"), ("one_tangent", "one_tangent", "3d"))
-COLUMNS = ("estimated", "true", "ratio", "on the way", "responses", "depths", "outside", "of", "CPU s")
+RATIOS = ("on the way", "responses", "depths")
+COLUMNS = (
+    *("rtol", "estimated", "difference", "of the truth", "ratio", *RATIOS),
+    *("outside", "of", "CPU s", "iterations", "outcome"),
+)
+COMPLETE = [outcome.meaning for outcome in Outcome if outcome.complete]
 
 
 def smallest_ratio(estimated: FloatArray, true: FloatArray, seen: np.ndarray) -> float:
@@ -44,52 +64,93 @@ def smallest_ratio(estimated: FloatArray, true: FloatArray, seen: np.ndarray) ->
     return float((estimated[seen] / true[seen]).min(initial=np.inf))
 
 
-def compare(history: WearHistory, truth: WearHistory) -> list[float]:
-    """The columns of the table, without the time, of a history against the true one at the same counts."""
+def compare(history: WearHistory, truth: WearHistory, rtol: float) -> list[object]:
+    """The columns of the table for a history, asked for with this rtol, against the true one at the same counts."""
     true = np.abs(history.worn_volume - truth.worn_volume)
     # only where something has worn and the truth is known, and there better than the difference
-    worn = (truth.worn_volume > 1e-3 * np.nanmax(truth.worn_volume)) & np.isfinite(true)
+    worn = (truth.worn_volume > 1e-3 * np.nan_to_num(truth.worn_volume).max()) & np.isfinite(true)
     known = worn & (true > np.maximum(FLOOR, truth.worn_volume_error) * truth.worn_volume)
     moved = np.linalg.norm(history.response - truth.response, axis=1) / np.linalg.norm(truth.response, axis=1)
-    volume, depth = history.worn_volume[-1], truth.wear_depth[-1]
+    depth = truth.wear_depth[-1]
     deep = (depth > 0.1 * depth.max()) & np.isfinite(history.wear_depth[-1])
     off, off_estimated = np.abs(history.wear_depth[-1] - depth)[deep], history.wear_depth_error[-1][deep]
     off = np.where(off > np.maximum(FLOOR * depth, truth.wear_depth_error[-1])[deep], off, 0.0)
-    last = float(true[-1] / volume) if volume > 0.0 else 0.0
-    volumes = history.worn_volume_error * history.worn_volume, true, known
+    last = 0.0 if true[-1] == 0.0 else float(true[-1] / history.worn_volume[-1])
     return [
-        *(history.error_estimate, last, history.error_estimate / last if known[-1] else float("nan")),
-        smallest_ratio(*volumes),
+        *(rtol, history.error_estimate, last, truth.error_estimate),
+        history.error_estimate / last if known[-1] else float("nan"),
+        smallest_ratio(history.worn_volume_error * history.worn_volume, true, known),
         smallest_ratio(history.response_error, moved, worn & (moved > np.maximum(FLOOR, truth.response_error))),
         smallest_ratio(off_estimated, off, off > 0.0),
         *(int((off > off_estimated).sum()), int(deep.sum())),
+        *(history.run_time, history.newton_iterations, history.outcome.meaning),
     ]
 
 
-def add_row(
-    table: Table, name: str, truth: WearHistory, model: ReducedModel, friction: float, start: StartState, *asked: object
-) -> None:
-    """A row for a history from a start state, without the time of this; asked: the arguments of `march_wear` from the
-    wear coefficient on.
+def are_kept(rows: pd.DataFrame) -> pd.Series:
+    """Which histories are computed to the end and known within their rtol."""
+    return (rows["estimated"] <= rows["rtol"]) & rows["outcome"].isin(COMPLETE)
+
+
+def summarise(rows: pd.DataFrame) -> None:
+    """For each rtol: how many adaptive histories keep it, their CPU time and differences; median and worst ratios; how
+    many are too small.
     """
-    found = measure(lambda: march_wear(model, friction, start, *asked))
-    table.row(f"{name} {found.result.outcome.meaning}", *compare(found.result, truth), found.seconds)
+    for rtol, of_rtol in rows.groupby("rtol"):
+        adaptive = of_rtol[~of_rtol.iloc[:, 0].astype(str).str.contains("implicit|explicit")]
+        kept, known, ratio = are_kept(adaptive), of_rtol[np.isfinite(of_rtol["difference"])], of_rtol["ratio"].dropna()
+        spent, off = adaptive["CPU s"], adaptive["difference"]
+        print(f"rtol {rtol:g}: {len(of_rtol)} histories, {kept.sum()} of {kept.size} adaptive ones within it")
+        print(f"CPU s: median {spent.median():.1f}, of those within rtol {spent[kept].median():.1f}")
+        print(f"difference of {off.count()} adaptive ones: median {off.median():.2g}, largest {off.max():.2g}")
+        print(f"ratio at the end, {ratio.size} known: median {ratio.median():.2f}, least {ratio.min():.2f}")
+        for name in RATIOS:
+            print(f"{name}: least {known[name].min():.2f}, {(known[name] < 0.5).sum()} below 0.5")
+        print(f"{known['outside'].sum()} of {known['of'].sum()} depths outside")
 
 
-def summarise(table: Table, rtol: float = SolverSettings().rtol) -> None:
-    """How many adaptive histories keep rtol, and their CPU time; median and worst ratios; how many are too small."""
-    rows = [row for row in table.rows[1:] if np.isfinite(float(row[2]))]
-    if rows:
-        estimated, _, ratio, *least, outside, pairs, spent = np.array([row[1:] for row in rows], dtype=float).T
-        adaptive = np.array([not {"implicit", "explicit"} & set(str(row[0]).split()) for row in rows])
-        kept, of = estimated[adaptive] <= rtol, f"adaptive ones within rtol = {rtol:g}"
-        print(f"{len(rows)} histories, {kept.sum()} of {kept.size} {of}, median {np.median(spent[adaptive]):.1f} CPU s")
-        at_end = ratio[~np.isnan(ratio)]
-        if at_end.size:
-            print(f"at the end, {at_end.size} known: median {np.median(at_end):.2f}, least {at_end.min():.2f}")
-        for name, column in zip(COLUMNS[3:6], least, strict=True):
-            print(f"{name}: least {column.min():.2f}, {(column < 0.5).sum()} below 0.5")
-        print(f"{outside.sum():.0f} of {pairs.sum():.0f} depths outside")
+def draw(rows: pd.DataFrame, picture: Path) -> None:
+    """Error against CPU time of each history; for each rtol the share of histories that keep it, and the CPU time."""
+    rows = rows.assign(kept=are_kept(rows), error=np.maximum(rows["difference"], rows["of the truth"]))
+    known, handles = rows[np.isfinite(rows["error"]) & (rows["error"] > 0.0)], []
+    names = [show_percent(rtol) for rtol in sorted(rows["rtol"].unique(), reverse=True)]
+    with style():
+        figure = Figure(figsize=(WIDTH, 3.8), layout="constrained")
+        panels = figure.subplot_mosaic([["error", "share"], ["error", "time"]], width_ratios=(1.7, 1.0))
+        for place, (rtol, all_of) in enumerate(sorted(rows.groupby("rtol"), reverse=True)):
+            colour, marker = line_style(place)["color"], line_style(place)["marker"]
+            handles.append(Line2D([], [], color=colour, marker=marker, linestyle="--", label=f"rtol {names[place]}"))
+            panels["error"].axhline(rtol, linestyle="--", linewidth=1.0, color=colour)
+            for _, row in known[known["rtol"] == rtol].iterrows():
+                at, error, fill = row["CPU s"], row["error"], colour if row["kept"] else "white"
+                panels["error"].plot(at, error, color=colour, marker=marker, markerfacecolor=fill)
+                if row["difference"] < error:
+                    panels["error"].plot((at, at), (error, 0.7 * error), marker=CARETDOWN, markevery=[1], color=colour,
+                                         linewidth=0.8, zorder=1.5)  # fmt: skip
+            share, (low, median, high) = all_of["kept"].mean(), all_of["CPU s"].quantile([0.25, 0.5, 0.75])
+            panels["share"].bar(place, share, 0.6, color=colour)
+            panels["share"].text(place, share, f"{all_of['kept'].sum()}/{len(all_of)}", ha="center", va="bottom")
+            panels["time"].vlines(place, low, high, color=colour)
+            panels["time"].plot(place, median, color=colour, marker=marker)
+        set_log(panels["error"].xaxis, known["CPU s"].min(), known["CPU s"].max())
+        set_log(panels["error"].yaxis, known["error"].min(), rows["rtol"].max(), percent=True)
+        set_log(panels["time"].yaxis, rows["CPU s"].min(), rows["CPU s"].max())
+        for name in ("share", "time"):
+            panels[name].set(xlim=(-0.5, len(names) - 0.5))
+            panels[name].set_xticks(range(len(names)), names)
+        title = f"{len(known)} of {len(rows)} histories: those whose error is known"
+        panels["error"].set(xlabel="CPU time of a point (s)", ylabel="error of final worn volume", title=title)
+        panels["share"].set(ylabel="share within rtol", ylim=(0.0, 1.2), yticks=(0.0, 0.5, 1.0))
+        panels["share"].yaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
+        panels["time"].set(xlabel="rtol", ylabel="CPU time (s)", title="median and quartiles")
+        for fill, marker, meaning in (
+            *(("0.3", "o", "estimated within rtol"), ("white", "o", "inaccurate")),
+            ("0.3", CARETDOWN, "at most: the truth is not known better"),
+        ):
+            look = {"marker": marker, "markerfacecolor": fill, "linestyle": "none"}
+            handles.append(Line2D([], [], color="0.3", label=meaning, **look))
+        add_legend(figure, handles)
+        figure.savefig(picture, dpi=160)
 
 
 def fine_starts(
@@ -113,32 +174,30 @@ def dovetail(title: str, model: ReducedModel, steps: list[float], frequencies: F
     for frequency, fine, start in zip(frequencies, fine_starts(model, 0.5, 0.5, omegas, exact), starts, strict=True):
         truth = march_wear(model, 0.5, fine, WEAR, 1000.0, "adaptive", cycles, exact)
         for scheme, step in runs:
-            name = f"{frequency:.7g} Hz, {scheme} {step:g}"
-            add_row(table, name, truth, model, 0.5, start, WEAR, step, scheme, cycles, settings)
-    summarise(table)
+            history = march_wear(model, 0.5, start, WEAR, step, scheme, cycles, settings)
+            table.row(f"{frequency:.7g} Hz, {scheme} {step:g}", *compare(history, truth, settings.rtol))
+    summarise(table.frame)
 
 
-def random_loads(n: int, rtol: float) -> None:
+def random_loads(seeds: range, rtols: list[float], records: Path | None) -> None:
     """Adaptive histories of the coarse dovetail near its resonance under random loads; those that wear."""
-    table, model = Table(f"random loads, rtol {rtol:g}", *COLUMNS), scene("dovetail_sector", HARMONICS, mesh=1)
-    settings, exact = SolverSettings(rtol=rtol), SolverSettings(rtol=min(1e-3, 0.1 * rtol))
-    first = glued_frequency(model)
-    for seed in range(n):
+    table, model = Table("seed", *COLUMNS, file=records), scene("dovetail_sector", HARMONICS, mesh=1)
+    first, exact = glued_frequency(model), SolverSettings(rtol=min(1e-3, max(1e-4, 0.3 * min(rtols))))
+    for seed in seeds:
         random = np.random.default_rng(1000 + seed)
         frequency = first * random.uniform(0.9955, 1.0008)
         load, friction = float(np.exp(random.uniform(*np.log([0.4, 1.3])))), random.uniform(0.3, 0.6)
         wear = float(np.exp(random.uniform(*np.log([2e-12, 5e-11]))))
-        cycles = np.linspace(0.0, 10.0 ** random.uniform(4.7, 5.8), 41)
-        asked = model, friction, load, [2.0 * np.pi * frequency]
+        asked = wear, 1000.0, "adaptive", np.linspace(0.0, 10.0 ** random.uniform(4.7, 5.8), 41)
+        way = model, friction, load, [2.0 * np.pi * frequency]
         sweep = str(random.choice(["up", "down", "ramp"]))
-        (start,), (fine,) = branch_states(*asked, settings, sweep), fine_starts(*asked, exact, sweep)
-        if start.state is None or fine.state is None:
-            continue
-        truth = march_wear(model, friction, fine, wear, 1000.0, "adaptive", cycles, exact)
-        if np.nanmax(truth.worn_volume) > 0.0:
-            name = f"{seed}, {frequency:.7g} Hz, {load:.3g} N, {sweep}"
-            add_row(table, name, truth, model, friction, start, wear, 1000.0, "adaptive", cycles, settings)
-    summarise(table, rtol)
+        print(f"{seed}: {frequency:.7g} Hz, {load:.3g} N, {sweep}", flush=True)
+        truth = march_wear(model, friction, *fine_starts(*way, exact, sweep), *asked, exact)
+        # one that is not known may wear
+        for settings in [] if (truth.worn_volume == 0.0).all() else [SolverSettings(rtol=rtol) for rtol in rtols]:
+            history = march_wear(model, friction, *branch_states(*way, settings, sweep), *asked, settings)
+            table.row(str(seed), *compare(history, truth, settings.rtol))
+    summarise(table.frame)
 
 
 def random_joints(n: int) -> None:
@@ -158,13 +217,15 @@ def random_joints(n: int) -> None:
         cycles = np.linspace(0.0, 24.0 * step, 13)
         truth = march_wear(model, 0.4, fine, WEAR, step, "adaptive", cycles, exact)
         for scheme in ("implicit", "explicit", "adaptive"):
+            history = march_wear(model, 0.4, start, WEAR, step, scheme, cycles, settings)
             name = f"joint {seed}, {scheme} {step / limit:.2g} of the limit"
-            add_row(table, name, truth, model, 0.4, start, WEAR, step, scheme, cycles, settings)
-    summarise(table)
+            table.row(name, *compare(history, truth, settings.rtol))
+    summarise(table.frame)
 
 
 def main() -> None:
-    given = arguments(__doc__, mesh=[1], diameter=[0], random=0, loads=0, rtol=[1e-2], step=STEPS, frequency=[0.0])
+    lists = {"mesh": [1], "diameter": [0], "loads": [0], "rtol": [1e-2], "step": STEPS, "frequency": [0.0]}
+    given = arguments(__doc__, **lists, random=0, records=None, picture=None)
     for mesh, diameter in product(given.mesh, given.diameter):
         model = scene("dovetail_sector", HARMONICS, mesh=mesh, nodal_diameter=diameter)
         frequencies = np.array(given.frequency if any(given.frequency) else OFFSETS if diameter else FREQUENCIES[mesh])
@@ -172,9 +233,13 @@ def main() -> None:
         dovetail(f"mesh {mesh}, d {diameter}", model, given.step, first + frequencies)
     if given.random:
         random_joints(given.random)
-    if given.loads:
-        for rtol in given.rtol:
-            random_loads(given.loads, rtol)
+    if any(given.loads):
+        random_loads(range(*given.loads), given.rtol, given.records)
+    if given.picture:
+        rows = pd.read_csv(given.records)
+        draw(rows, given.picture)
+        if not any(given.loads):
+            summarise(rows)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 from solver.clock import computing_time
 from solver.newton import run as newton
@@ -75,6 +76,11 @@ class Table:
         if self.file is not None:
             with self.file.open("a", encoding="utf-8", newline="") as file:
                 csv.writer(file).writerow(words)
+
+    @property
+    def frame(self) -> pd.DataFrame:
+        """The rows, with the columns by name."""
+        return pd.DataFrame(self.rows[1:], columns=self.columns)
 
     def draw(self, picture: Path | None, x: str, y: str, scale: str = "linear") -> None:
         """Draws one column over another, a line for each first word up to a comma; nothing without a file."""
