@@ -86,8 +86,7 @@ def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: Float
 @njit(cache=True)
 def _slide(pairs: IntArray, path: Path, out: FloatArray, notes: FloatArray) -> IntArray:
     """As `slide_along`; returns the numbers of steps (n,), which are noted (n, k, NOTES) where there is room."""
-    n_samples = path.first.shape[2]
-    counts = np.zeros(pairs.size, np.int64)
+    n_samples, counts = path.first.shape[2], np.zeros(pairs.size, np.int64)
     near, margin, discs = np.empty(n_samples, np.int64), np.empty(n_samples), np.empty((3, n_samples))
     for place, pair in enumerate(pairs):
         first, last, friction, state = path.first[pair], path.last[pair], path.friction[pair], path.state[pair]
