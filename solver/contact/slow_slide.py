@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from solver.model import FloatArray, IntArray
 from solver.settings import ROUND_OFF
@@ -59,7 +60,7 @@ class Path(NamedTuple):
 
 
 class Way(NamedTuple):
-    """Path of one pair. near (n,): samples whose discs are looked at; discs (3, n): their centres and radii, N."""
+    """Path of one pair. near (n,): samples whose discs are looked at; discs (3, N): their centres and radii, N."""
 
     first: FloatArray
     last: FloatArray
@@ -68,32 +69,64 @@ class Way(NamedTuple):
     discs: FloatArray
 
 
-@njit(cache=True)
 def slide_along(pairs: IntArray, path: Path, out: FloatArray) -> None:
     """Tangential states of some pairs (n,) at the end of a path into out (n_contact, 2), N."""
-    none = np.zeros((0, NOTES))
-    for pair in pairs:
-        first, last, state = path.first[pair], path.last[pair], path.state[pair]
-        out[pair, 0], out[pair, 1], _ = _slide(first, last, path.friction[pair], state, none)
+    _slide(pairs, path, out, np.empty((pairs.size, 0, NOTES)))
 
 
-@njit(cache=True)
 def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: FloatArray) -> None:
     """Derivatives of the states of `slide_along` by the harmonics of the predicted force at the end of the path, into
     out (n_contact, 2, 3m). synthesis (m, N): as in `FourierBasis`.
     """
+    # with the same function: each one more is a second of compiling
+    notes = np.empty((pairs.size, 2 * PARTS + 2, NOTES))
+    _trace_back(pairs, _slide(pairs, path, np.empty_like(path.state), notes), notes, synthesis, out)
+
+
+@njit(cache=True)
+def _slide(pairs: IntArray, path: Path, out: FloatArray, notes: FloatArray) -> IntArray:
+    """As `slide_along`; returns the numbers of steps (n,), which are noted (n, k, NOTES) where there is room."""
+    n_samples, counts = path.first.shape[2], np.zeros(pairs.size, np.int64)
+    near, margin, discs = np.empty(n_samples, np.int64), np.empty(n_samples), np.empty((3, n_samples))
+    for place, pair in enumerate(pairs):
+        first, last, friction, state = path.first[pair], path.last[pair], path.friction[pair], path.state[pair]
+        x_1, x_2, reach = state[0], state[1], 0.0
+        for n in range(n_samples):
+            ends = np.inf
+            for force in (first, last):
+                apart = np.sqrt((force[1, n] - x_1) ** 2 + (force[2, n] - x_2) ** 2)
+                ends = min(ends, friction * force[0, n] - apart)
+            margin[n] = ends
+            reach = max(reach, -4.0 * ends)
+        # a margin is concave along a straight path: a state inside at both ends is inside between
+        farthest = np.inf if reach > 0.0 else 0.0
+        while farthest > reach:
+            n_near = 0
+            for n in range(n_samples):
+                if margin[n] <= reach:
+                    near[n_near] = n
+                    n_near += 1
+            way = Way(first, last, friction, near[:n_near], discs)
+            x_1, x_2, counts[place], farthest = _follow(way, state, notes[place])
+            reach = np.inf if farthest > reach else reach
+        out[pair, 0], out[pair, 1] = x_1, x_2
+    return counts
+
+
+@njit(cache=True)
+def _trace_back(pairs: IntArray, counts: IntArray, notes: FloatArray, synthesis: FloatArray, out: FloatArray) -> None:
+    """As `slide_tangent`, from the noted steps."""
     m, n_samples = synthesis.shape
-    notes, weights, later = np.empty((2 * PARTS + 2, NOTES)), np.empty((n_samples, 6)), np.empty(4)
-    for pair in pairs:
-        first, last, state = path.first[pair], path.last[pair], path.state[pair]
-        count = _slide(first, last, path.friction[pair], state, notes)[2]
+    weights, later = np.empty((n_samples, 6)), np.empty(4)
+    for place, pair in enumerate(pairs):
         weights[:] = 0.0
         later[0] = later[3] = 1.0
         later[1] = later[2] = 0.0
         # from the last step to the first
-        while count > 0 and np.abs(later).max() > ROUND_OFF:
-            count -= 1
-            _weigh(notes[count], later, weights)
+        for step in range(counts[place] - 1, -1, -1):
+            if max(abs(later[0]), abs(later[1]), abs(later[2]), abs(later[3])) <= ROUND_OFF:
+                break
+            _weigh(notes[place, step], later, weights)
         for n in range(n_samples):
             for entry in range(6):
                 weight = weights[n, entry]
@@ -102,7 +135,7 @@ def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: Float
                         out[pair, entry // 3, entry % 3 * m + k] += weight * synthesis[k, n]
 
 
-@njit(cache=True)
+@register_jitable
 def _weigh(note: FloatArray, later: FloatArray, weights: FloatArray) -> None:
     """Add the derivatives of the end of a path by what a step depends on to `weights` (N, 6); later (2, 2): derivative
     of the end by the place after the step, then by that before it, row by row.
@@ -118,40 +151,9 @@ def _weigh(note: FloatArray, later: FloatArray, weights: FloatArray) -> None:
             later[2 * row + k] = one * note[14 + k] + other * note[16 + k]
 
 
-@njit(cache=True)
-def _slide(
-    first: FloatArray, last: FloatArray, friction: float, state: FloatArray, notes: FloatArray
-) -> tuple[float, float, int]:
-    """State at the end of a path (3, N), and the number of its steps, noted (n, NOTES) where there is room."""
-    n_samples = first.shape[1]
-    near, margin = np.empty(n_samples, np.int64), np.empty(n_samples)
-    reach = 0.0
-    for n in range(n_samples):
-        ends = np.inf
-        for force in (first, last):
-            apart = np.sqrt((force[1, n] - state[0]) ** 2 + (force[2, n] - state[1]) ** 2)
-            ends = min(ends, friction * force[0, n] - apart)
-        margin[n] = ends
-        reach = max(reach, -4.0 * ends)
-    # a margin is concave along a straight path: a state inside at both ends is inside between
-    if reach == 0.0:
-        return state[0], state[1], 0
-    while True:
-        n_near = 0
-        for n in range(n_samples):
-            if margin[n] <= reach:
-                near[n_near] = n
-                n_near += 1
-        way = Way(first, last, friction, near[:n_near], np.empty((3, n_near)))
-        x_1, x_2, count, farthest = _follow(way, state, notes)
-        if farthest <= reach:
-            return x_1, x_2, count
-        reach = np.inf
-
-
-@njit(cache=True)
+@register_jitable
 def _follow(way: Way, state: FloatArray, notes: FloatArray) -> tuple[float, float, int, float]:
-    """As `_slide`, with the discs of some samples, and the farthest distance from the start."""
+    """As `_slide` for one pair, with the discs of some samples, and the farthest distance from the start."""
     x_1, x_2, count, farthest, slips = state[0], state[1], 0, 0.0, False
     unused = np.empty(NOTES)
     for part in range(PARTS + 1):
@@ -161,7 +163,17 @@ def _follow(way: Way, state: FloatArray, notes: FloatArray) -> tuple[float, floa
             slips = True
             continue
         if slips:
-            slips, begin = False, _first_common(way, along - 1.0 / PARTS, along, x_1, x_2)
+            # the fraction of the path at which the discs come to have a common point
+            slips, low, begin = False, along - 1.0 / PARTS, along
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + begin)
+                if _nearest(way, middle, x_1, x_2)[0]:
+                    begin = middle
+                else:
+                    low = middle
+            _, one, other = _nearest(way, begin, x_1, x_2)
+            if one >= 0:
+                x_1, x_2 = _project(way, begin, x_1, x_2, one, other, unused)
             x_1, x_2 = _meet(way, begin, x_1, x_2, notes[count] if count < len(notes) else unused)
             count, farthest = count + 1, max(farthest, np.hypot(x_1 - state[0], x_2 - state[1]))
             common, one, other = _nearest(way, along, x_1, x_2)
@@ -171,19 +183,7 @@ def _follow(way: Way, state: FloatArray, notes: FloatArray) -> tuple[float, floa
     return x_1, x_2, count, farthest
 
 
-@njit(cache=True)
-def _first_common(way: Way, low: float, high: float, x_1: float, x_2: float) -> float:
-    """Fraction of the path, between one without and one with a common point of all discs, at which there is one."""
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if _nearest(way, middle, x_1, x_2)[0]:
-            high = middle
-        else:
-            low = middle
-    return high
-
-
-@njit(cache=True)
+@register_jitable
 def _nearest(way: Way, along: float, x_1: float, x_2: float) -> tuple[bool, int, int]:
     """Whether all discs have a common point at a fraction of the path, and the disc, or the two, on whose border the
     one nearest to x lies: -1 where x lies within all.
@@ -233,14 +233,14 @@ def _nearest(way: Way, along: float, x_1: float, x_2: float) -> tuple[bool, int,
     return False, -1, -1
 
 
-@njit(cache=True)
+@register_jitable
 def _outside(x_1: float, x_2: float, discs: FloatArray, place: int) -> float:
     """Distance from a disc, 0 within round-off of it."""
     distance = np.sqrt((x_1 - discs[0, place]) ** 2 + (x_2 - discs[1, place]) ** 2) - discs[2, place]
     return distance if distance > 0.01 * INSIDE * discs[2, place] else 0.0
 
 
-@njit(cache=True)
+@register_jitable
 def _corner(x_1: float, x_2: float, discs: FloatArray, one: int, other: int, third: int) -> tuple[float, float, float]:
     """The corner of two discs that is nearest to x among those inside of a third one (-1: none): its distance, inf
     where there is none, and the corner.
@@ -263,7 +263,7 @@ def _corner(x_1: float, x_2: float, discs: FloatArray, one: int, other: int, thi
     return best, y_1, y_2
 
 
-@njit(cache=True)
+@register_jitable
 def _project(
     way: Way, along: float, x_1: float, x_2: float, one: int, other: int, note: FloatArray
 ) -> tuple[float, float]:
@@ -299,15 +299,12 @@ def _project(
     return x_1, x_2
 
 
-@njit(cache=True)
+@register_jitable
 def _meet(way: Way, along: float, x_1: float, x_2: float, note: FloatArray) -> tuple[float, float]:
     """The point at which two discs come to touch, at a fraction of the path at which all have a very small common part,
-    and its note: the fraction, too, depends on the forces at the end.
+    with the place x in it, and its note: the fraction, too, depends on the forces at the end.
     """
-    _, one, other = _nearest(way, along, x_1, x_2)
     discs, grown = way.discs, (1.0 - INSIDE) * way.friction
-    if one >= 0:
-        x_1, x_2 = _project(way, along, x_1, x_2, one, other, note)
     one = other = -1
     least = np.inf
     for place in range(way.near.size):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import solver
+from solver.contact import slow_slide
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, mean_normal_force, mean_normal_tangent
 from solver.contact.elastic_pairs import march_period, march_tangent, new_period
 from solver.contact.sliding_masses import Masses, march_masses
@@ -205,9 +206,11 @@ def test_a_kernel_is_compiled_once_for_any_resolution():
     for resolution in (Resolution((), 1), Resolution((1, 2, 3), 32)):
         joint = build_case(model, FRICTION, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
         predicted = PRELOAD * np.ones((2, 3, len(joint.basis.synthesis)))
-        joint.law.tangent(joint.law.march(predicted, np.zeros((2, 2))))
-    for kernel in (march_period, march_tangent, mean_normal_tangent):
-        assert len(kernel.signatures) == 1, kernel.signatures
+        history, first = np.zeros((2, 2)), 0.5 * predicted @ joint.basis.synthesis
+        joint.law.tangent(joint.law.march(predicted, history, first), history, first)
+    sliding = [each for each in vars(slow_slide).values() if hasattr(each, "signatures")]
+    for kernel in (march_period, march_tangent, mean_normal_tangent, *sliding):
+        assert len(kernel.signatures) == 1, (kernel, kernel.signatures)
 
 
 # --- elastic pairs and masses in one joint ---
