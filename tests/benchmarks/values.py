@@ -4,9 +4,8 @@
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.values --write FILE.csv [--only GROUP ...]
 
 Compared are outcomes, and values with their estimated errors, all relative. A value is "equal" to the bit, differs by
-"round-off", is "within" the smaller one of its errors before and now, or "OUTSIDE" of it; an error that is not known
-allows nothing. "GONE" is what there is no longer, "OUTCOME" another outcome. What is in capitals gives the status 1.
-Another message is only printed, and Newton iterations and CPU seconds are summed.
+"round-off", "within" each of its errors before and now, by what both allow "together", or is "OUTSIDE", as any other is
+whose error is not known. "GONE" is what there is no longer, "OUTCOME" another outcome: all in capitals gives status 1.
 """
 
 import csv
@@ -234,9 +233,10 @@ def verdict(before: list[str], now: list[str]) -> tuple[float, str]:
         return math.nan, "equal" if before[2] == now[2] else f"OUTCOME {now[2]}, was {before[2]}"
     old, new = complex(before[2]), complex(now[2])
     difference = abs(new - old) / (max(abs(new), abs(old)) or 1.0)
-    known = min(error if math.isfinite(error) else 0.0 for error in (float(before[3]), float(now[3])))
-    within = "within" if difference <= max(known, SOLVED) else "OUTSIDE"
-    return difference, "equal" if old == new else "round-off" if difference <= ROUND_OFF else within
+    errors = float(before[3]), float(now[3])
+    least, both = (min(errors), sum(errors)) if math.isfinite(sum(errors)) else (0.0, 0.0)
+    limits = {"equal": 0.0, "round-off": ROUND_OFF, "within": max(least, SOLVED), "together": max(both, SOLVED)}
+    return difference, next((word for word, limit in limits.items() if difference <= limit), "OUTSIDE")
 
 
 def compare(file: Path, groups: Sequence[str]) -> bool:
