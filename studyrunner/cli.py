@@ -40,7 +40,7 @@ examples:
   mpiexec -n 2 run-study my_study.toml -o worn.nc        a study of one's own on two cores
   run-study my_study.toml --check                        mass, pairs, frequencies of a finite-element model
   run-study worn.nc -o again.nc                          the study of a result file again
-  run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[192.0, 192.5]'
+  run-study dovetail --set slow_time.cycles=1e4 --set 'axes.frequency=[211.5, 212.0]'
 
 exit status:
   0  all points were computed to the end, each with its error; the last lines say how many are known to rtol

@@ -31,7 +31,7 @@ _MOST_FAILURES = 2
 _WIDTH, _LONGEST = 12, 240
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
-_AUTOMATIC = 'harmonics and samples of "auto", where numbers are given'
+_AUTOMATIC = '"auto" in place of numbers of harmonics and samples'
 ADVICE = {
     Outcome.TIME_LIMIT: "--retry-failed continues with a larger solver.time_limit",
     Outcome.RESONANCE_LOST: "Try another range in loading.between, or another axes.sweep",

@@ -2,14 +2,12 @@
 
 import argparse
 import csv
-import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
@@ -56,7 +54,7 @@ def dense_solve(n: int, repeats: int = 7) -> float:
 
 
 class Table:
-    """A table of columns, the first one of words; also as comma-separated values where a file is given, or drawn."""
+    """A table of columns, the first one of words; also as comma-separated values where a file is given."""
 
     def __init__(self, *columns: str, file: Path | None = None) -> None:
         self.widths = [42, *(max(len(column), 9) for column in columns[1:])]
@@ -81,20 +79,6 @@ class Table:
     def frame(self) -> pd.DataFrame:
         """The rows, with the columns by name."""
         return pd.DataFrame(self.rows[1:], columns=self.columns)
-
-    def draw(self, picture: Path | None, x: str, y: str, scale: str = "linear") -> None:
-        """Draws one column over another, a line for each first word up to a comma; nothing without a file."""
-        if picture is None:
-            return
-        figure, axes = plt.subplots(figsize=(6.0, 4.2))
-        lines: dict[str, list[list[Any]]] = {}
-        for row in self.rows[1:]:
-            lines.setdefault(str(row[0]).split(",")[0], []).append([row[self.columns.index(name)] for name in (x, y)])
-        for (name, points), marker in zip(lines.items(), itertools.cycle("os^Dvx"), strict=False):
-            axes.plot(*zip(*points, strict=True), marker=marker, label=name)
-        axes.set(xlabel=x, ylabel=y, title=self.columns[0], xscale=scale, yscale=scale)
-        axes.legend()
-        figure.savefig(picture, dpi=110, bbox_inches="tight")
 
 
 def arguments(doc: str | None, choices: Sequence[str] = (), **defaults: Any) -> argparse.Namespace:

@@ -1,6 +1,6 @@
 """What a mesh of the bundled dovetail root is worth.
 
-    python -m tests.benchmarks.meshes --mesh 1 2 3 [--records meshes.csv] [--picture meshes.png]
+    python -m tests.benchmarks.meshes --mesh 1 2 3 [--records meshes.csv]
 
 Worn volumes after 1e5 cycles at equal f/f_1, with f_1 the first frequency of the glued sector of each mesh: so the
 frequency of the finite elements does not count.
@@ -18,7 +18,7 @@ SHARES = [0.99556, 0.99676, 0.99735, 0.99794, 0.99853, 0.99912, 1.00029]  # f/f_
 
 
 def main() -> None:
-    given = arguments(__doc__, mesh=[1, 2, 3], share=SHARES, records=None, picture=None)
+    given = arguments(__doc__, mesh=[1, 2, 3], share=SHARES, records=None)
     columns = ("f/f_1", "worn volume, mm3", "error", "outcome", "tip, mm", "worn tip, mm", "CPU s")
     table, settings = Table("model", *columns, file=given.records), SolverSettings()
     for mesh in given.mesh:
@@ -32,7 +32,6 @@ def main() -> None:
             history, tip = found.result, 1e3 * abs(found.result.response[[0, -1], 0])
             worn = (1e9 * float(history.worn_volume[-1]), history.error_estimate, history.outcome)
             table.row(f"mesh {mesh}, {first:.2f} Hz", share, *worn, *tip.tolist(), start.run_time + found.seconds)
-    table.draw(given.picture, "f/f_1", "worn volume, mm3")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Error of the worn volume against run time across methods: the schemes of the solver and a plain time integration.
 
-    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.methods [slider] [dovetail] [--picture FILE]
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.methods [slider] [dovetail]
 
 Two scenes, 1e5 cycles each: a mass on a rigid slider, whose truth is its differential equation (closed form of Den
 Hartog), and the bundled dovetail root with mesh 1 at 212.42 Hz, whose truth is the time integration, extrapolated from
@@ -82,7 +82,7 @@ def least_time(runs: list[Row], truth: float, target: float) -> float | None:
 
 
 def main() -> None:
-    given = arguments(__doc__, tuple(CASES), picture=None)
+    given = arguments(__doc__, tuple(CASES))
     for name in given.chosen:
         (kind, values, *case), (n_steps, periods, each) = CASES[name], IN_TIME[name]
         model = scene(kind, HARMONICS, **values)
@@ -95,7 +95,6 @@ def main() -> None:
         table = Table(f"{name}, truth {1e9 * truth:.5g} mm3", "CPU s", "error, %")
         for method, setting, seconds, volume in runs:
             table.row(f"{method}, {setting}", seconds, 100.0 * abs(volume / truth - 1.0))
-        table.draw(given.picture, "CPU s", "error, %", "log")
         costs = Table("CPU s for an error of", *(f"{target:.1%}" for target in TARGETS))
         for method in dict.fromkeys(run[0] for run in runs):
             own = [run for run in runs if run[0] == method]

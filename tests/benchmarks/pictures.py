@@ -1,10 +1,9 @@
 """Draws the pictures of the bundled study in `studies/pictures` and writes down the numbers that they show.
 
-    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures dovetail.nc [work_precision_slider.nc]
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures dovetail.nc
 
-`dovetail.nc` is the result of `run-study dovetail --set 'outputs.variables=["default", "natural_frequency"]'`. The
-picture of the other study shows CPU times and is in no test. Written are the PNG files of `NAMES`, as the report draws
-them, and `numbers.json`: the study, what the artists of each figure hold, and a checksum of each picture.
+`dovetail.nc` is the result of the bundled study. Written are the PNG files of `SHOWN`, as the report draws them, and
+`numbers.json`: the study, what the artists of each figure of `NAMES` hold, and a checksum of each picture.
 `tests/studyrunner/test_bundled_studies.py` compares all of that with the bundled study, with the files, and with points
 that are computed anew.
 """
@@ -31,10 +30,8 @@ from studyrunner.result.view import open_for_report
 
 FOLDER = Path(studies.__file__).parent / "pictures"
 NUMBERS = "numbers.json"
-NAMES = (
-    *("final_worn_volume", "frequency_response", "fretting_loops", "mean_pressure", "natural_frequencies"),
-    *("worn_profile", "worn_root", "worn_volume_map"),
-)
+SHOWN = ("final_worn_volume", "worn_profile", "worn_root", "worn_volume_map")  # on the pages
+NAMES = (*SHOWN, "frequency_response")
 WIDTH, COLOURS = 1200, 128  # of a picture: pixels, and of its palette
 MOST_POINTS, DIGITS = 30, 6  # of a line that is written down, and of its numbers
 
@@ -93,7 +90,7 @@ def drawings_of(path: str, names: tuple[str, ...]) -> dict[str, Drawing]:
 
 
 def main() -> None:
-    dovetail, *precision = sys.argv[1:]
+    (dovetail,) = sys.argv[1:]
     drawings = drawings_of(dovetail, NAMES)
     figures = {
         name: {
@@ -106,14 +103,12 @@ def main() -> None:
     numbers = {
         "study": open_for_report(Path(dovetail)).dataset.attrs["study"],
         "figures": figures,
-        "pictures": {f"{name}.png": write_picture(drawing) for name, drawing in drawings.items()},
+        "pictures": {f"{name}.png": write_picture(drawings[name]) for name in SHOWN},
     }
     text = json.dumps(numbers, indent=1, ensure_ascii=False)
     # each list of numbers on one line
     text = re.sub(r"\[\s+([^\[\]{}\"]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
     (FOLDER / NUMBERS).write_text(text, encoding="utf-8")
-    for path in precision:
-        write_picture(drawings_of(path, ("precision",))["precision"])
 
 
 if __name__ == "__main__":
