@@ -71,7 +71,10 @@ ASKED = {
     ),
     "wear_rate_error": Variable(_CYCLE, "1", "estimated relative error of the wear rate", "As response_error."),
     "worn_volume_error": Variable(
-        _CYCLE, "1", "estimated relative error of the worn volume", "0 where nothing has worn."
+        _CYCLE,
+        "1",
+        "estimated relative error of the worn volume",
+        "As response_error, but of the whole way; 0 where nothing has worn.",
     ),
     "wear_depth_error": Variable(
         _PAIRS, "m", "estimated error of the wear depth", "Relatively larger than for the volume."
