@@ -61,6 +61,13 @@ class ContactInterface(_ByRows):
         """`3 pair + component` (n_rel,) of each relative displacement."""
         return np.flatnonzero(self.dofs.ravel() >= 0)
 
+    @cached_property
+    def pair_rows(self) -> IntArray:
+        """Relative displacement of each component of the pairs (n_contact, 3); -1 where there is none."""
+        rows = np.full(self.dofs.size, -1)
+        rows[self.component_index] = np.arange(self.component_index.size)
+        return rows.reshape(self.dofs.shape)
+
     @property
     def relative(self) -> IntArray:
         """Indices (n_rel,) of the relative displacements in a `LinearModel`."""

@@ -216,9 +216,13 @@ class _Search:
     def _next(self, here: ResolvedState, wanted: Resolution) -> ResolvedState | None:
         """The state with the wanted resolution, or with one more level of harmonics; None where none is found."""
         limit = self.begun + REFINEMENT_WORK / here.unknowns(shifted(here.case.resolution, 2))
-        if wanted == here.case.resolution or self.run.budget.iterations >= limit:
+        now = here.case.resolution
+        if wanted == now or self.run.budget.iterations >= limit:
             return None
-        more = wanted.orders != here.case.resolution.orders
+        if (more := wanted.orders != now.orders) and not self.allows(here, wanted):
+            # with more samples, too, these harmonics are not allowed: nodes of the dovetail had 13 where 27 are
+            fewest = shifted(now, 1).samples if here.case.settings.samples == "auto" else now.samples
+            wanted = replace(wanted, samples=min(wanted.samples, fewest))
         for resolution in (wanted, shifted(wanted, 1)) if more else (wanted,):
             # impacts: Newton's method diverges from a start without force in the new harmonics
             for with_tail in (False, True) if more else (False,):

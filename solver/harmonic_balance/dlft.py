@@ -163,7 +163,7 @@ class Linearisation:
     @cached_property
     def passive_rows(self) -> IntArray:
         """All other relative displacements."""
-        return np.setdiff1d(np.arange(self.joint.component_index.size), self.active_rows, assume_unique=True)
+        return np.delete(np.arange(self.joint.component_index.size), self.active_rows)
 
     def motion(self, step: FloatArray) -> FloatArray:
         """Change of the motion (n_contact, 3, m), m, with a step (n_rel, m), N."""
@@ -178,7 +178,7 @@ class Linearisation:
         """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""
         joint = self.joint
         blocks = self.force_tangent, joint.law.compliance, self.growth_tangent
-        return untransmitted(np.ascontiguousarray(step), joint.pair_rows, self.active, *blocks)
+        return untransmitted(np.ascontiguousarray(step), joint.contact.pair_rows, self.active, *blocks)
 
     def dense(self, pairs: IntArray, width: int | None = None) -> FloatArray:
         """Rows and columns (displacement, coefficient) of the Jacobian for some pairs and their first `width`

@@ -77,7 +77,7 @@ class DenseFactor:
         if self.rows.size:
             width = len(self.factor[1]) // self.rows.size
             inside = right[self.rows, :width].ravel()
-            solved = scipy.linalg.lu_solve(self.factor, inside, check_finite=False)
+            solved = scipy.linalg.lapack.dgetrs(*self.factor, inside)[0]
             found[self.rows, :width] = solved.reshape(-1, width)
         return found
 

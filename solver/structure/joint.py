@@ -48,21 +48,15 @@ class Joint:
         """The contact law of the pairs."""
         return ContactLaw(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
 
-    @cached_property
-    def pair_rows(self) -> IntArray:
-        """Relative displacement of each component of the pairs (n_contact, 3); -1 where there is none."""
-        rows = np.full(3 * self.contact.n_contact, -1)
-        rows[self.component_index] = np.arange(self.component_index.size)
-        return rows.reshape(-1, 3)
-
     @property
     def relative_penalty(self) -> FloatArray:
         """Penalty (n_rel,), N/m, of each relative displacement."""
         return self.penalty.stiffness.ravel()[self.component_index]
 
     def rows_of(self, pairs: IntArray | int) -> IntArray:
-        """Indices of the relative displacements of one or more pairs, ascending."""
-        return np.flatnonzero(np.isin(self.component_index // 3, pairs))
+        """Indices of the relative displacements of one pair, or of ascending pairs, ascending."""
+        rows = self.contact.pair_rows[pairs].ravel()
+        return rows[rows >= 0]
 
     def to_pairs(self, values: FloatArray) -> FloatArray:
         """Values (n_contact, 3, m) of the pairs from (n_rel, m); zero where a pair has no such displacement."""

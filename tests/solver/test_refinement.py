@@ -177,6 +177,12 @@ def test_a_state_that_is_not_allowed_what_it_needs_says_so(name, most, monkeypat
     assert found.case.resolution.samples <= 64 if name == "MOST_SAMPLES" else unknowns <= 7
 
 
+def test_more_samples_than_are_allowed_do_not_keep_the_harmonics_from_a_state(monkeypatch):
+    """Both are wanted at once: nodes of the dovetail had 13 harmonics and an error of 4 % with `rtol` 1e-3."""
+    monkeypatch.setattr(refinement, "MOST_SAMPLES", 64)
+    assert refined_of(slider(SolverSettings(rtol=1e-4))).case.resolution.highest == 5
+
+
 def test_given_samples_limit_the_harmonics():
     found = refined_of(slider(SolverSettings(samples=32, rtol=1e-4)))
     assert found.case.resolution.samples == 32 > 2 * found.case.resolution.highest
