@@ -66,15 +66,12 @@ ASKED = {
         _CYCLE,
         "1",
         "estimated relative error of the response",
-        "1.5 times the largest difference to the reference solution from a quarter of the count up to it,"
+        "1.5 times the largest difference to the reference solution in the second half of the way to the count,"
         " at least the error of harmonics and samples.",
     ),
     "wear_rate_error": Variable(_CYCLE, "1", "estimated relative error of the wear rate", "As response_error."),
     "worn_volume_error": Variable(
-        _CYCLE,
-        "1",
-        "estimated relative error of the worn volume",
-        "0 where nothing has worn.",
+        _CYCLE, "1", "estimated relative error of the worn volume", "0 where nothing has worn."
     ),
     "wear_depth_error": Variable(
         _PAIRS, "m", "estimated error of the wear depth", "Relatively larger than for the volume."

@@ -23,15 +23,14 @@ HISTORY_SAFETY = 1.5
 """Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps of
 250 to 2000 cycles: 0.02 to 1.4, in the median 0.3."""
 
-CROSSING_WINDOW = 0.25
-"""Fraction of the cycle count from which on the largest difference is the error: histories with an event at different
-counts cross each other (dovetail, 211.25 Hz, steps of 2000 cycles: else a quarter of the true error at the crossing).
-With 0.5, adaptive histories of 211.25 Hz, apart by 1.2 % in an event at 30 % of the way, agree by chance from 50 % on:
-0.4 % are told of 0.8 %. Where an event has passed at 10 % of the way (212.125 Hz), the true error falls as well."""
-
 PAIR_OVER_VOLUME = 2.0
 """Relative error of the depth of a pair over that of the worn volume, at least, where four or more pairs wear. With 1
 deep pairs of the dovetail are outside of their errors by 2.7 (mu = 0.3) to 3.2 times (212.5 Hz, 48 pairs, explicit)."""
+
+CROSSING_WINDOW = 0.5
+"""Fraction of the cycle count from which on the largest difference is the error: histories with an event at different
+counts cross each other (dovetail, 211.25 Hz, steps of 2000 cycles: else a quarter of the true error at the crossing).
+Later differences are not used: an error does not depend on the length of the study."""
 
 
 @dataclass(frozen=True)
@@ -101,9 +100,11 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     """
     values = outputs.values
 
+    def crossing(differences: FloatArray) -> FloatArray:
+        return HISTORY_SAFETY * _largest_before(steps.counts, differences, outputs.counts)
+
     def largest(change: Callable[[Compared], FloatArray]) -> FloatArray:
-        on_the_way = _largest_before(steps.counts, change(steps), outputs.counts)
-        return HISTORY_SAFETY * np.maximum(change(outputs), on_the_way)
+        return np.maximum(HISTORY_SAFETY * change(outputs), crossing(change(steps)))
 
     depth, volume = values["wear_depth"], values["wear_depth"] @ area
     error = largest(lambda both: _volume_apart(both, area))
@@ -197,10 +198,10 @@ def _frequency_error(both: Compared, safety: float, known: FloatArray) -> FloatA
 def _largest_before(at: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
     """Largest difference (n_output, ...) from `CROSSING_WINDOW` times each count up to this count; 0 if none.
 
-    at (n,): ascending counts of the differences (n, ...). Later ones are not used: an error does not depend on the
-    length of the study.
+    at (n,): ascending counts of the differences (n, ...).
     """
-    first, last = np.searchsorted(at, CROSSING_WINDOW * counts, "left"), np.searchsorted(at, counts, "right")
+    first = np.searchsorted(at, CROSSING_WINDOW * counts, "left")
+    last = np.searchsorted(at, counts, "right")
     return np.array([differences[one:other].max(axis=0, initial=0.0) for one, other in zip(first, last, strict=True)])
 
 

@@ -235,16 +235,6 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing():
     assert crossing.wear_rate == pytest.approx([0.0, 0.0, safety * 0.25])
 
 
-def test_a_difference_counts_until_four_times_its_count():
-    steps = Compared(np.array([0.45]), at_step(0.5), at_step(1.0))
-    found, safety = error_of(read(DEPTH), read(DEPTH), steps), HISTORY_SAFETY
-    assert found.worn_volume == pytest.approx([0.0, safety * 1.5 / 3.0, 0.0])
-    found = error_of(read(DEPTH), read(DEPTH), replace(steps, counts=np.array([0.5])))
-    assert found.worn_volume == pytest.approx([0.0, safety * 1.5 / 3.0, safety * 1.5 / 6.0])
-    assert (found.wear_depth[1:] >= safety * 0.5).all()
-    assert found.wear_rate == pytest.approx([0.0, safety * 1.0, safety * 1.0])
-
-
 @pytest.mark.slow
 def test_histories_that_are_integrated_together_are_those_alone(monkeypatch):
     """To the last bit, interrupted or not; the adaptive history, which all of them need, is integrated once."""
