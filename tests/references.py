@@ -55,17 +55,7 @@ def den_hartog_amplitude(mass: float, stiffness: float, force: float, friction_f
     return amplitude
 
 
-def coulomb_orbit(
-    mass: ArrayLike,
-    damping: ArrayLike,
-    stiffness: ArrayLike,
-    load: ArrayLike,
-    friction_dof: int,
-    friction_force: float,
-    omega: float,
-    *,
-    transient: int = 30,
-) -> Orbit:
+def coulomb_orbit(mass, damping, stiffness, load, friction_dof, friction_force, omega, *, transient=30) -> Orbit:
     """Periodic motion of `M x'' + C x' + K x + lambda = Re(load exp(i omega t))` from rest.
 
     mass, damping, stiffness (n, n); load (n,), N, may be complex. lambda acts on `friction_dof` alone, which may have

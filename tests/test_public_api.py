@@ -156,12 +156,6 @@ def test_several_processes_do_not_compute_the_same(tmp_path, monkeypatch):
 # --- one joint ---
 
 
-def slider(**changes):
-    """The mass of Den Hartog's case from matrices: 0.1 kg on 1.6e5 N/m, pressed by 10 N."""
-    given = {"load_harmonic": [1.0], "normal_load": 10.0, "response_names": ["mass"]} | changes
-    return build_model([[0.1]], None, [[1.6e5]], [[-1, 0, -1]], 1e-4, **given)
-
-
 @pytest.mark.slow
 def test_the_response_without_friction_is_linear():
     mass, damping, stiffness = np.diag([0.1, 0.2]), np.diag([2.0, 3.0]), np.array([[3e5, -1e5], [-1e5, 2e5]])
@@ -243,11 +237,11 @@ def test_results_are_datasets_files_pictures_and_five_lines(tmp_path):
 
 
 def test_a_point_that_fails_is_one_point():
-    settings = SolverSettings(time_limit=0.0)
-    curve = frequency_response(slider(), [150.0], 10.0, 0.5, settings=settings)
+    model, settings = build_scene("sdof_slider"), SolverSettings(time_limit=0.0)
+    curve = frequency_response(model, [150.0], 10.0, 0.5, settings=settings)
     assert curve.outcome == (Outcome.TIME_LIMIT,)
     assert np.isnan(curve.response).all()
-    history = march_wear(slider(), 150.0, 10.0, 0.5, 1e-11, 1e4, settings=settings)
+    history = march_wear(model, 150.0, 10.0, 0.5, 1e-11, 1e4, settings=settings)
     assert history.outcome is Outcome.TIME_LIMIT
     assert history.cycles.tolist() == [0.0, 1e4]
     assert "time_limit" in repr(history)

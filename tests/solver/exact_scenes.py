@@ -20,7 +20,7 @@ from tests.cantilever import FRICTION, Cantilever
 from tests.contact_pair import ContactPair
 from tests.event_driven import Orbit
 from tests.random_scenes import log_uniform as _spread
-from tests.solver.models import march_wear
+from tests.solver.models import branch_states, march_wear
 
 
 @dataclass(frozen=True)
@@ -118,17 +118,7 @@ def slider(random: np.random.Generator, lowest: float = 0.5, highest: float = 1.
     return slid(m, damping, k, load, friction, force, ratio * np.sqrt(k / m), random.choice([0.0, k]))
 
 
-def slid(
-    mass: float,
-    damping: float,
-    stiffness: float,
-    load: float,
-    friction: float,
-    force: float,
-    omega: float,
-    pressing: float = 0.0,
-    swing: complex = 0.0,
-) -> Scene:
+def slid(mass, damping, stiffness, load, friction, force, omega, pressing=0.0, swing=0.0) -> Scene:
     """A mass on a slider. pressing: stiffness, N/m, of a spring at the pair, or 0. swing: harmonic part of the normal
     force, N, which takes a spring.
     """
@@ -284,7 +274,10 @@ def exact_tip(name: str, force: float, omega: float) -> tuple[complex, float]:
     return complex(first), float(np.abs(tip @ orbit.sample(4096)[: tip.size]).max())
 
 
-def reported_tip(model: ReducedModel, start: StartState, settings: SolverSettings) -> tuple[complex, float]:
-    """The same as reported of an unworn state."""
+def tip_errors(name: str, force: float, omega: float, settings: SolverSettings) -> tuple[StartState, list[float]]:
+    """An unworn state, and the relative errors of what is reported of its tip."""
+    model = Cantilever(spring=SPRINGS[name]).model()
+    (start,) = branch_states(model, FRICTION, force, [omega], settings)
     history = march_wear(model, FRICTION, start, 0.0, 1.0, "explicit", np.zeros(1), settings)
-    return complex(history.response[0, 0]), float(history.response_peak[0, 0])
+    found = history.response[0, 0], history.response_peak[0, 0]
+    return start, [float(abs(own / true - 1.0)) for own, true in zip(found, exact_tip(name, force, omega), strict=True)]

@@ -53,12 +53,9 @@ def test_the_contact_force_is_that_of_the_plain_law(kinds):
     predicted_h = state.contact_force_h + eps[:, :, None] * moved
     predicted_h[model.contact.dofs[:, 0] < 0, 0, 1:] = 0.0
     predicted_t = series(predicted_h, SETTINGS.samples)
-    forces = np.array(
-        [
-            pair_period(predicted_t[pair], FRICTION, penalty.tangential[pair] * state.start_history[pair], 8)[0]
-            for pair in range(model.contact.n_contact)
-        ]
-    )
+    begin = penalty.tangential[:, None] * state.start_history
+    pairs = zip(predicted_t, begin, strict=True)
+    forces = np.array([pair_period(predicted, FRICTION, start, 8)[0] for predicted, start in pairs])
     size = np.abs(state.contact_force_h).max()
     assert forces[:, 1:] @ joint.basis.analysis == pytest.approx(state.contact_force_h[:, 1:], abs=1e-9 * size)
     # normal forces are averaged up to the instant of opening: near those of 64 times the samples, Eq. (11)
@@ -79,9 +76,8 @@ def test_the_report_is_that_of_the_time_signals(kinds):
     phase = 2 * np.pi * np.arange(FINE_SAMPLES) / FINE_SAMPLES
     waves = sum(np.real(responses[n][:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
     assert report["response_peak"] == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
-    assert report["mean_pressure"] == pytest.approx(
-        state.contact_force_h[:, 0, 0] / model.contact.area, rel=1e-12, abs=0.0
-    )
+    pressure = state.contact_force_h[:, 0, 0] / model.contact.area
+    assert report["mean_pressure"] == pytest.approx(pressure, rel=1e-12, abs=0.0)
     assert report["open_fraction"] == pytest.approx((at.force_t[:, 0] == 0).mean(axis=1))
     slip = at.state_t / joint.penalty.tangential[:, None, None]
     for pair in range(model.contact.n_contact):

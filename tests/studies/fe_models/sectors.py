@@ -1,5 +1,7 @@
 """Small bladed sectors: one in any kind of element, meshes matching or not, and one with shrouds."""
 
+from functools import partial
+
 import numpy as np
 
 from studies.finite_element.cut_faces import CyclicAxis, match_cut_faces
@@ -14,8 +16,6 @@ from tests.studies.fe_models.solid_meshes import block, joined
 N_SECTORS = 12
 OMEGA_SQUARED = 2.5e5
 Z = np.array([0.0, 0.0, 1.0])
-
-
 HALF = np.tan(np.pi / N_SECTORS)
 
 
@@ -23,10 +23,6 @@ def wedge_shape(points, begin=0.2):
     """A wedge from x = begin, 0.1 m long: in place of blades, a ring whose joint runs through the cut faces."""
     x = begin + 0.1 * points[:, 0]
     return np.stack([x, x * HALF * (2.0 * points[:, 1] - 1.0), 0.04 * points[:, 2]], axis=1)
-
-
-def disk_shape(points):
-    return wedge_shape(points, 0.1)
 
 
 def blade_shape(points):
@@ -59,7 +55,7 @@ class Sector:
 
     def __init__(self, disk_kind, blade_kind, disk=(2, 4, 2), blade=(3, 2, 2), blade_shape=blade_shape):
         """Cut faces are where the angle is that of a sector, on the blade as well."""
-        first, _ = block(disk_kind, disk, disk_shape, part="disk", straight=True)
+        first, _ = block(disk_kind, disk, partial(wedge_shape, begin=0.1), part="disk", straight=True)
         second, _ = block(blade_kind, blade, blade_shape, part="blade", straight=True)
         self.mesh = joined(first, second)
         x, y, _ = self.mesh.coordinates.T
