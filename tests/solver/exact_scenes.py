@@ -181,9 +181,7 @@ def grazing(random: np.random.Generator) -> Scene:
     return wall(ratio, gap, damping, _spread(random, 5.0, 300.0), random.uniform(0.0, 2.0 * np.pi))
 
 
-def behind_spring(
-    tangential: float, damping: float, limit: float, omega: float, force: complex = 1.0, units: float = 1.0
-) -> Scene:
+def behind_spring(tangential, damping, limit, omega, force=1.0, units=1.0) -> Scene:
     """Jenkins' element on a mass, its mount of stiffness 1 N/m and the mass 1 kg, all forces and stiffnesses times
     `units`. damping: N s/m. limit: of friction, N.
     """

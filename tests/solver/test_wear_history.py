@@ -1,7 +1,5 @@
 """Wear histories against differential equations and time integrations; what is stored and read between their steps."""
 
-from functools import lru_cache
-
 import numpy as np
 import pytest
 
@@ -39,7 +37,6 @@ FEW = SolverSettings(harmonics=3, samples=128)
 FINE_OUTPUT = np.linspace(0.0, END, 101)
 
 
-@lru_cache
 def final_depth(step, scheme):
     history = march(step, scheme, np.array([0.0, END]))
     assert history.outcome is Outcome.CONVERGED
