@@ -76,8 +76,8 @@ def test_importing_loads_no_more_than_is_needed():
     """The commands say how many threads there are to be before numpy is loaded; what takes long to load, each rank of
     each run would load."""
     code = """
-import sys, solver, studies, studyrunner
-print({'numpy', 'pydantic', 'xarray', 'numba'} & set(sys.modules))
+import sys, solver, studies.scenes, studyrunner
+print({'numpy', 'scipy', 'pydantic', 'h5py', 'xarray', 'numba'} & set(sys.modules))
 import studyrunner.run
 late = {'matplotlib', 'netCDF4', 'pandas', 'rich', 'xarray'}
 late |= {'scipy.optimize', 'scipy.spatial', 'scipy.special', 'scipy.stats'}

@@ -1,4 +1,4 @@
-"""Small bladed sectors: one in any kind of element, meshes matching or not, and one with shrouds."""
+"""Small bladed sectors: one in any kind of element, meshes matching or not, and one with shrouds; two cubes."""
 
 from functools import partial
 
@@ -11,7 +11,7 @@ from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, mean_motion
 from studies.finite_element.surfaces import surface_of_faces
 from studies.scenes import shrouded_sector
-from tests.studies.fe_models.solid_meshes import block, joined
+from tests.studies.fe_models.solid_meshes import STEEL, block, joined
 
 N_SECTORS = 12
 OMEGA_SQUARED = 2.5e5
@@ -48,6 +48,15 @@ def faces_where(mesh: SolidMesh, inside):
 def surface_where(mesh: SolidMesh, name, inside):
     """The surface of these faces."""
     return surface_of_faces(mesh, name, *faces_where(mesh, inside))
+
+
+def cubes_on_each_other(lower, upper, lower_divisions, upper_divisions, lift=0.0, material=STEEL):
+    """Two unit cubes that touch at z = 1, the upper one lifted; surfaces LOW and UP."""
+    first, a = block(lower, lower_divisions, material=material)
+    second, b = block(upper, upper_divisions, lambda points: points + [0.0, 0.0, 1.0 + lift], material)
+    mesh = joined(first, second)
+    height = np.append(a[:, 2], 2.0 + b[:, 2])
+    return mesh, surface_where(mesh, "LOW", height == 1.0), surface_where(mesh, "UP", height == 2.0)
 
 
 class Sector:
