@@ -199,13 +199,18 @@ def jenkins(random: np.random.Generator) -> Scene:
     return behind_spring(tangential, damping, limit, omega, 1.0, _spread(random, 1e-3, 1e3))
 
 
+def barely_slipping(tangential, damping, omega, over, phase=0.7) -> Scene:
+    """Elastic dry friction whose limit is exceeded by a share `over` if it sticks. phase: rad, of the excitation."""
+    stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
+    return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(1j * phase))
+
+
 def slipping_little(random: np.random.Generator) -> Scene:
     """Elastic dry friction next to the onset of slip."""
     tangential, damping = _spread(random, 0.1, 30.0), random.uniform(0.01, 0.1)
     omega = random.uniform(0.3, 1.5) * np.sqrt(1.0 + tangential)
-    stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
     over = random.choice([-1.0, 1.0, 1.0, 1.0]) * _spread(random, 1e-4, 0.2)
-    return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(2j * np.pi * random.random()))
+    return barely_slipping(tangential, damping, omega, over, 2.0 * np.pi * random.random())
 
 
 def inclined(random: np.random.Generator) -> Scene:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
+from solver.arguments import worn_model
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
@@ -16,12 +17,13 @@ from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.newton.run import Run
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, SolverSettings, first_resolution
-from solver.structure.joint import Case, build_case
+from solver.structure.joint import Case, Joint, build_case
 from solver.wear.history import integrate_together
 from solver.wear.wearing_joint import WearRequest, steps_of
 from studies.scenes import build_scene, scene_parameters
 from tests.random_scenes import COMPONENTS, definite
 
+ALL_KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent")
 STIFFNESS = 1e7  # N/m
 MASS = 5.0  # kg
 PRELOAD = 100.0  # N on a pair
@@ -144,6 +146,13 @@ def branch_states(model, friction, amplitude, omegas, settings, sweep="up") -> l
     frequencies = np.asarray(omegas, float) / (2.0 * np.pi)
     found = dict(follow_branch(model, friction, amplitude, frequencies, sweep, settings))
     return [found[index] for index in range(len(omegas))]
+
+
+def worn_state(kinds: Sequence[str], settings: SolverSettings) -> tuple[Joint, State]:
+    """A random joint, worn a little, whose pairs stick, slip and open, and its state."""
+    worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(kinds))
+    case = build_case(worn_model(random_model(1, kinds), worn), 0.4, OMEGA, settings)
+    return case.joint(OMEGA, 60.0), first_point(case, OMEGA, 60.0)
 
 
 def first_point(case: Case, omega: float, amplitude: float) -> State:

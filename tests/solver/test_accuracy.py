@@ -14,7 +14,7 @@ from tests.cantilever import FRICTION, Cantilever
 from tests.references import den_hartog_amplitude
 from tests.solver.exact_scenes import (
     KINDS,
-    behind_spring,
+    barely_slipping,
     drawn,
     exact_tip,
     find,
@@ -25,12 +25,6 @@ from tests.solver.exact_scenes import (
 from tests.solver.models import first_point, scene
 
 SCENES = textbook_scenes()
-
-
-def barely_slipping(tangential, damping, omega, over):
-    """Elastic dry friction whose limit is exceeded by a share `over` if it sticks."""
-    stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
-    return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(0.7j))
 
 
 HARD = {

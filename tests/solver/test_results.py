@@ -8,35 +8,26 @@ import numpy as np
 import pytest
 
 from solver.accuracy.certificate import certify
-from solver.arguments import worn_model
 from solver.outcome import Outcome
 from solver.results.history import first_cut_off, judge
 from solver.results.state_report import LOOP_PHASES, periodic_state, report_state
 from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
-from solver.structure.joint import build_case
 from studies import build_scene
-from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
+from tests.solver.models import ALL_KINDS, branch_states, march_wear, scene, worn_state
 from tests.solver.reconstruction import full_motion, harmonic_structure, pair_period, series
 from tests.studyrunner.faked_runs import history
 
 # --- states ---
 
 FRICTION = 0.4
-AMPLITUDE = 60.0
 SETTINGS = SolverSettings(harmonics=3, samples=64, tolerance=1e-10)
-KINDS = {
-    "3d": ("3d", "3d", "3d"),
-    "mixed": ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent"),
-}
+KINDS = {"3d": ("3d",) * 3, "mixed": ALL_KINDS}
 
 
 @lru_cache
 def periodic(kinds):
-    worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(KINDS[kinds]))
-    case = build_case(worn_model(random_model(1, KINDS[kinds]), worn), FRICTION, OMEGA, SETTINGS)
-    point = first_point(case, OMEGA, AMPLITUDE)
-    joint = case.joint(OMEGA, AMPLITUDE)
+    joint, point = worn_state(KINDS[kinds], SETTINGS)
     return joint, point, periodic_state(joint, point)
 
 
