@@ -23,7 +23,6 @@ from fretwear import (
     Study,
     UserError,
     backbone,
-    build_model,
     build_scene,
     frequency_response,
     integrate_mission,
@@ -154,18 +153,6 @@ def test_several_processes_do_not_compute_the_same(tmp_path, monkeypatch):
 
 
 # --- one joint ---
-
-
-@pytest.mark.slow
-def test_the_response_without_friction_is_linear():
-    mass, damping, stiffness = np.diag([0.1, 0.2]), np.diag([2.0, 3.0]), np.array([[3e5, -1e5], [-1e5, 2e5]])
-    given = {"load_harmonic": [1.0, 2.0j], "normal_load": 5.0, "response": [[1.0, 1.0], [0.0, 2.0]]}
-    model = build_model(mass, damping, stiffness, [[-1, 1, -1]], 1e-4, **given)
-    curve = frequency_response(model, [250.0, 90.0], 3.0, 0.0, sweep="ramp")
-    for place, frequency in enumerate(curve.frequency):
-        omega = 2.0 * np.pi * frequency
-        exact = np.linalg.solve(stiffness - omega**2 * mass + 1j * omega * damping, 3.0 * np.array([1.0, 2.0j]))
-        np.testing.assert_allclose(curve.response[place], [exact.sum(), 2.0 * exact[1]], rtol=1e-9)
 
 
 @pytest.mark.slow

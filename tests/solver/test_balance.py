@@ -11,10 +11,7 @@ from solver.settings import Resolution, SolverSettings
 from tests.solver.models import ALL_KINDS, cyclic_model, random_balance, random_model, scene, with_free_masses
 
 SETTINGS = SolverSettings(3, 24)
-MODELS = {
-    "3d": ("3d", "3d", "3d", "3d"),
-    "mixed": ALL_KINDS,
-}
+MODELS = {"3d": ("3d",) * 4, "mixed": ALL_KINDS}
 
 
 def jacobian_by_differences(balance, predicted, step):
