@@ -137,14 +137,6 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
 # --- penalty ---
 
 
-@pytest.mark.parametrize(
-    ("name", "omega", "inertial"),
-    [("sdof_slider", 2 * np.pi * 160, True), ("two_masses", 0.5, True), ("vibro_impact", 1.2, False)],
-)
-def test_a_mass_directly_on_a_slider_is_marched_with_its_mass(name, omega, inertial):
-    assert build_penalty(scene(name, 5), omega, 5).inertial.tolist() == [inertial]
-
-
 def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness():
     model = dovetail()
     penalty = build_penalty(model, 2 * np.pi * 212.0, 3)
