@@ -3,10 +3,7 @@
 All of them are general in their parameters, in SI units, and share no code with the solver.
 """
 
-from collections.abc import Callable
-
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
@@ -18,7 +15,7 @@ class StopsOccurError(ValueError):
     """Den Hartog's closed form does not hold: the mass stops, or its amplitude has no bound."""
 
 
-def den_hartog_amplitude(mass: float, stiffness: float, force: float, friction_force: float, omega: float) -> float:
+def den_hartog_amplitude(mass, stiffness, force, friction_force, omega) -> float:
     """Amplitude, m, of a mass on a spring under force cos(omega t) with rigid Coulomb friction alone, without stops.
 
     Den Hartog (1931): `X = sqrt(V^2 - (F_f/F)^2 G^2) F/k`, `V = 1/(1 - r^2)`,
@@ -41,9 +38,8 @@ def den_hartog_amplitude(mass: float, stiffness: float, force: float, friction_f
         raise StopsOccurError(f"no motion without stops: friction {friction_force} N, force {force} N, ratio {r}")
     amplitude = float(np.sqrt(square) * force / stiffness)
 
-    def needed(tau: FloatArray) -> FloatArray:
-        ratio: FloatArray = (np.sin(tau) + r * g * (np.cos(r * tau) - np.cos(tau))) / (r * np.sin(r * tau))
-        return ratio
+    def needed(tau):
+        return (np.sin(tau) + r * g * (np.cos(r * tau) - np.cos(tau))) / (r * np.sin(r * tau))
 
     taus = np.linspace(0, np.pi / r, 4001)[1:-1]
     best = int(np.argmax(needed(taus)))
@@ -55,17 +51,7 @@ def den_hartog_amplitude(mass: float, stiffness: float, force: float, friction_f
     return amplitude
 
 
-def coulomb_orbit(
-    mass: ArrayLike,
-    damping: ArrayLike,
-    stiffness: ArrayLike,
-    load: ArrayLike,
-    friction_dof: int,
-    friction_force: float,
-    omega: float,
-    *,
-    transient: int = 30,
-) -> Orbit:
+def coulomb_orbit(mass, damping, stiffness, load, friction_dof, friction_force, omega, *, transient=30) -> Orbit:
     """Periodic motion of `M x'' + C x' + K x + lambda = Re(load exp(i omega t))` from rest.
 
     mass, damping, stiffness (n, n); load (n,), N, may be complex. lambda acts on `friction_dof` alone, which may have
@@ -79,9 +65,7 @@ def coulomb_orbit(
     return ContactPair(*given, None, friction_dof, friction_force, 0.0, 1.0, omega).orbit_from_rest(transient)
 
 
-def slider_orbit(
-    mass: float, damping: float, stiffness: float, force: float, friction_force: float, omega: float
-) -> Orbit:
+def slider_orbit(mass, damping, stiffness, force, friction_force, omega) -> Orbit:
     """Periodic motion of one mass under force cos(omega t) with rigid Coulomb friction, sticking allowed.
 
     Raises NoPeriodicMotionError.
@@ -89,9 +73,7 @@ def slider_orbit(
     return coulomb_orbit([[mass]], [[damping]], [[stiffness]], [force], 0, friction_force, omega)
 
 
-def slider_amplitude(
-    mass: float, damping: float, stiffness: float, force: float, friction_force: float, omega: float
-) -> float:
+def slider_amplitude(mass, damping, stiffness, force, friction_force, omega) -> float:
     """A quarter of the distance, m, that the mass of `slider_orbit` slides in a period: its amplitude.
 
     Closed where Den Hartog's form holds, from the events elsewhere. Raises NoPeriodicMotionError.
@@ -108,16 +90,15 @@ def slider_amplitude(
 
 
 def slider_wear_depth(
-    cycles: ArrayLike, amplitude: Callable[[float], float], *, wear: float = 1.1e-11, friction: float = 0.5,
-    area: float = 1e-4, load: float = 10.0, stiffness: float = 1e5,
-) -> FloatArray:  # fmt: skip
+    cycles, amplitude, *, wear=1.1e-11, friction=0.5, area=1e-4, load=10.0, stiffness=1e5
+) -> FloatArray:
     """Wear depth W, m, at cycle counts (ascending, the first 0) of a slider that a spring presses.
 
     Integrates `dW/dcycle = (k_w / alpha) N 4 X(mu N)`, `N = N_0 - k_N W`, where `amplitude(friction_force)` is X, m.
     wear: 1/Pa; area: m2; load, stiffness: N_0, N, and k_N, N/m, of the spring. Defaults are those of `sdof_slider`.
     """
 
-    def rate(_: float, depth: FloatArray) -> FloatArray:
+    def rate(_, depth):
         normal = max(load - stiffness * float(depth[0]), 0.0)
         return np.array([wear / area * normal * 4.0 * amplitude(friction * normal) if normal else 0.0])
 
@@ -126,13 +107,10 @@ def slider_wear_depth(
     found = solve_ivp(rate, (counts[0], counts[-1]), [0.0], method="DOP853", t_eval=counts, rtol=1e-11, atol=atol)
     if not found.success:
         raise RuntimeError(found.message)
-    depths: FloatArray = found.y[0]
-    return depths
+    return found.y[0]
 
 
-def vibro_impact_orbit(
-    mass: float, damping: float, stiffness: float, force: float, wall: float, gap: float, omega: float, begin: float
-) -> Orbit:
+def vibro_impact_orbit(mass, damping, stiffness, force, wall, gap, omega, begin) -> Orbit:
     """Periodic motion of a mass on a spring that meets an elastic wall at the distance `gap`, under force cos(omega t).
 
     wall: N/m. gap < 0: the wall presses on the resting mass. The branch is the one that a sweep reaches from rest at

@@ -23,7 +23,6 @@ from fretwear import (
     Study,
     UserError,
     backbone,
-    build_model,
     build_scene,
     frequency_response,
     integrate_mission,
@@ -76,8 +75,8 @@ def test_importing_loads_no_more_than_is_needed():
     """The commands say how many threads there are to be before numpy is loaded; what takes long to load, each rank of
     each run would load."""
     code = """
-import sys, solver, studies, studyrunner
-print({'numpy', 'pydantic', 'xarray', 'numba'} & set(sys.modules))
+import sys, solver, studies.scenes, studyrunner
+print({'numpy', 'scipy', 'pydantic', 'h5py', 'xarray', 'numba'} & set(sys.modules))
 import studyrunner.run
 late = {'matplotlib', 'netCDF4', 'pandas', 'rich', 'xarray'}
 late |= {'scipy.optimize', 'scipy.spatial', 'scipy.special', 'scipy.stats'}
@@ -156,24 +155,6 @@ def test_several_processes_do_not_compute_the_same(tmp_path, monkeypatch):
 # --- one joint ---
 
 
-def slider(**changes):
-    """The mass of Den Hartog's case from matrices: 0.1 kg on 1.6e5 N/m, pressed by 10 N."""
-    given = {"load_harmonic": [1.0], "normal_load": 10.0, "response_names": ["mass"]} | changes
-    return build_model([[0.1]], None, [[1.6e5]], [[-1, 0, -1]], 1e-4, **given)
-
-
-@pytest.mark.slow
-def test_the_response_without_friction_is_linear():
-    mass, damping, stiffness = np.diag([0.1, 0.2]), np.diag([2.0, 3.0]), np.array([[3e5, -1e5], [-1e5, 2e5]])
-    given = {"load_harmonic": [1.0, 2.0j], "normal_load": 5.0, "response": [[1.0, 1.0], [0.0, 2.0]]}
-    model = build_model(mass, damping, stiffness, [[-1, 1, -1]], 1e-4, **given)
-    curve = frequency_response(model, [250.0, 90.0], 3.0, 0.0, sweep="ramp")
-    for place, frequency in enumerate(curve.frequency):
-        omega = 2.0 * np.pi * frequency
-        exact = np.linalg.solve(stiffness - omega**2 * mass + 1j * omega * damping, 3.0 * np.array([1.0, 2.0j]))
-        np.testing.assert_allclose(curve.response[place], [exact.sum(), 2.0 * exact[1]], rtol=1e-9)
-
-
 @pytest.mark.slow
 def test_one_joint_gives_the_bits_of_a_study(result):
     """In tests BLAS has one thread, as in a run."""
@@ -243,11 +224,11 @@ def test_results_are_datasets_files_pictures_and_five_lines(tmp_path):
 
 
 def test_a_point_that_fails_is_one_point():
-    settings = SolverSettings(time_limit=0.0)
-    curve = frequency_response(slider(), [150.0], 10.0, 0.5, settings=settings)
+    model, settings = build_scene("sdof_slider"), SolverSettings(time_limit=0.0)
+    curve = frequency_response(model, [150.0], 10.0, 0.5, settings=settings)
     assert curve.outcome == (Outcome.TIME_LIMIT,)
     assert np.isnan(curve.response).all()
-    history = march_wear(slider(), 150.0, 10.0, 0.5, 1e-11, 1e4, settings=settings)
+    history = march_wear(model, 150.0, 10.0, 0.5, 1e-11, 1e4, settings=settings)
     assert history.outcome is Outcome.TIME_LIMIT
     assert history.cycles.tolist() == [0.0, 1e4]
     assert "time_limit" in repr(history)

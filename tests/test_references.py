@@ -5,16 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from solver import SolverSettings, backbone, build_model
+from tests import references
 from tests.benchmarks import time_integration as in_time
 from tests.benchmarks.free_decay import decay_of, free_decay
-from tests.references import (
-    coulomb_orbit,
-    den_hartog_amplitude,
-    slider_amplitude,
-    slider_orbit,
-    slider_wear_depth,
-    vibro_impact_orbit,
-)
 from tests.solver.models import scene
 
 TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2)
@@ -24,7 +17,7 @@ VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
 @pytest.mark.parametrize("case", [(0.7, 0.1, 0.6), (0.4, 0.02, 0.5), (1.2, 0.3, 0.3)])
 def test_slider_with_damping_balances_its_energy(case):
     omega, damping, friction = case
-    orbit = slider_orbit(1.0, damping, 1.0, 1.0, friction, omega)
+    orbit = references.slider_orbit(1.0, damping, 1.0, 1.0, friction, omega)
     # Work of cos(omega t) on Re(X exp(i omega t)) in a period is -pi Im X.
     work = -np.pi * orbit.harmonic(0).imag
     speed = orbit.sample(4096)[1]
@@ -34,7 +27,7 @@ def test_slider_with_damping_balances_its_energy(case):
 
 @pytest.mark.parametrize(("omega", "first", "second"), [(0.4, 25.21813, 31.60782), (0.6, 139.0437, 217.1278)])
 def test_two_masses_have_the_known_first_harmonics(omega, first, second):
-    orbit = coulomb_orbit(*TWO_MASSES, omega)
+    orbit = references.coulomb_orbit(*TWO_MASSES, omega)
     assert abs(orbit.harmonic(0)) == pytest.approx(first, rel=3e-7)
     assert abs(orbit.harmonic(1)) == pytest.approx(second, rel=3e-7)
     assert abs(orbit.harmonic(1, 0)) < 1e-9 * second
@@ -46,7 +39,7 @@ def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase():
     damping = 0.02 * stiffness + 0.01 * mass
     load = np.array([1.0, 0.5j, 0])
     for dof in range(3):
-        orbit = coulomb_orbit(mass, damping, stiffness, load, dof, 0.3, 1.1)
+        orbit = references.coulomb_orbit(mass, damping, stiffness, load, dof, 0.3, 1.1)
         motion = np.array([orbit.harmonic(index) for index in range(3)])
         taken_up = load - (stiffness - 1.1**2 * mass + 1.1j * damping) @ motion
         assert np.delete(taken_up, dof) == pytest.approx(0, abs=1e-10)
@@ -56,7 +49,7 @@ def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase():
 
 @pytest.mark.parametrize(("omega", "known"), [(1.2, 0.1146716), (1.5, 0.1889205)])
 def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega, known):
-    orbit = vibro_impact_orbit(*VIBRO_IMPACT, omega, begin=0.85)
+    orbit = references.vibro_impact_orbit(*VIBRO_IMPACT, omega, begin=0.85)
     assert {segment.phase for segment in orbit.segments} == {"open", "closed"}
     assert abs(orbit.harmonic(0)) == pytest.approx(known, rel=3e-7)
 
@@ -88,8 +81,8 @@ def test_the_differences_are_exact_for_the_excitation():
 def test_a_mass_on_rigid_ground_moves_as_in_den_hartogs_closed_form():
     """Of first order, with some noise: the mass turns on whole steps."""
     model = scene("sdof_slider", normal_stiffness=0.0)
-    path = 4.0 * den_hartog_amplitude(MASS, STIFFNESS, FORCE, 5.0, OMEGA)
-    first = abs(slider_orbit(MASS, 0.0, STIFFNESS, FORCE, 5.0, OMEGA).harmonic(0))
+    path = 4.0 * references.den_hartog_amplitude(MASS, STIFFNESS, FORCE, 5.0, OMEGA)
+    first = abs(references.slider_orbit(MASS, 0.0, STIFFNESS, FORCE, 5.0, OMEGA).harmonic(0))
     errors = []
     for n_steps in (200, 3200):
         structure = in_time.build(model, 0.5, FREQUENCY, FORCE, n_steps)
@@ -113,7 +106,9 @@ def test_wear_of_a_slider_follows_its_differential_equation():
     for part in (np.full(1, 0.0), np.full(1, 1e-9)):
         assert in_time.at_rest(model, structure, part).force[0] == pytest.approx(10.0 - 1e5 * part[0], rel=1e-6)
     *_, (cycle, depth, _) = in_time.wear(model, structure, motion, 1.1e-11, 600.0, 1e5)
-    exact = slider_wear_depth([0.0, 1e5], lambda limit: slider_amplitude(MASS, 8.0, STIFFNESS, FORCE, limit, OMEGA))
+    exact = references.slider_wear_depth(
+        [0.0, 1e5], lambda limit: references.slider_amplitude(MASS, 8.0, STIFFNESS, FORCE, limit, OMEGA)
+    )
     assert cycle == pytest.approx(1e5)
     assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
 

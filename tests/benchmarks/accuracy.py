@@ -11,9 +11,7 @@ error above the tolerance or above twice its estimate.
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from tests.benchmarks.frame import Table, arguments
-from tests.cantilever import FRICTION, Cantilever
-from tests.solver.exact_scenes import SPRINGS, exact_tip, find, reported_tip, textbook_scenes
-from tests.solver.models import branch_states
+from tests.solver.exact_scenes import SPRINGS, find, textbook_scenes, tip_errors
 
 CANTILEVERS = [  # spring, force, N, frequency, rad/s
     *((name, *at) for name in ("rigid", "stiff spring") for at in ((3.0, 0.7), (3.0, 0.96), (6.0, 0.85))),
@@ -34,10 +32,7 @@ def exact_states(rtol: float) -> None:
 def cantilevers(rtol: float) -> None:
     table = Table(f"rtol {rtol:g}", "N", "rad/s", "response", "peak", "estimate", "good")
     for name, force, omega in CANTILEVERS:
-        model, settings = Cantilever(spring=SPRINGS[name]).model(), SolverSettings(rtol=rtol)
-        (start,) = branch_states(model, FRICTION, force, [omega], settings)
-        found = zip(reported_tip(model, start, settings), exact_tip(name, force, omega), strict=True)
-        errors = [float(abs(own / true - 1.0)) for own, true in found]
+        start, errors = tip_errors(name, force, omega, SolverSettings(rtol=rtol))
         good = 0.5 * max(errors) < start.response_error <= rtol and max(errors) < rtol
         table.row(name, force, omega, *errors, start.response_error, "yes" if good else "no")
 

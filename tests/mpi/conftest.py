@@ -17,11 +17,8 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture(scope="package", autouse=True)
 def default_signals():
     """Whoever runs the tests may ignore signals, as in the background or under nohup: what they start would, too."""
-    handlers = {
-        signal.SIGINT: signal.default_int_handler,
-        signal.SIGHUP: signal.SIG_DFL,
-        signal.SIGUSR1: signal.SIG_DFL,
-    }
+    handlers = {signal.SIGINT: signal.default_int_handler}
+    handlers |= dict.fromkeys((signal.SIGHUP, signal.SIGUSR1), signal.SIG_DFL)
     before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     yield
     for number, handler in before.items():

@@ -101,24 +101,18 @@ class Running:
         return {int(number): pid for pid, number in numbers.items() if number is not None} or {0: self.process.pid}
 
 
-def run_command(
-    command: Sequence[str],
-    folder: Path,
-    environment: Mapping[str, str] | None = None,
-    disturb: Callable[[Running], object] = lambda _: None,
-) -> Ended:
+def run_command(command, folder, environment=None, disturb=lambda _: None) -> Ended:
     """A command to its end, with `disturb` called once it has started; never hangs.
 
     Fails where a process outlives the command.
     """
     mark = uuid.uuid4().hex
-    own = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", _MARK: mark}
+    surroundings = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", _MARK: mark}
+    surroundings |= environment or {}
     with (
         tempfile.TemporaryFile() as stdout,
         tempfile.TemporaryFile() as stderr,
-        subprocess.Popen(
-            command, cwd=folder, env={**os.environ, **own, **(environment or {})}, stdout=stdout, stderr=stderr
-        ) as process,
+        subprocess.Popen(command, cwd=folder, env=surroundings, stdout=stdout, stderr=stderr) as process,
     ):
         running = Running(process, stderr, mark)
         try:

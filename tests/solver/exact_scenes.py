@@ -20,7 +20,7 @@ from tests.cantilever import FRICTION, Cantilever
 from tests.contact_pair import ContactPair
 from tests.event_driven import Orbit
 from tests.random_scenes import log_uniform as _spread
-from tests.solver.models import march_wear
+from tests.solver.models import branch_states, march_wear
 
 
 @dataclass(frozen=True)
@@ -118,17 +118,7 @@ def slider(random: np.random.Generator, lowest: float = 0.5, highest: float = 1.
     return slid(m, damping, k, load, friction, force, ratio * np.sqrt(k / m), random.choice([0.0, k]))
 
 
-def slid(
-    mass: float,
-    damping: float,
-    stiffness: float,
-    load: float,
-    friction: float,
-    force: float,
-    omega: float,
-    pressing: float = 0.0,
-    swing: complex = 0.0,
-) -> Scene:
+def slid(mass, damping, stiffness, load, friction, force, omega, pressing=0.0, swing=0.0) -> Scene:
     """A mass on a slider. pressing: stiffness, N/m, of a spring at the pair, or 0. swing: harmonic part of the normal
     force, N, which takes a spring.
     """
@@ -191,9 +181,7 @@ def grazing(random: np.random.Generator) -> Scene:
     return wall(ratio, gap, damping, _spread(random, 5.0, 300.0), random.uniform(0.0, 2.0 * np.pi))
 
 
-def behind_spring(
-    tangential: float, damping: float, limit: float, omega: float, force: complex = 1.0, units: float = 1.0
-) -> Scene:
+def behind_spring(tangential, damping, limit, omega, force=1.0, units=1.0) -> Scene:
     """Jenkins' element on a mass, its mount of stiffness 1 N/m and the mass 1 kg, all forces and stiffnesses times
     `units`. damping: N s/m. limit: of friction, N.
     """
@@ -211,13 +199,18 @@ def jenkins(random: np.random.Generator) -> Scene:
     return behind_spring(tangential, damping, limit, omega, 1.0, _spread(random, 1e-3, 1e3))
 
 
+def barely_slipping(tangential, damping, omega, over, phase=0.7) -> Scene:
+    """Elastic dry friction whose limit is exceeded by a share `over` if it sticks. phase: rad, of the excitation."""
+    stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
+    return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(1j * phase))
+
+
 def slipping_little(random: np.random.Generator) -> Scene:
     """Elastic dry friction next to the onset of slip."""
     tangential, damping = _spread(random, 0.1, 30.0), random.uniform(0.01, 0.1)
     omega = random.uniform(0.3, 1.5) * np.sqrt(1.0 + tangential)
-    stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
     over = random.choice([-1.0, 1.0, 1.0, 1.0]) * _spread(random, 1e-4, 0.2)
-    return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(2j * np.pi * random.random()))
+    return barely_slipping(tangential, damping, omega, over, 2.0 * np.pi * random.random())
 
 
 def inclined(random: np.random.Generator) -> Scene:
@@ -284,7 +277,10 @@ def exact_tip(name: str, force: float, omega: float) -> tuple[complex, float]:
     return complex(first), float(np.abs(tip @ orbit.sample(4096)[: tip.size]).max())
 
 
-def reported_tip(model: ReducedModel, start: StartState, settings: SolverSettings) -> tuple[complex, float]:
-    """The same as reported of an unworn state."""
+def tip_errors(name: str, force: float, omega: float, settings: SolverSettings) -> tuple[StartState, list[float]]:
+    """An unworn state, and the relative errors of what is reported of its tip."""
+    model = Cantilever(spring=SPRINGS[name]).model()
+    (start,) = branch_states(model, FRICTION, force, [omega], settings)
     history = march_wear(model, FRICTION, start, 0.0, 1.0, "explicit", np.zeros(1), settings)
-    return complex(history.response[0, 0]), float(history.response_peak[0, 0])
+    found = history.response[0, 0], history.response_peak[0, 0]
+    return start, [float(abs(own / true - 1.0)) for own, true in zip(found, exact_tip(name, force, omega), strict=True)]

@@ -1,6 +1,6 @@
 """Small models for the tests of the solver, all seeded, and the textbook and dovetail scenes at a small size."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
@@ -8,21 +8,22 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
+from solver.arguments import worn_model
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.loading_history.start_states import follow_branch
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
 from solver.newton.run import Run
-from solver.packing import Packed
 from solver.results.history import StartState, WearHistory
-from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
-from solver.structure.joint import Case, build_case
+from solver.settings import Resolution, SolverSettings, first_resolution
+from solver.structure.joint import Case, Joint, build_case
 from solver.wear.history import integrate_together
 from solver.wear.wearing_joint import WearRequest, steps_of
 from studies.scenes import build_scene, scene_parameters
 from tests.random_scenes import COMPONENTS, definite
 
+ALL_KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent")
 STIFFNESS = 1e7  # N/m
 MASS = 5.0  # kg
 PRELOAD = 100.0  # N on a pair
@@ -140,18 +141,18 @@ def dovetail(n_harmonics: int = 3, nodal_diameter: int = 0) -> ReducedModel:
     return scene("dovetail_sector", n_harmonics, mesh=1, nodal_diameter=nodal_diameter)
 
 
-def branch_states(
-    model: ReducedModel,
-    friction: float,
-    amplitude: float,
-    omegas: Sequence[float],
-    settings: SolverSettings,
-    sweep: str = "up",
-) -> list[StartState]:
+def branch_states(model, friction, amplitude, omegas, settings, sweep="up") -> list[StartState]:
     """Start states at angular frequencies, rad/s, ascending."""
     frequencies = np.asarray(omegas, float) / (2.0 * np.pi)
     found = dict(follow_branch(model, friction, amplitude, frequencies, sweep, settings))
     return [found[index] for index in range(len(omegas))]
+
+
+def worn_state(kinds: Sequence[str], settings: SolverSettings) -> tuple[Joint, State]:
+    """A random joint, worn a little, whose pairs stick, slip and open, and its state."""
+    worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(kinds))
+    case = build_case(worn_model(random_model(1, kinds), worn), 0.4, OMEGA, settings)
+    return case.joint(OMEGA, 60.0), first_point(case, OMEGA, 60.0)
 
 
 def first_point(case: Case, omega: float, amplitude: float) -> State:
@@ -162,22 +163,11 @@ def first_point(case: Case, omega: float, amplitude: float) -> State:
 
 
 def march_wear(
-    model: ReducedModel,
-    friction_coefficient: float | FloatArray | None,
-    start: StartState,
-    wear_coefficient: float,
-    step: float,
-    scheme: Scheme,
-    cycles: FloatArray | ToTheEnd,
-    settings: SolverSettings,
-    *,
-    keep: Callable[[Packed], None] | None = None,
-    resume: Packed | None = None,
-    **asked: Any,
+    model, friction, start, wear_coefficient, step, scheme, cycles, settings, *, keep=None, resume=None, **asked
 ) -> WearHistory:
     """The history from a start state; asked: what else `WearRequest` has."""
     wanted = WearRequest(wear_coefficient, steps_of(scheme, step, settings.rtol, None), cycles, **asked)
-    return next(integrate_together(model, friction_coefficient, settings, start, (wanted,), keep, resume))
+    return next(integrate_together(model, friction, settings, start, (wanted,), keep, resume))
 
 
 def glued_frequency(model: ReducedModel) -> float:

@@ -35,12 +35,6 @@ from tests.solver.models import scene as bundled
 SETTINGS = SolverSettings()
 
 
-@pytest.fixture
-def presented(monkeypatch):
-    """Unstable states are handed out, to be looked at here."""
-    monkeypatch.setattr(start_states, "find_instability", lambda *_: None)
-
-
 def start_of(model, friction, excitation, frequency):
     ((_, start),) = follow_branch(model, friction, excitation, np.array([frequency]), "up", SETTINGS)
     return start
@@ -53,7 +47,6 @@ def largest(multipliers):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("presented")
 @pytest.mark.parametrize(
     ("kind", "seed", "allowed"),
     [
@@ -66,7 +59,9 @@ def largest(multipliers):
         ("inclined", 8, 0.01),
     ],
 )
-def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed):
+def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed, monkeypatch):
+    # unstable states are handed out, to be looked at here
+    monkeypatch.setattr(start_states, "find_instability", lambda *_: None)
     scene = drawn(kind, seed)
     start = start_of(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
     case = build_case(scene.model, scene.friction, start.penalty_omega, SETTINGS, start.resolution)

@@ -10,20 +10,18 @@ from solver.accuracy import refinement
 from solver.accuracy.certificate import certify
 from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import Estimate, ResolvedState
-from solver.arguments import worn_model
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.run import Run
 from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.joint import build_case
-from tests.solver.models import OMEGA, branch_states, first_point, random_model, scene
+from tests.solver.models import ALL_KINDS, OMEGA, branch_states, first_point, random_model, scene, worn_state
 
 # --- certificates ---
 
 TOLERANCE = SolverSettings().tolerance
 SLIDER = ("sdof_slider", 0.5, 10.0, 2 * np.pi * 160.0)
-ALL_KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent")
 
 
 @lru_cache
@@ -37,10 +35,8 @@ def on_branch(name, friction, amplitude, omega, n_harmonics):
 
 @lru_cache
 def random_state():
-    """Elastic joint with pairs that stick, slip and open."""
-    worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(ALL_KINDS))
-    case = build_case(worn_model(random_model(1, ALL_KINDS), worn), 0.4, OMEGA, SolverSettings(5, 128))
-    return case.joint(OMEGA, 60.0), first_point(case, OMEGA, 60.0).evaluation
+    joint, state = worn_state(ALL_KINDS, SolverSettings(5, 128))
+    return joint, state.evaluation
 
 
 def failing(joint, evaluation):

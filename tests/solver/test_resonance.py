@@ -14,7 +14,6 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.state_report import periodic_state, resonance_frequency
 from solver.settings import FollowedFrequency, Resolution, Scheme, SolverSettings, all_orders
-from studies.scenes import build_scene, scene_parameters
 from tests.references import slider_orbit
 from tests.solver.models import assert_same, dovetail, random_balance, random_model, scene
 from tests.solver.models import march_wear as march_from
@@ -155,16 +154,6 @@ def test_outside_its_range_a_resonance_ends_the_history(between, n_known, said):
     assert known.sum() <= n_known
     assert known[0] == (n_known > 0)
     np.testing.assert_allclose(history.excitation_frequency[known], worn().excitation_frequency[known], atol=0.05)
-
-
-@pytest.mark.slow
-def test_stable_states_whose_samples_are_few_do_not_end_the_sweep():
-    """128 samples find a stable state of many pairs that slip and open, at 273.81 Hz, unstable."""
-    damper = build_scene("underplatform_damper", scene_parameters("underplatform_damper")(nodal_diameter=2), 20)
-    follow = FollowedFrequency("resonance", 240.0, 295.0)
-    ((_, found),) = follow_branch(damper, 0.3, 0.2, follow, "up", SolverSettings(rtol=3e-2))
-    assert found.outcome is Outcome.CONVERGED
-    assert found.state.omega / (2.0 * np.pi) == pytest.approx(274.42, abs=0.06)
 
 
 def test_a_resonance_that_the_sweep_jumps_over_is_none_of_its_states():

@@ -8,35 +8,26 @@ import numpy as np
 import pytest
 
 from solver.accuracy.certificate import certify
-from solver.arguments import worn_model
 from solver.outcome import Outcome
 from solver.results.history import first_cut_off, judge
 from solver.results.state_report import LOOP_PHASES, periodic_state, report_state
 from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
-from solver.structure.joint import build_case
 from studies import build_scene
-from tests.solver.models import OMEGA, branch_states, first_point, march_wear, random_model, scene
+from tests.solver.models import ALL_KINDS, branch_states, march_wear, scene, worn_state
 from tests.solver.reconstruction import full_motion, harmonic_structure, pair_period, series
 from tests.studyrunner.faked_runs import history
 
 # --- states ---
 
 FRICTION = 0.4
-AMPLITUDE = 60.0
 SETTINGS = SolverSettings(harmonics=3, samples=64, tolerance=1e-10)
-KINDS = {
-    "3d": ("3d", "3d", "3d"),
-    "mixed": ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent"),
-}
+KINDS = {"3d": ("3d",) * 3, "mixed": ALL_KINDS}
 
 
 @lru_cache
 def periodic(kinds):
-    worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(KINDS[kinds]))
-    case = build_case(worn_model(random_model(1, KINDS[kinds]), worn), FRICTION, OMEGA, SETTINGS)
-    point = first_point(case, OMEGA, AMPLITUDE)
-    joint = case.joint(OMEGA, AMPLITUDE)
+    joint, point = worn_state(KINDS[kinds], SETTINGS)
     return joint, point, periodic_state(joint, point)
 
 
@@ -53,12 +44,9 @@ def test_the_contact_force_is_that_of_the_plain_law(kinds):
     predicted_h = state.contact_force_h + eps[:, :, None] * moved
     predicted_h[model.contact.dofs[:, 0] < 0, 0, 1:] = 0.0
     predicted_t = series(predicted_h, SETTINGS.samples)
-    forces = np.array(
-        [
-            pair_period(predicted_t[pair], FRICTION, penalty.tangential[pair] * state.start_history[pair], 8)[0]
-            for pair in range(model.contact.n_contact)
-        ]
-    )
+    begin = penalty.tangential[:, None] * state.start_history
+    pairs = zip(predicted_t, begin, strict=True)
+    forces = np.array([pair_period(predicted, FRICTION, start, 8)[0] for predicted, start in pairs])
     size = np.abs(state.contact_force_h).max()
     assert forces[:, 1:] @ joint.basis.analysis == pytest.approx(state.contact_force_h[:, 1:], abs=1e-9 * size)
     # normal forces are averaged up to the instant of opening: near those of 64 times the samples, Eq. (11)
@@ -79,9 +67,8 @@ def test_the_report_is_that_of_the_time_signals(kinds):
     phase = 2 * np.pi * np.arange(FINE_SAMPLES) / FINE_SAMPLES
     waves = sum(np.real(responses[n][:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
     assert report["response_peak"] == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
-    assert report["mean_pressure"] == pytest.approx(
-        state.contact_force_h[:, 0, 0] / model.contact.area, rel=1e-12, abs=0.0
-    )
+    pressure = state.contact_force_h[:, 0, 0] / model.contact.area
+    assert report["mean_pressure"] == pytest.approx(pressure, rel=1e-12, abs=0.0)
     assert report["open_fraction"] == pytest.approx((at.force_t[:, 0] == 0).mean(axis=1))
     slip = at.state_t / joint.penalty.tangential[:, None, None]
     for pair in range(model.contact.n_contact):

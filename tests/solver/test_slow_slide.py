@@ -69,11 +69,8 @@ def test_projections_are_those_of_a_general_optimiser():
     for first, last, state in (path for seed in range(60) if (path := random_path(seed)) is not None):
         place = state
         for part in range(1, PARTS + 1):
-            place = (
-                None
-                if place is None
-                else nearest(place, (first + part / PARTS * (last - first)) @ BASIS.synthesis, INSIDE)
-            )
+            if place is not None:
+                place = nearest(place, (first + part / PARTS * (last - first)) @ BASIS.synthesis, INSIDE)
         found = slid(first @ BASIS.synthesis, last @ BASIS.synthesis, state)
         # the discs of some have no common point on the way
         if place is not None and (found != state).any():
@@ -126,18 +123,7 @@ def test_jacobian_with_the_way_to_a_state_is_that_of_central_differences(wear):
 @pytest.mark.slow
 def test_a_root_that_slides_for_long_wears_as_in_short_steps():
     """With one slide for each step the worn volume at 1e-2 was 3 % off."""
-    model, cycles = scene("dovetail_sector", 21, mesh=1), [0.0, 275967.85]
-    loose, tight = (
-        solver.march_wear(
-            model,
-            212.42951760611248,
-            1.1941769464308571,
-            0.6184272339579265,
-            4.580559825081128e-12,
-            cycles,
-            sweep="ramp",
-            settings=SolverSettings(9, 128, rtol=rtol),
-        )
-        for rtol in (1e-2, 1e-3)
-    )
+    case = 212.42951760611248, 1.1941769464308571, 0.6184272339579265, 4.580559825081128e-12, [0.0, 275967.85]
+    model, settings = scene("dovetail_sector", 21, mesh=1), [SolverSettings(9, 128, rtol=rtol) for rtol in (1e-2, 1e-3)]
+    loose, tight = (solver.march_wear(model, *case, sweep="ramp", settings=each) for each in settings)
     assert loose.worn_volume[-1] == pytest.approx(tight.worn_volume[-1], rel=1e-3)

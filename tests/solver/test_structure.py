@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver import frequency_response, march_wear, with_contact_stiffness
+from solver import march_wear, with_contact_stiffness
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS as LARGEST
-from solver.compliant_contact import TANGENTIAL_RATIO
 from solver.model import needed_nodal_diameters
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, condense, frequency_slope
@@ -138,14 +137,6 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
 # --- penalty ---
 
 
-@pytest.mark.parametrize(
-    ("name", "omega", "inertial"),
-    [("sdof_slider", 2 * np.pi * 160, True), ("two_masses", 0.5, True), ("vibro_impact", 1.2, False)],
-)
-def test_a_mass_directly_on_a_slider_is_marched_with_its_mass(name, omega, inertial):
-    assert build_penalty(scene(name, 5), omega, 5).inertial.tolist() == [inertial]
-
-
 def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness():
     model = dovetail()
     penalty = build_penalty(model, 2 * np.pi * 212.0, 3)
@@ -181,21 +172,6 @@ def test_contact_forces_move_the_contact_by_the_springs_more(wave, contact_stiff
     assert joint.response_h(contact) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     # energy: the springs take none, so that what the excitation puts in leaves through the contact or the dampers
     assert joint.input_work(contact) == pytest.approx(body.input_work(moved), rel=1e-8)
-
-
-def test_a_stuck_block_on_its_foundation_is_a_mass_on_two_springs():
-    contact_stiffness = 5e9
-    block = build_scene("sdof_slider", normal_load=1e6, normal_stiffness=0.0, contact_stiffness=contact_stiffness)
-    spring = 1.6e5 + TANGENTIAL_RATIO * contact_stiffness * 1e-4
-    found = frequency_response(block, 300.0, 10.0, friction_coefficient=0.5).response[0, 0]
-    assert abs(found) == pytest.approx(10.0 / abs(spring - 0.1 * (2.0 * np.pi * 300.0) ** 2), rel=1e-9)
-
-
-def test_a_spring_that_presses_gives_way_to_rough_surfaces():
-    """The force is divided by 1 + k_N / (contact stiffness times area), as the pages of the scene say."""
-    block = build_scene("sdof_slider", contact_stiffness=2e10)
-    found = march_wear(block, 160.0, 10.0, 0.5, 0.0, [0.0], wear_depth=[2e-5])
-    assert 1e-4 * found.mean_pressure[0, 0] == pytest.approx((10.0 - 1e5 * 2e-5) / 1.05, rel=1e-9)
 
 
 @pytest.mark.slow

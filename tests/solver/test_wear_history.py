@@ -1,7 +1,5 @@
 """Wear histories against differential equations and time integrations; what is stored and read between their steps."""
 
-from functools import lru_cache
-
 import numpy as np
 import pytest
 
@@ -39,7 +37,6 @@ FEW = SolverSettings(harmonics=3, samples=128)
 FINE_OUTPUT = np.linspace(0.0, END, 101)
 
 
-@lru_cache
 def final_depth(step, scheme):
     history = march(step, scheme, np.array([0.0, END]))
     assert history.outcome is Outcome.CONVERGED
@@ -114,34 +111,22 @@ def test_a_response_at_a_depth_is_that_of_less_normal_force():
     assert set(worn.outcome) == {Outcome.CONVERGED}
 
 
-# --- where pairs slide or stick again ---
+# --- steps and their errors ---
 
 
-def steps_and_volume(scene_name: str, start: StartState, settings: SolverSettings, cycles: float) -> tuple[int, float]:
-    """Number of steps and worn volume, m3, of an adaptive history without its reference solution."""
-    model = scene(scene_name, 13, **({"mesh": 1} if scene_name == "dovetail_sector" else {}))
-    case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    asked = WearRequest(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles]))
-    ended = Integrator(np.inf).integrate(WearProblem(case, start, asked))
-    depth = ended.course.read(np.array([cycles]))["wear_depth"]
-    return len(ended.course.ends), float((depth @ model.contact.area)[0])
-
-
-@pytest.mark.slow
-def test_where_pairs_slide_or_stick_again_the_history_is_that_of_a_time_integration():
-    """Which is known to half a per cent. `tests/truth` has those of the finer mesh."""
-    history = march_model(scene("dovetail_sector", mesh=1), 212.6, 0.5, 0.5, WEAR, np.array([0.0, 1e5]))
-    apart = abs(1e9 * history.worn_volume[-1] / 1.810 - 1.0)
-    assert apart < history.error_estimate + 0.005
-    assert history.error_estimate < 0.01
+def steps_and_depth(rtol):
+    """Number of steps, and depth at the end, m, of an adaptive history without its reference solution."""
+    model, settings = scene("sdof_slider", 13), SolverSettings(13, 128, rtol=rtol)
+    (start,) = branch_states(model, FRICTION, 10.0, [OMEGA], settings)
+    case = build_case(model, FRICTION, start.penalty_omega, settings, start.resolution)
+    asked = WearRequest(WEAR, Adaptive(rtol), np.array([0.0, END]))
+    course = Integrator(np.inf).integrate(WearProblem(case, start, asked)).course
+    return len(course.ends), float(course.read(np.array([END]))["wear_depth"][0, 0])
 
 
 @pytest.mark.slow
 def test_the_slow_time_of_the_slider_is_of_second_order():
-    model, settings = scene("sdof_slider", 13), SolverSettings(13, 128)
-    (start,) = branch_states(model, 0.5, 10.0, [2.0 * np.pi * 160.0], settings)
-    given = [SolverSettings(13, 128, rtol=rtol) for rtol in (1e-2, 1e-3, 1e-6)]
-    (few, coarse), (many, fine), (_, finest) = (steps_and_volume("sdof_slider", start, one, 1e5) for one in given)
+    (few, coarse), (many, fine), (_, finest) = map(steps_and_depth, (1e-2, 1e-3, 1e-6))
     order = np.log(abs(coarse - finest) / abs(fine - finest)) / np.log(many / few)
     assert order > 1.7
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.scene_file import write_scene
+from tests.random_scenes import definite
 
 Change = Callable[[h5py.File], object]
 
@@ -15,17 +16,12 @@ Change = Callable[[h5py.File], object]
 def linear_model(n: int, *, hermitian: bool, seed: int) -> LinearModel:
     """Random structure with a massless first displacement."""
     random = np.random.default_rng(seed)
-
-    def definite(size: int) -> np.ndarray:
-        root = random.normal(size=(size, size)) + (1j * random.normal(size=(size, size)) if hermitian else 0)
-        matrix = root @ root.conj().T + np.eye(size)
-        return (matrix + matrix.conj().T) / 2
-
     mass = np.zeros((n, n), dtype=complex if hermitian else float)
-    mass[1:, 1:] = definite(n - 1)
+    mass[1:, 1:] = definite(random, n - 1, hermitian)
     response = random.normal(size=(2, n)) + (1j * random.normal(size=(2, n)) if hermitian else 0)
     load = random.normal(size=n), random.normal(size=n) + 1j * random.normal(size=n)
-    return LinearModel(mass, 0.01 * definite(n), 1e6 * definite(n), *load, response)
+    damping, stiffness = (size * definite(random, n, hermitian) for size in (0.01, 1e6))
+    return LinearModel(mass, damping, stiffness, *load, response)
 
 
 def general_model(linear: dict[int, LinearModel], n_sectors: int = 0, nodal_diameter: int = 0) -> ReducedModel:

@@ -97,9 +97,8 @@ def test_a_history_that_was_given_up_goes_on_with_more_time(monkeypatch):
     from solver.newton import run as newton
     from solver.wear import history
 
-    study = ["sdof_slider", *("--set", "axes.frequency=[160]"), *("--set", "axes.scheme=['implicit']")]
-    study += [*("--set", "solver.harmonics=5"), *("--set", "solver.samples=64"), *("--set", "axes.step=500")]
-    study += ["--set", "slow_time.cycles=100_000"]
+    study = ["sdof_slider", *options("axes.frequency=160", "axes.scheme=implicit", "axes.step=500")]
+    study += options("solver.harmonics=5", "solver.samples=64", "slow_time.cycles=100_000")
     assert main([*study, "-o", "whole.nc"]) == 0
     own, begun = history.integrate_together, []
     own_clock, n_looks = newton.computing_time, 0

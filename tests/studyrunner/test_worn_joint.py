@@ -114,9 +114,7 @@ def sliding(tmp_path):
 
 
 def half_width(study):
-    value = dict(study.scene.parameters)["half_width"]
-    assert isinstance(value, float)
-    return value
+    return dict(study.scene.parameters)["half_width"]
 
 
 def test_all_that_is_made_of_the_study_has_the_width_that_it_shows(sliding):

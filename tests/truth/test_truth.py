@@ -1,17 +1,14 @@
 """Exact references, in less than a minute: what is told is true, on the last commit.
 
 Motions of friction oscillators whose friction excites a higher mode, integrated event by event with matrix exponentials
-(steady to 1e-9); the bending beam with friction at its tip, and motions with stops and impacts, the same way; worn
-volumes of the dovetail by nonsmooth time integration (BDF2 fitted to the frequency, set-valued contact, 500 steps a
-period), which shares no code with the solver.
+(steady to 1e-9); worn volumes of the dovetail by nonsmooth time integration (BDF2 fitted to the frequency, set-valued
+contact, 500 steps a period), which shares no code with the solver. `tests/solver/test_accuracy.py` has more motions.
 """
 
 import numpy as np
 import pytest
 
 from solver import Outcome, SolverSettings, build_model, frequency_response
-from tests.cantilever import FRICTION, Cantilever
-from tests.solver.exact_scenes import SPRINGS, exact_tip, find, reported_tip, textbook_scenes
 from tests.solver.models import branch_states, march_wear, scene
 
 # seed, rad/s, first harmonic of the response, largest response of a period
@@ -34,7 +31,8 @@ SUPERHARMONIC = [
     (7, 217.17, 0.033917253, 0.035700506),
 ]
 
-INTEGRATED = [(211.5, 2.261, 0.005), (212.0, 0.492, 0.01)]  # Hz, worn volume, mm3, and its own relative error
+# mesh, Hz, worn volume, mm3, and its own relative error; of mesh 1 pairs slide or stick again on the way
+INTEGRATED = [(1, 212.6, 1.810, 0.005), (2, 211.5, 2.261, 0.005), (2, 212.0, 0.492, 0.01)]
 
 
 def superharmonic(seed):
@@ -71,29 +69,9 @@ def test_a_motion_whose_friction_excites_a_higher_mode_is_as_exact_as_it_is_told
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["slider 10.0 N 0.5", "slider 5.5 N 0.6", "two masses 0.4", "vibro-impact 1.2 upper"])
-def test_motions_with_stops_and_impacts(name):
-    given, sweep = textbook_scenes()[name]
-    found = find(given, SolverSettings(rtol=1e-3), sweep)
-    assert found.outcome is Outcome.CONVERGED
-    assert found.safe
-    assert max(found.response, found.wear_rate) <= 1e-3
-
-
-@pytest.mark.slow
-def test_a_beam_with_rigid_friction_at_its_tip():
-    model, settings = Cantilever(spring=SPRINGS["rigid"]).model(), SolverSettings()
-    (start,) = branch_states(model, FRICTION, 3.0, [0.96], settings)
-    pairs = zip(reported_tip(model, start, settings), exact_tip("rigid", 3.0, 0.96), strict=True)
-    errors = [float(abs(own / true - 1.0)) for own, true in pairs]
-    assert 0.5 * max(errors) < start.response_error <= settings.rtol
-    assert max(errors) < settings.rtol
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("frequency", "volume", "own"), INTEGRATED)
-def test_a_worn_volume_is_that_of_a_time_integration(frequency, volume, own):
-    model, cycles = scene("dovetail_sector", 13, mesh=2), np.linspace(0.0, 1e5, 11)
+@pytest.mark.parametrize(("mesh", "frequency", "volume", "own"), INTEGRATED)
+def test_a_worn_volume_is_that_of_a_time_integration(mesh, frequency, volume, own):
+    model, cycles = scene("dovetail_sector", 13, mesh=mesh), np.linspace(0.0, 1e5, 11)
     (start,) = branch_states(model, 0.5, 0.5, [2.0 * np.pi * frequency], SolverSettings())
     found = march_wear(model, 0.5, start, 1.1e-11, 1000.0, "adaptive", cycles, SolverSettings())
     apart = abs(found.worn_volume[-1] * 1e9 / volume - 1.0)

@@ -1,4 +1,6 @@
-"""Small bladed sectors: one in any kind of element, meshes matching or not, and one with shrouds."""
+"""Small bladed sectors: one in any kind of element, meshes matching or not, and one with shrouds; two cubes."""
+
+from functools import partial
 
 import numpy as np
 
@@ -9,13 +11,11 @@ from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, mean_motion
 from studies.finite_element.surfaces import surface_of_faces
 from studies.scenes import shrouded_sector
-from tests.studies.fe_models.solid_meshes import block, joined
+from tests.studies.fe_models.solid_meshes import STEEL, block, joined
 
 N_SECTORS = 12
 OMEGA_SQUARED = 2.5e5
 Z = np.array([0.0, 0.0, 1.0])
-
-
 HALF = np.tan(np.pi / N_SECTORS)
 
 
@@ -23,10 +23,6 @@ def wedge_shape(points, begin=0.2):
     """A wedge from x = begin, 0.1 m long: in place of blades, a ring whose joint runs through the cut faces."""
     x = begin + 0.1 * points[:, 0]
     return np.stack([x, x * HALF * (2.0 * points[:, 1] - 1.0), 0.04 * points[:, 2]], axis=1)
-
-
-def disk_shape(points):
-    return wedge_shape(points, 0.1)
 
 
 def blade_shape(points):
@@ -54,12 +50,21 @@ def surface_where(mesh: SolidMesh, name, inside):
     return surface_of_faces(mesh, name, *faces_where(mesh, inside))
 
 
+def cubes_on_each_other(lower, upper, lower_divisions, upper_divisions, lift=0.0, material=STEEL):
+    """Two unit cubes that touch at z = 1, the upper one lifted; surfaces LOW and UP."""
+    first, a = block(lower, lower_divisions, material=material)
+    second, b = block(upper, upper_divisions, lambda points: points + [0.0, 0.0, 1.0 + lift], material)
+    mesh = joined(first, second)
+    height = np.append(a[:, 2], 2.0 + b[:, 2])
+    return mesh, surface_where(mesh, "LOW", height == 1.0), surface_where(mesh, "UP", height == 2.0)
+
+
 class Sector:
     """Mesh, sets and faces of the sector; `joint` gives what is done with it."""
 
     def __init__(self, disk_kind, blade_kind, disk=(2, 4, 2), blade=(3, 2, 2), blade_shape=blade_shape):
         """Cut faces are where the angle is that of a sector, on the blade as well."""
-        first, _ = block(disk_kind, disk, disk_shape, part="disk", straight=True)
+        first, _ = block(disk_kind, disk, partial(wedge_shape, begin=0.1), part="disk", straight=True)
         second, _ = block(blade_kind, blade, blade_shape, part="blade", straight=True)
         self.mesh = joined(first, second)
         x, y, _ = self.mesh.coordinates.T

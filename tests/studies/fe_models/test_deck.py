@@ -40,11 +40,8 @@ def test_sets(cubes):
     assert sets["EVEN"] == [2, 4, 6, 8, 12, 14, 16, 18]
     assert sets["OF_UPPER"] == list(range(11, 19))
     assert sets["NALL"] == cubes.node_numbers.tolist()
-    assert {name: numbers.tolist() for name, numbers in cubes.element_sets.items()} == {
-        "LOWER": [1],
-        "UPPER": [2],
-        "ALL": [1, 2],
-    }
+    element_sets = {name: numbers.tolist() for name, numbers in cubes.element_sets.items()}
+    assert element_sets == {"LOWER": [1], "UPPER": [2], "ALL": [1, 2]}
 
 
 def test_surfaces_and_contact(cubes):
@@ -89,11 +86,7 @@ def test_part_and_instance(tmp_path):
     assert deck.surfaces["FACE"].elements.tolist() == [1]
     assert deck.surfaces["OTHER"].elements.tolist() == [2]
     assert deck.ties == (SurfacePair("FACE", "OTHER", 0.01),)
-    assert [held(item)[:2] for item in deck.boundaries] == [
-        ([1, 3], 1),
-        ([2], 1),
-        ([1, 2, 3, 4, 5], 3),
-    ]
+    assert [held(item)[:2] for item in deck.boundaries] == [([1, 3], 1), ([2], 1), ([1, 2, 3, 4, 5], 3)]
 
 
 def test_included_files(tmp_path):

@@ -18,7 +18,7 @@ from studies.finite_element.surfaces import surface_of_nodes
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from tests.studies.fe_models.plates import Plates
-from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, surface_where, wedge_shape
+from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, cubes_on_each_other, wedge_shape
 from tests.studies.fe_models.solid_meshes import block, joined
 
 
@@ -156,15 +156,11 @@ def test_plain_assembly_without_cyclic_symmetry():
 
 def bars(lift, load=0.0):
     """Two bars of unit section and length in a row, each held at its far end, which overlap or are apart by `lift`."""
-    soft = Material(1e9, 0.0, 1000.0)
-    first, a = block("C3D8", (2, 2, 2), material=soft)
-    second, b = block("C3D8", (2, 2, 3), lambda points: points + [0.0, 0.0, 1.0 + lift], material=soft)
-    mesh = joined(first, second)
-    z = np.append(a[:, 2], 10.0 + b[:, 2])
-    surfaces = (surface_where(mesh, name, z == at) for name, at in (("LOW", 1.0), ("UP", 10.0)))
-    held = np.repeat(((z == 0.0) | (z == 11.0))[:, None], 3, axis=1)
-    end = mean_motion(np.flatnonzero(z == 10.0), -Z, mesh.n_nodes)
-    joint = JointDefinition((ContactSurfaces(*surfaces, 0.1, with_gaps=True),), held, end, {"end": end})
+    mesh, low, up = cubes_on_each_other("C3D8", "C3D8", (2, 2, 2), (2, 2, 3), lift, Material(1e9, 0.0, 1000.0))
+    z = mesh.coordinates[:, 2]
+    held = np.repeat(((z == 0.0) | (z == z.max()))[:, None], 3, axis=1)
+    end = mean_motion(up.nodes, -Z, mesh.n_nodes)
+    joint = JointDefinition((ContactSurfaces(low, up, 0.1, with_gaps=True),), held, end, {"end": end})
     preload = load * end if load else None
     return build_fe_scene(FeModel(mesh, preload=preload), joint, ReductionOptions(n_modes=6), 1).model
 

@@ -12,7 +12,7 @@ from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
 from studies.finite_element.solid_mesh import rigid_motions
 from studies.scene_error import SceneError
-from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, surface_where
+from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, cubes_on_each_other, faces_where, surface_where
 from tests.studies.fe_models.solid_meshes import block, joined
 
 NONE = np.empty(0, dtype=np.int64)
@@ -83,18 +83,9 @@ def test_closest_points_against_a_search(kind):
     assert (np.linalg.norm(weights @ mesh.coordinates - points, axis=1) < distances + 0.08).all()
 
 
-def blocks_on_each_other(lower, upper, lower_divisions, upper_divisions, lift=0.0):
-    """Two unit cubes that touch at z = 1, the upper one lifted; surfaces LOW and UP."""
-    first, a = block(lower, lower_divisions)
-    second, b = block(upper, upper_divisions, lambda points: points + [0.0, 0.0, 1.0 + lift])
-    mesh = joined(first, second)
-    height = np.append(a[:, 2], 2.0 + b[:, 2])
-    return mesh, surface_where(mesh, "LOW", height == 1.0), surface_where(mesh, "UP", height == 2.0)
-
-
 @pytest.mark.parametrize(("lower", "upper"), [("C3D8", "C3D10"), ("C3D20R", "C3D15"), ("C3D10", "C3D4")])
 def test_pairs_interpolate_what_a_face_can_hold(lower, upper):
-    mesh, low, up = blocks_on_each_other(lower, upper, (2, 3, 1), (7, 7, 1), lift=0.01)
+    mesh, low, up = cubes_on_each_other(lower, upper, (2, 3, 1), (7, 7, 1), lift=0.01)
     pairs = build_contact_pairs(mesh, [ContactSurfaces(low, up, 0.02, with_gaps=True)], Z)
     assert pairs.moving_name == ("UP",)
     assert np.array_equal(pairs.moving, up.nodes)
@@ -132,7 +123,7 @@ def test_no_pair_goes_through_a_body(layers, tolerance):
 
 
 def test_wrong_surfaces_are_named():
-    mesh, low, up = blocks_on_each_other("C3D8", "C3D8", (2, 2, 1), (3, 3, 1), lift=0.02)
+    mesh, low, up = cubes_on_each_other("C3D8", "C3D8", (2, 2, 1), (3, 3, 1), lift=0.02)
     with pytest.raises(SceneError, match=r"16 of 16 nodes of UP .* 0\.01 m from LOW"):
         build_contact_pairs(mesh, [ContactSurfaces(low, up, tolerance=0.01)], Z)
     with pytest.raises(SceneError, match="LOW and LOW share 9 nodes"):

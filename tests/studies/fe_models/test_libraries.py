@@ -69,14 +69,11 @@ def test_elements_of_a_cdb_in_another_form(tmp_path, form):
         read_mesh_file(path)
 
 
-@pytest.mark.parametrize("library", ["meshio", "ansys.mapdl.reader"])
-def test_missing_library(tmp_path, monkeypatch, library):
-    monkeypatch.setitem(sys.modules, library, None)
-    if library == "meshio":
-        with pytest.raises(SceneError, match=r"msh needs the library meshio, .*: pip install meshio"):
-            read_mesh_file(write(tmp_path, GMSH_41, "mesh.msh"))
-        return
-    monkeypatch.setitem(sys.modules, "ansys.mapdl", None)
+def test_missing_libraries(tmp_path, monkeypatch):
+    for library in ("meshio", "ansys.mapdl", "ansys.mapdl.reader"):
+        monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(SceneError, match=r"msh needs the library meshio, .*: pip install meshio"):
+        read_mesh_file(write(tmp_path, GMSH_41, "mesh.msh"))
     (tmp_path / "job.full").write_bytes(b"1")
     with pytest.raises(SceneError, match="pip install ansys-mapdl-reader"):
         read_matrices(tmp_path / "job")

@@ -57,44 +57,47 @@ def test_names_of_files(tmp_path):
 
 
 WRITERS = {
-    ".sti": write_calculix,
-    ".dof": write_calculix,
-    "_STIF1.mtx": write_matrix_input,
-    ".pch": write_punch,
-    "_mass.mtx": REDUCED["market"],
-    "_stiffness.hb": REDUCED["one triangle"],
+    "job.sti": write_calculix,
+    "job.dof": write_calculix,
+    "job_STIF1.mtx": write_matrix_input,
+    "job.pch": write_punch,
+    "job.mtx": REDUCED["user element"],
+    "job.mat": REDUCED["mat"],
+    "job.op4": REDUCED["op4 binary sparse"],
+    "job_mass.mtx": REDUCED["market"],
+    "job_stiffness.hb": REDUCED["one triangle"],
 }
 
 
 @pytest.mark.parametrize(
-    ("end", "old", "new"),
+    ("name", "old", "new"),
     [
-        (".sti", r"^1 2 (.*)", r"1 2 \1\n1 2 \1"),
-        (".sti", r"^1 2 (.*)", r"1 2 \1\n2 1 0.0"),
-        (".sti", r"^2 2 .*", "2 2 x"),
-        (".dof", r"10.3", "10.2"),
-        (".sti", r"^1 1 .*\n", "10 10 1.0\n"),
-        ("_STIF1.mtx", r"^1,1, 1,1, .*", "1,1, 1,1, 1e36"),
-        ("_STIF1.mtx", r"^1,1, 1,1,", "0,1, 0,1,"),
-        ("_STIF1.mtx", r"(?s).*", "1 1 2.5e9\n"),
-        (".pch", "KAAX           0       6       2", "KAAX           0       6       4"),
-        (".pch", "KAAX           0", "LAAX           0"),
-        (".pch", "D[+]10", "D+10         1.0D+10"),
-        (".pch", "GRID,1,,0.,0.,0.", "GRID,1,,0.,0.,0.,3"),
-        ("_mass.mtx", "real symmetric", "real skew-symmetric"),
-        ("_mass.mtx", "real symmetric", "pattern symmetric"),
-        ("_stiffness.hb", "RSA", "RZA"),
-        ("_stiffness.hb", r" 0\nRSA", " 2\nRSA"),
-        ("_stiffness.hb", r"(?s)[^\n]*\n$", ""),
+        ("job.sti", r"^1 2 (.*)", r"1 2 \1\n1 2 \1"),
+        ("job.sti", r"^1 2 (.*)", r"1 2 \1\n2 1 0.0"),
+        ("job.sti", r"^2 2 .*", "2 2 x"),
+        ("job.dof", r"10.3", "10.2"),
+        ("job.sti", r"^1 1 .*\n", "10 10 1.0\n"),
+        ("job_STIF1.mtx", r"^1,1, 1,1, .*", "1,1, 1,1, 1e36"),
+        ("job_STIF1.mtx", r"^1,1, 1,1,", "0,1, 0,1,"),
+        ("job_STIF1.mtx", r"(?s).*", "1 1 2.5e9\n"),
+        ("job.pch", "KAAX           0       6       2", "KAAX           0       6       4"),
+        ("job.pch", "KAAX           0", "LAAX           0"),
+        ("job.pch", "D[+]10", "D+10         1.0D+10"),
+        ("job.pch", "GRID,1,,0.,0.,0.", "GRID,1,,0.,0.,0.,3"),
+        ("job_mass.mtx", "real symmetric", "real skew-symmetric"),
+        ("job_mass.mtx", "real symmetric", "pattern symmetric"),
+        ("job_stiffness.hb", "RSA", "RZA"),
+        ("job_stiffness.hb", r" 0\nRSA", " 2\nRSA"),
+        ("job_stiffness.hb", r"(?s)[^\n]*\n$", ""),
     ],
 )
-def test_wrong_files_are_named(tmp_path, end, old, new):
-    WRITERS[end](tmp_path, *chain())
-    path = tmp_path / f"job{end}"
+def test_wrong_files_are_named(tmp_path, name, old, new):
+    WRITERS[name](tmp_path, *chain())
+    path = tmp_path / name
     changed = re.sub(old, new, path.read_text(), count=1, flags=re.MULTILINE)
     assert changed != path.read_text()
     path.write_text(changed)
-    with pytest.raises(SceneError, match=rf"^matrices: {path.name}: "):
+    with pytest.raises(SceneError, match=f"^matrices: {name}: "):
         read_matrices(tmp_path / "job")
 
 
@@ -160,22 +163,10 @@ def test_a_substructure_of_calculix(tmp_path):
     np.testing.assert_allclose(read.stiffness.toarray(), expected, atol=1e-9 * abs(expected).max())
 
 
-DAMAGED = {
-    "job.sti": write_calculix,
-    "job.dof": write_calculix,
-    "job_STIF1.mtx": write_matrix_input,
-    "job.pch": write_punch,
-    "job.mtx": REDUCED["user element"],
-    "job.mat": REDUCED["mat"],
-    "job_mass.hb": REDUCED["one triangle"],
-    "job.op4": REDUCED["op4 binary sparse"],
-}
-
-
-@pytest.mark.parametrize("name", DAMAGED)
+@pytest.mark.parametrize("name", WRITERS)
 def test_damaged_matrices(tmp_path, name):
     """What is read is symmetric and finite; what is not ends in a sentence that names the file."""
-    DAMAGED[name](tmp_path, *chain())
+    WRITERS[name](tmp_path, *chain())
     path = tmp_path / name
     good, said = path.read_bytes(), []
     for seed in range(25):

@@ -1,7 +1,7 @@
 """Reduced matrices of a sector with both cut faces, in the files of several programs, against its complex matrices."""
 
 import re
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import pytest
@@ -77,6 +77,7 @@ class Sector:
         lines = [f"{node},{dof},{weight!r}" for (node, dof), weight in zip(rows, self.weights[1].tolist(), strict=True)]
         return "\n".join(["node,dof,root [MPa]", *reversed(lines[:-N_MODES]), *lines[-N_MODES:]]) + "\n"
 
+    @cached_property
     def scene(self):
         """The scene for three harmonics: `u_right = exp(2 pi i k / N) R u_left`, relative displacements first."""
         axis, place = self.joint.cut.axis, {node: 3 * n for n, node in enumerate(self.nodes)}
@@ -119,11 +120,6 @@ def sector():
     return Sector()
 
 
-@cache
-def expected_scene():
-    return sector().scene()
-
-
 def write(folder, kind="mat"):
     """Modes are nodes of their own, or all of them node 0."""
     rows = np.where(sector().rows[:, 1:] == 0, 0, sector().rows) if kind == "one triangle" else sector().rows
@@ -154,7 +150,7 @@ def seen(model, k, omega):
 @pytest.mark.parametrize("kind", ["mat", "user element", "one triangle"])
 def test_tables_of_nodes_and_matrices_give_the_complex_matrices_of_each_nodal_diameter(tmp_path, kind):
     """Of formats with forces, and one without."""
-    expected = expected_scene()
+    expected = sector().scene
     forces = [{"set": "TIP", "direction": [1, 0, 0], "force": sector().named["load"].sum()}]
     found = model_of(write(tmp_path, kind), preload=forces if kind == "user element" else ())
     assert set(found.linear) == set(expected.linear)
@@ -206,7 +202,7 @@ def test_tables_that_do_not_fit_are_named(tmp_path, kind, file, old, new, key):
 
 
 def test_a_model_in_python_has_the_matrices_of_each_nodal_diameter():
-    scene = expected_scene()
+    scene = sector().scene
     mass, damping, stiffness, response = (
         {k: getattr(each, name) for k, each in scene.linear.items()}
         for name in ("mass", "damping", "stiffness", "response")
