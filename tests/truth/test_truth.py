@@ -1,14 +1,16 @@
 """Exact references, in less than a minute: what is told is true, on the last commit.
 
 Motions of friction oscillators whose friction excites a higher mode, integrated event by event with matrix exponentials
-(steady to 1e-9); worn volumes of the dovetail by nonsmooth time integration (BDF2 fitted to the frequency, set-valued
-contact, 500 steps a period), which shares no code with the solver. `tests/solver/test_accuracy.py` has more motions.
+(steady to 1e-9); the bending beam with friction at its tip, the same way; worn volumes of the dovetail by nonsmooth
+time integration (BDF2 fitted to the frequency, set-valued contact, 500 steps a period), which shares no code with the
+solver. `tests/solver/test_accuracy.py` has more motions, with stops and impacts.
 """
 
 import numpy as np
 import pytest
 
 from solver import Outcome, SolverSettings, build_model, frequency_response
+from tests.solver.exact_scenes import tip_errors
 from tests.solver.models import branch_states, march_wear, scene
 
 # seed, rad/s, first harmonic of the response, largest response of a period
@@ -66,6 +68,14 @@ def test_a_motion_whose_friction_excites_a_higher_mode_is_as_exact_as_it_is_told
     assert found.outcome == (Outcome.CONVERGED,)
     assert first <= max(told, 0.1 * rtol)
     assert max(first, 0.5 * largest, told) <= rtol
+
+
+@pytest.mark.slow
+def test_a_beam_with_rigid_friction_at_its_tip():
+    settings = SolverSettings()
+    start, errors = tip_errors("rigid", 3.0, 0.96, settings)
+    assert 0.5 * max(errors) < start.response_error <= settings.rtol
+    assert max(errors) < settings.rtol
 
 
 @pytest.mark.slow
