@@ -145,11 +145,3 @@ def test_a_constant_load_wears_without_end_at_the_rate_of_its_path():
     path = 2.0 * found.slip_range[-1, 0]
     assert found.wear_rate[-1] == pytest.approx(WEAR * 10.0 * path, rel=1e-2)
     assert np.isfinite(found.worn_volume).all()
-
-
-@pytest.mark.slow
-def test_a_travelling_wave_whose_last_state_is_unstable_only_with_few_samples_is_stable():
-    model = build_scene("dovetail_sector", mesh=1, nodal_diameter=3)
-    settings = SolverSettings(rtol=0.1)
-    found = march_model(model, 214.42358972, 1.5, 0.5, WEAR, [0.0, 1500.0, 3000.0], settings=settings)
-    assert found.outcome is Outcome.CONVERGED
