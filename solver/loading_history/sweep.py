@@ -122,9 +122,12 @@ class Sweep(Generic[S]):
         if self.here is None or self.reference is None:
             return None
         last: S = self.reference.states[-1]
-        node = self.path.at(self.reference.resolution).move(last, path, run)
+        own = self.path.at(self.reference.resolution)
+        node = own.move(last, path, run)
         if node is None:
-            return None
+            # there may be no state with these harmonics at the node, as there is one at the point
+            there = _through(own, (last,), (state.parameter,), run.fresh())
+            return own.move(there[-1], path, run) if there else None
         # over states in between where the last part is too long
         for n_parts in PARTS_TO_POINT:
             way = np.linspace(node.parameter, state.parameter, n_parts + 1)[1:].tolist()

@@ -142,10 +142,10 @@ class Course:
 
         def between(each: FloatArray) -> FloatArray:
             first, last = each[start], each[end]
-            # an error that is not known is inf from its first step on: no difference of two of them
-            rise = np.subtract(last, first, out=np.zeros_like(last), where=last != first)
-            part = fraction.reshape(-1, *[1] * (each.ndim - 1))
-            return np.asarray(first + np.multiply(part, rise, out=np.zeros_like(last), where=part != 0.0))
+            part, known = fraction.reshape(-1, *[1] * (each.ndim - 1)), np.isfinite(first) & np.isfinite(last)
+            inside = first + part * np.subtract(last, first, out=np.zeros_like(last), where=known)
+            # what is not known at one end of a step is not known within
+            return np.where(known, inside, np.where(part == 0.0, first, np.where(part == 1.0, last, first + last)))
 
         found = {"wear_depth": depth, "depth_rate": between(self.rates)}
         found["wear_rate"] = self._volumes(found["depth_rate"])

@@ -184,11 +184,11 @@ def test_what_is_no_length_or_force_holds_through_a_step():
 
 def test_an_unknown_error_at_an_end_is_unknown_within_the_step():
     unknown, course = {"response_error": np.inf, "local": np.inf}, Course(AREAS)
-    for count, errors in ((0.0, {"local": 0.5}), (10.0, unknown), (20.0, unknown)):
+    for count, errors in ((0.0, {"local": 0.5}), (10.0, unknown), (20.0, unknown), (30.0, {"local": 0.5})):
         course = course.after(node(count, [count, count], [1.0, 1.0], 1.0, **errors))
-    found = course.read(np.array([0.0, 5.0, 15.0, 20.0, 25.0]))
-    for name, first in (("local", 0.5), ("response_error", 1.0)):
-        np.testing.assert_array_equal(found[name], [first, np.inf, np.inf, np.inf, np.nan])
+    found = course.read(np.array([0.0, 5.0, 15.0, 20.0, 25.0, 30.0, 35.0]))
+    for name, first, last in (("local", 0.5, 0.5), ("response_error", 1.0, np.inf)):
+        np.testing.assert_array_equal(found[name], [first, np.inf, np.inf, np.inf, np.inf, last, np.nan])
 
 
 def test_within_a_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume():

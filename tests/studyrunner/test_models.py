@@ -275,9 +275,9 @@ def test_cylinder_on_a_flat():
     assert wear[np.abs(x) < 0.1e-3].max() < 1e-6 * wear.max()
     assert wear[(np.abs(x) > 0.35e-3) & (np.abs(x) < 0.5e-3)].min() > 0.1 * wear.max()
     assert worn.worn_volume.values[-1] > 0.0
-    # the wear at the edges converges as 1/H: the rate with 81 harmonics differs by 13 % from that with 27
+    # the wear at the edges converges as 1/H: the rate with 81 harmonics differs by 13 % from that with 27; 55 are used
     assert worn.outcome == Outcome.INACCURATE
-    assert 0.13 < worn.error_estimate < 0.5
+    assert 0.06 < worn.error_estimate < 0.5
 
 
 # --- the page on a model of one's own ---
