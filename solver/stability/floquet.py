@@ -215,6 +215,9 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
     n_sectors, error, sizes = _sectors(joint, at), np.inf, list[float]()
     every = n_sectors * _moving(joint, at) <= SMALL_JOINT
     n_samples = _samples(joint, at) // (1 if growing_only else 2)
+    # fewer cannot tell the harmonics of the state apart
+    while n_samples <= 2 * max(joint.basis.orders, default=0):
+        n_samples *= 2
     most = 8 * (n_samples if every else min(n_samples, SMALL_SAMPLES))
     while True:
         values = _sorted(multipliers_of(build_monodromy(joint, at, n_samples, n_sectors), every))

@@ -29,7 +29,7 @@ from solver.structure.joint import build_case
 from solver.structure.penalty import Penalty
 from tests.rings import ring_of_sectors
 from tests.solver.exact_scenes import drawn
-from tests.solver.models import cyclic_model, march_wear, random_balance, random_model
+from tests.solver.models import cyclic_model, first_point, march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
 
 SETTINGS = SolverSettings()
@@ -181,6 +181,15 @@ def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
     assert isinstance(first, State)
     rest, joint = state_at_rest(case, 1.2, Run(settings.tolerance)), case.joint(1.2, 0.02)
     assert isinstance(relax_to_periodic(joint, np.zeros(1), rest, case.joint(1.2, 0.0), Run(settings.tolerance)), State)
+
+
+def test_multipliers_of_many_harmonics_have_samples_enough(monkeypatch):
+    """A cylinder with 81 harmonics ended in an unexpected error: 128 samples."""
+    monkeypatch.setattr(floquet, "SMALL_JOINT", 0)
+    case = build_case(bundled("vibro_impact"), 0.0, 1.2, SolverSettings(81, 512))
+    at = first_point(case, 1.2, 0.02).evaluation
+    found = floquet._integrated(case.joint(1.2, 0.02), at, 1e-2, True)
+    assert abs(found.values[0]) < 1.0
 
 
 def test_the_march_is_of_second_order_for_the_structure_alone():
