@@ -84,12 +84,13 @@ def _surprise(state: WearState, end: WearState, predicted: FloatArray) -> float:
 
 
 def _runs_away(state: WearState, end: WearState) -> bool:
-    """Whether a step moves the mean position of a pair `RUNAWAY` times as far as the pairs vibrate: where every pair
-    slips, nothing determines the position of a root along its slot, and Newton's method takes any (dovetail, 212.43 Hz,
-    1.19 N, `rtol` 0.1: 31 m in 1300 cycles). Then the position is held (`solver.wear.jump`).
+    """Whether a step moves the mean position of a pair `RUNAWAY` times as far as the pairs vibrate or wear in it: where
+    every pair slips, nothing determines the position of a root along its slot, and Newton's method takes any (dovetail,
+    212.43 Hz, 1.19 N, `rtol` 0.1: 31 m in 1300 cycles). Then the step is shorter, or the position held (`jump`).
     """
     moved = np.abs(end.at.displacement_h[:, 1:, 0] - state.at.displacement_h[:, 1:, 0])
-    return float(moved.max()) > RUNAWAY * float(np.abs(end.at.displacement_h[:, :, 1:]).max())
+    vibrates, wears = np.abs(end.at.displacement_h[:, :, 1:]).max(), np.abs(end.depth - state.depth).max()
+    return float(moved.max()) > RUNAWAY * float(max(vibrates, wears))
 
 
 def first_guess(wearing: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[Balance, FloatArray]:
