@@ -24,6 +24,7 @@ from solver import march_wear as march_from_rest
 from solver.outcome import COMPLETE, Outcome
 from solver.settings import SolverSettings
 from solver.wear.slow_time import CERTIFIED
+from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.random_decks import EXPECTED, random_deck, run_deck
 from tests.random_scenes import SALT, RandomScene, log_uniform, random_scene
@@ -71,7 +72,7 @@ def sector_point(seed: int, mesh: int) -> dict[str, Any]:
     random = np.random.default_rng([SALT, seed])
     diameter, friction = int(random.integers(0, 24)), float(random.uniform(0.1, 0.8))
     amplitude, ratio = log_uniform(random, 0.1, 3.0), float(random.uniform(0.98, 1.02))
-    model = scene("dovetail_sector", mesh=mesh, nodal_diameter=diameter)
+    model = scene("dovetail_sector", AUTOMATIC_HARMONICS_OF_A_WAVE, mesh=mesh, nodal_diameter=diameter)
     frequency = ratio * glued_frequency(model)
     settings = SolverSettings(time_limit=120.0)
     history = march_from_rest(model, frequency, amplitude, friction, 1.1e-11, 1e5, settings=settings)
