@@ -73,12 +73,6 @@ class ContactInterface(_ByRows):
         """Indices (n_rel,) of the relative displacements in a `LinearModel`."""
         return self.dofs.ravel()[self.component_index]
 
-    @cached_property
-    def line(self) -> IntArray:
-        """0 or 1 (n_contact,) where a pair has the first or the second tangent only, else -1."""
-        tangents = self.dofs[:, 1:] >= 0
-        return np.where(tangents.sum(axis=1) == 1, np.argmax(tangents, axis=1), -1)
-
 
 @dataclass(frozen=True, eq=False)
 class LinearModel(_ByRows):

@@ -17,6 +17,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from solver.contact.coulomb import STICK, advance_monodromy, contact_sample, contact_tangent
+from solver.contact.element import Tangents
 from solver.model import FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
@@ -27,13 +28,9 @@ Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""
 PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
 SMALLEST_DETERMINANT = ROUND_OFF  # of 1 - monodromy: below it a part of the state does not fade
 
-Tangents = tuple[FloatArray, FloatArray]
-"""Derivatives by the harmonics of the predicted force: of those of friction, in the last 2m rows of
-(n_contact, 3m, 3m), and of the slip work as in `Period`, (n_contact, 3m)."""
-
 
 class Period(NamedTuple):
-    """A period of pairs, as in `law.Marched`; the marches fill all but predicted_t, friction and start.
+    """A period of pairs, as in `Marched`; the marches fill all but predicted_t, friction and start.
 
     friction (n_contact,): coefficients. change (n_contact,): of the tangential state over the last period, of masses of
     the velocity, as a force m v / dt, N. slip_work: of elastic pairs times the tangential penalty, N * N.

@@ -26,7 +26,8 @@ from numba import njit
 from numba.extending import register_jitable
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_force, friction_limit, slip_tangent
-from solver.contact.elastic_pairs import MOST_PERIODS, Period, Tangents, assemble, periodic_start
+from solver.contact.elastic_pairs import MOST_PERIODS, Period, assemble, periodic_start
+from solver.contact.element import Tangents
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # parts of a step of a pair with two tangents
@@ -37,7 +38,9 @@ Pair = tuple[float, float]
 
 
 class Masses(NamedTuple):
-    """Mass, kg, drag, N s/m, and line (`ContactInterface`) of each pair (n_contact,); time between two samples, s."""
+    """Mass, kg, and drag, N s/m, of each pair (n,); its line, 0 or 1 where it has the first or the second tangent only,
+    else -1; time between two samples, s.
+    """
 
     mass: FloatArray
     drag: FloatArray

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from solver.contact.law import Marched
+from solver.contact.element import Marched
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.packing import packable
@@ -31,7 +31,7 @@ from solver.structure.joint import Joint
 class Balance:
     """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
-    - history (n_contact, 2): tangential history, m (`ContactLaw`). first (n_contact, 3, N): predicted force, N, with
+    - history (n_contact, 2): tangential history, m (`Element`). first (n_contact, 3, N): predicted force, N, with
       this history, from which that of the state has slowly come; None where it was always the same.
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6). Default: 0.
     - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given. wearing: this work.

@@ -97,7 +97,8 @@ def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArr
     tangential = evaluation.displacement_h[:, 1:]
     end = np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
     last = (tangential @ synthesis(old.resolution.orders, end))[:, :, 0]
-    return joint.law.history_from(old.penalty, evaluation.history, tangential[:, :, 0], last)
+    same = old.penalty.inertial == joint.penalty.inertial
+    return np.where(same[:, None], evaluation.history, joint.law.begun_at(tangential[:, :, 0], last))
 
 
 # --- responses ---

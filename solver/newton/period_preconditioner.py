@@ -26,7 +26,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.contact.law import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.structure.condensation import CACHED_STRUCTURES, CondensedStructure
@@ -91,7 +90,7 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
         n_samples //= 2
     stride = joint.basis.n_samples // n_samples
-    own, carried = sample_tangents(joint.law, at, stride)
+    own, carried = joint.law.sample_tangents(at, stride)
     pairs = np.flatnonzero(own.any(axis=(0, 2, 3)))
     own, carried = np.ascontiguousarray(own[:, pairs]), np.ascontiguousarray(carried[:, pairs])
     components = (3 * pairs[:, None] + np.arange(3)).ravel()

@@ -123,8 +123,9 @@ def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) 
         return np.array(rows).reshape(*values_t.shape[:-1], LOOP_PHASES)
 
     displacement = motion_h @ synthesis(orders, 2.0 * np.pi * phases)
-    series = motion_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * ends)
-    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, chosen, series), ends)
+    series = evaluation.displacement_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * ends)
+    beyond = joint.law.beyond_series(evaluation, series)
+    displacement[:, 1:] += at_phases(beyond[chosen], ends)
     displacement *= (joint.contact.dofs[chosen] >= 0)[:, :, None]
     force = at_phases(evaluation.force_t[chosen], np.arange(n_samples) / n_samples)
     return displacement.transpose(0, 2, 1), force.transpose(0, 2, 1)

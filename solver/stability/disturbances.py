@@ -25,7 +25,7 @@ from numba import njit
 from scipy.linalg import eigvals
 
 from solver.contact.coulomb import SEPARATED, STICK
-from solver.contact.law import SampledLaw, sampled_law
+from solver.contact.element import SampledLaw
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, ReducedModel
 from solver.structure.fourier import build_basis, derivative
@@ -128,7 +128,7 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     law = SampledLaw(
         *(
             part.reshape(n_sectors, steps, -1, 3, 3).swapaxes(0, 1).reshape(steps, -1, 3, 3)
-            for part in vars(sampled_law(fine.law, state, np.flatnonzero(switching))).values()
+            for part in vars(fine.law.sampled(state, np.flatnonzero(switching))).values()
         )
     )
     parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)

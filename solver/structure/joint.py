@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.contact.law import ContactLaw
+from solver.contact.law import ContactLaw, build_law
 from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
@@ -46,7 +46,7 @@ class Joint:
     @cached_property
     def law(self) -> ContactLaw:
         """The contact law of the pairs."""
-        return ContactLaw(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
+        return build_law(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
 
     @property
     def relative_penalty(self) -> FloatArray:

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
+from solver.model import BoolArray, FloatArray, IntArray, LinearModel, ReducedModel
 from solver.structure.condensation import condense, regular
 
 INERTIAL_RATIO = 2.0
@@ -50,6 +50,10 @@ class Penalty:
     mass: FloatArray
     drag: FloatArray
     mean: FloatArray
+
+    def at(self, places: IntArray) -> "Penalty":
+        """That of some pairs (k,)."""
+        return Penalty(*(each[places] for each in vars(self).values()))
 
     @property
     def stiffness(self) -> FloatArray:
