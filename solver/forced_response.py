@@ -199,7 +199,7 @@ def balance_at_start(
     case = build_case(model, friction, start.penalty_omega, fixed, start.resolution)
     joint = case.joint(2.0 * np.pi * frequency, load)
     if start.state is None:
-        return start, case, Balance(joint, np.zeros((model.contact.n_contact, 2))), None
+        return start, case, Balance(joint, np.zeros((model.contact.n_contact, joint.law.n_history))), None
     return start, case, *evaluated(joint, start.state)
 
 

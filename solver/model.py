@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,15 @@ class _ByRows:
                 object.__setattr__(self, name, np.asarray(value, order="C"))
 
 
+class PairLaw(Protocol):
+    """What some pairs of a scene follow in place of friction and separation, with its numbers. pairs: their indices."""
+
+    pairs: tuple[int, ...]
+
+    def element(self, places: IntArray, *of_pairs: Any) -> Any:
+        """The `solver.contact.element.Element` of these pairs in one joint, of which these are the first fields."""
+
+
 @dataclass(frozen=True)
 class ContactInterface(_ByRows):
     """Contact pairs, `n_contact` of them.
@@ -35,6 +45,7 @@ class ContactInterface(_ByRows):
     - friction_coefficient (n_contact,): None where the study gives it.
     - edge (n_contact,): True for pairs at which the modelled contact ends but the bodies continue: load or wear of such
       a pair shows that the contact is cut off. None where the bodies end with their pairs.
+    - laws: of pairs that do not rub and open; each pair belongs to one at most.
     """
 
     dofs: IntArray
@@ -45,6 +56,7 @@ class ContactInterface(_ByRows):
     surface: tuple[str, ...]
     friction_coefficient: FloatArray | None = None
     edge: BoolArray | None = None
+    laws: tuple[PairLaw, ...] = ()
 
     @property
     def n_contact(self) -> int:

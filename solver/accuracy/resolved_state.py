@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from solver.accuracy.certificate import SMALL_WORK, certify
-from solver.contact.coulomb import SEPARATED, STICK
+from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import State, first_response, largest_responses, transfer
@@ -220,7 +220,7 @@ def nothing_happens(evaluation: Evaluation) -> bool:
     """
     separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
     rests = np.ptp(state_t, axis=2) <= ROUND_OFF * np.abs(state_t).max(axis=2)
-    still = rests.all(axis=1) & ~separated.any(axis=1)
+    still = rests.all(axis=1) & ((evaluation.status_t == STICK) | (evaluation.status_t == SLIP)).all(axis=1)
     sticks = (evaluation.status_t == STICK).all(axis=1)
     return bool((sticks | still | separated.all(axis=1)).all())
 

@@ -30,6 +30,7 @@ from solver.model import FloatArray, IntArray
 SEPARATED = 0
 STICK = 1
 SLIP = 2
+OTHER = 3  # of a law without these states
 
 Force = TypeVar("Force", float, FloatArray)
 

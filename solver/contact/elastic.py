@@ -33,14 +33,14 @@ class CoulombPairs(Element):
         # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
         periodicity = 0.1 * ROUND_OFF * float(limit.max(initial=0.0))
         march_period(np.arange(slid.size), period, periodicity, MOST_PERIODS)
-        return self.marched(period, period.force_t @ self.basis.analysis, slid)
+        return self.left_by(period, period.force_t @ self.basis.analysis, slid)
 
-    def marched(self, period: Period, force_h: FloatArray, slid: BoolArray) -> Marched:
+    def left_by(self, period: Period, force_h: FloatArray, slid: BoolArray) -> Marched:
         """What a march has left. force_h (k, 3, m): harmonics of the contact force, N, the normal one in place."""
         force_h[:, 0] = mean_normal_force(period.predicted_t) @ self.basis.analysis
-        return Marched(
-            predicted_t=period.predicted_t,
-            force_t=period.force_t,
+        return self.marched(
+            period.predicted_t,
+            period.force_t,
             force_h=force_h,
             state_t=period.state_t,
             start=period.start,
@@ -57,7 +57,7 @@ class CoulombPairs(Element):
         return Period(*marched, at.periods, at.slip_work, at.slip_work)
 
     def tangent(  # noqa: D102
-        self, at: Marched, history: FloatArray | None, first: FloatArray | None, out: Tangents
+        self, at: Marched, history: FloatArray | None, first: FloatArray | None, out: Tangents, /
     ) -> None:
         # an open pair transmits nothing
         switching = ~(at.stuck | (at.status_t == SEPARATED).all(axis=1))
@@ -72,6 +72,12 @@ class CoulombPairs(Element):
         closing = np.flatnonzero(self.has_normal & switching)
         mean_normal_tangent(closing, at.predicted_t, basis_t, analysis_h, out[0])
         out[1][:] /= self.state_stiffness[:, None]
+
+    def started_from(self, at: Marched, history: FloatArray, /) -> FloatArray:  # noqa: D102
+        return np.where(at.slid[:, None], at.start / self.state_stiffness[:, None], history)
+
+    def relieved(self, history: FloatArray, force: FloatArray, /) -> FloatArray:  # noqa: D102
+        return history + force / self.penalty.tangential[:, None]
 
     def friction_tangent(
         self, pairs: IntArray, period: Period, starts: FloatArray, by: tuple[FloatArray, FloatArray], out: Tangents, /

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from solver.contact.coulomb import STICK, friction_limit
+from solver.contact.coulomb import OTHER, STICK, friction_limit
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Marched:
     - state_t (n, 2, N+1): tangential state, over `state_stiffness` the slip, m.
     - start (n, 2): state at the start of the first period, N; of masses the velocity at the start, m/s.
     - slid (n,): whether the pair slid there on the way from another state (`slow_slide`).
-    - status_t (n, N): SEPARATED, STICK or SLIP. periods (n,): number of periods marched.
+    - status_t (n, N): SEPARATED, STICK or SLIP; OTHER of a law without these. periods (n,): number of periods marched.
     - periodicity_error: change of the tangential state over the last period, N.
     - slip_work (n,): integral of normal force times slip distance over a period, J.
     """
@@ -85,8 +85,8 @@ class Element(ABC):
     """The law of k pairs of a joint at one frequency omega, rad/s. All arrays are of these pairs.
 
     places (k,): the pairs among all of the joint. penalty: eps. friction_coefficient (k,). dofs (k, 3): as in
-    `ContactInterface`. Harmonics are on the axis of length m = 2H+1. history (k, 2): what a pair remembers from one
-    state to the next, m: by default the slip of its state.
+    `ContactInterface`. Harmonics are on the axis of length m = 2H+1. history (k, `n_history`): what a pair remembers
+    from one state to the next, m: by default the slip of its state.
     """
 
     places: IntArray
@@ -98,6 +98,7 @@ class Element(ABC):
 
     # whether the law depends on velocities
     rate_dependent: ClassVar[bool] = False
+    n_history: ClassVar[int] = 2
 
     @property
     def has_normal(self) -> BoolArray:
@@ -126,13 +127,45 @@ class Element(ABC):
         first (k, 3, N): predicted force, N, from which it has slowly come; None where it was always the same.
         """
 
-    @abstractmethod
-    def tangent(self, at: Marched, history: FloatArray | None, first: FloatArray | None, out: Tangents) -> None:
-        """Exact derivatives by the harmonics of the predicted force, with the periodicity, of pairs that neither stick
-        nor stand open during the whole period; with the way from history and `first` where these are given.
-
-        out: receives them.
+    def marched(self, predicted_t: FloatArray, force_t: FloatArray, **others: Any) -> Marched:
+        """What a march has left: predicted and contact force (k, 3, N), N, and others than those of a law without
+        friction, which remembers nothing.
         """
+        k, _, n = predicted_t.shape
+        nothing: dict[str, Any] = {
+            "force_h": force_t @ self.basis.analysis,
+            "state_t": np.zeros((k, 2, n + 1)),
+            "start": np.zeros((k, 2)),
+            "slid": np.zeros(k, bool),
+            "status_t": np.full((k, n), OTHER),
+            "periods": np.ones(k, np.int64),
+            "periodicity_error": 0.0,
+            "slip_work": np.zeros(k),
+        }
+        return Marched(predicted_t, force_t, **{**nothing, **others})
+
+    def tangent(self, at: Marched, _: FloatArray | None, __: FloatArray | None, out: Tangents, /) -> None:
+        """Exact derivatives by the harmonics of the predicted force, with the periodicity, of pairs that neither stick
+        nor stand open during the whole period, into `out`; with the way from history and `first` force of `march`,
+        where these are given. By default from `sample_tangents`, without slip work.
+        """
+        own, carried = self.sample_tangents(at)
+        synthesis, analysis = self.basis.synthesis, self.basis.analysis
+        (n_samples, k), size = own.shape[:2], 3 * len(synthesis)
+        # the first period from no change of the state, the second from that with which it repeats
+        state, passed = np.zeros((k, 3, size)), np.broadcast_to(np.eye(2), (k, 2, 2))
+        for each in carried:
+            passed = each @ passed
+        for period in range(2):
+            for n in range(n_samples):
+                by_force = np.kron(np.eye(3), synthesis[:, n])
+                before, state = state, own[n] @ by_force
+                state[:, 1:] += carried[n] @ before[:, 1:]
+                if period:
+                    changed = (by_force - state)[:, :, None, :] * analysis[n][:, None]
+                    out[0][:] += changed.reshape(k, size, size)
+            if not period:
+                state[:, 1:] = np.linalg.pinv(np.eye(2) - passed) @ state[:, 1:]
 
     @abstractmethod
     def sample_tangents(self, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:
@@ -160,7 +193,15 @@ class Element(ABC):
 
     def origin(self, history: FloatArray) -> FloatArray:
         """Mean tangential position (k, 2), m, without mean force."""
-        return np.zeros_like(history)
+        return np.zeros((len(history), 2))
+
+    def started_from(self, _: Marched, history: FloatArray, /) -> FloatArray:
+        """The history with which the periods of a state begin after the way from another history."""
+        return history
+
+    def relieved(self, history: FloatArray, _: FloatArray, /) -> FloatArray:
+        """History of a state without some tangential force (k, 2), N."""
+        return history
 
     def final_history(self, at: Marched, _: FloatArray, /) -> FloatArray:
         """History that a state leaves; second argument (k, 3, m): its motion, m."""

@@ -16,13 +16,13 @@ import numpy as np
 from solver.contact.elastic import CoulombPairs
 from solver.contact.element import Element, Marched, SampledLaw
 from solver.contact.masses import SlidingMasses
-from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray
+from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from solver.structure.fourier import FourierBasis
     from solver.structure.penalty import Penalty
 
-A = TypeVar("A", FloatArray, ComplexArray)
+A = TypeVar("A", FloatArray, ComplexArray, BoolArray)
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,11 @@ class ContactLaw:
         return any(each.rate_dependent for each in self.elements)
 
     @property
+    def moves_on(self) -> BoolArray:
+        """Pairs (n_contact,) whose mean position the law alone does not determine: masses."""
+        return self._joined([np.full(each.places.size, each.rate_dependent) for each in self.elements])
+
+    @property
     def sample_step(self) -> float:
         """Time between two samples, s."""
         return self.elements[0].sample_step
@@ -52,6 +57,20 @@ class ContactLaw:
     def _joined(self, parts: list[A], axis: int = 0) -> A:
         """Values of all pairs from those of each element."""
         return parts[0] if len(parts) == 1 else cast("A", np.take(np.concatenate(parts, axis), self._order, axis))
+
+    @property
+    def n_history(self) -> int:
+        """Length of the history of a pair; shorter ones end with zeros."""
+        return max(each.n_history for each in self.elements)
+
+    @staticmethod
+    def _history(element: Element, history: FloatArray) -> FloatArray:
+        """The history of one element from that of all pairs."""
+        return history[element.places, : element.n_history]
+
+    def _histories(self, parts: list[FloatArray]) -> FloatArray:
+        """The history of all pairs from those of each element."""
+        return self._joined([np.pad(each, ((0, 0), (0, self.n_history - each.shape[1]))) for each in parts])
 
     def _of(self, element: Element, at: Marched) -> Marched:
         """The part of one element."""
@@ -71,7 +90,9 @@ class ContactLaw:
         parts = list[Marched]()
         for each in self.elements:
             at = each.places
-            parts.append(each.march(predicted_h[at], history[at], None if first is None else first[at]))
+            parts.append(
+                each.march(predicted_h[at], self._history(each, history), None if first is None else first[at])
+            )
         if len(parts) == 1:
             return parts[0]
         joined: dict[str, Any] = {"periodicity_error": max(each.periodicity_error for each in parts)}
@@ -92,8 +113,8 @@ class ContactLaw:
         for each in self.elements:
             part, own = self._of(each, at), each.places
             out = np.zeros((own.size, size, size)), np.zeros((own.size, size))
-            before, way = (None if given is None else given[own] for given in (history, first))
-            each.tangent(part, before, way, out)
+            before = None if history is None else self._history(each, history)
+            each.tangent(part, before, None if first is None else first[own], out)
             out[0][part.stuck] = np.eye(size)
             found.append(out)
         force, work = (self._joined([each[place] for each in found]) for place in (0, 1))
@@ -135,7 +156,7 @@ class ContactLaw:
 
     def origin(self, history: FloatArray) -> FloatArray:
         """Mean tangential position (n_contact, 2), m, without mean force."""
-        return self._joined([each.origin(history[each.places]) for each in self.elements])
+        return self._joined([each.origin(self._history(each, history)) for each in self.elements])
 
     # --- history ---
 
@@ -145,16 +166,23 @@ class ContactLaw:
         return self._joined([each.state_stiffness for each in self.elements])
 
     def final_history(self, at: Marched, displacement_h: FloatArray) -> FloatArray:
-        """History (n_contact, 2), m, that a state leaves; displacement_h (n_contact, 3, m): its motion, m."""
-        return self._each(lambda each, part: each.final_history(part, displacement_h[each.places]), at)
+        """History (n_contact, n_history), m, that a state leaves; displacement_h (n_contact, 3, m): its motion, m."""
+        ends = [each.final_history(self._of(each, at), displacement_h[each.places]) for each in self.elements]
+        return self._histories(ends)
 
     def started_from(self, at: Marched, history: FloatArray) -> FloatArray:
-        """The history (n_contact, 2), m, with which the periods of a state begin after the way from another history."""
-        return np.where(at.slid[:, None], at.start / self.state_stiffness[:, None], history)
+        """As in Element."""
+        begun = [each.started_from(self._of(each, at), self._history(each, history)) for each in self.elements]
+        return self._histories(begun)
+
+    def relieved(self, history: FloatArray, force: FloatArray) -> FloatArray:
+        """As in Element."""
+        parts = [each.relieved(self._history(each, history), force[each.places]) for each in self.elements]
+        return self._histories(parts)
 
     def begun_at(self, mean: FloatArray, last: FloatArray) -> FloatArray:
         """As in Element."""
-        return self._joined([each.begun_at(mean[each.places], last[each.places]) for each in self.elements])
+        return self._histories([each.begun_at(mean[each.places], last[each.places]) for each in self.elements])
 
     # --- masses on rigid ground: ratcheting, and harmonics above the highest one ---
 
@@ -183,13 +211,21 @@ def build_law(
     penalty: Penalty, friction_coefficient: FloatArray, contact: ContactInterface, basis: FourierBasis, omega: float
 ) -> ContactLaw:
     """The law of a joint at omega, rad/s. friction_coefficient: (n_contact,)."""
-    kinds = (CoulombPairs, ~penalty.inertial), (SlidingMasses, penalty.inertial)
-    elements = []
-    for kind, own in kinds:
-        if own.any():
-            at = np.flatnonzero(own)
-            elements.append(kind(at, penalty.at(at), friction_coefficient[at], contact.dofs[at], basis, omega))
-    return ContactLaw(tuple(elements))
+    rubs = np.ones(contact.n_contact, bool)
+    for each in contact.laws:
+        rubs[list(each.pairs)] = False
+    makers: list[tuple[Callable[..., Element], IntArray]] = [
+        (CoulombPairs, np.flatnonzero(rubs & ~penalty.inertial)),
+        (SlidingMasses, np.flatnonzero(rubs & penalty.inertial)),
+        *((each.element, np.sort(each.pairs)) for each in contact.laws),
+    ]
+    return ContactLaw(
+        tuple(
+            make(at, penalty.at(at), friction_coefficient[at], contact.dofs[at], basis, omega)
+            for make, at in makers
+            if at.size
+        )
+    )
 
 
 def _scaled(values_h: FloatArray, factor: ComplexArray) -> FloatArray:

@@ -60,7 +60,7 @@ class SlidingMasses(CoulombPairs):
         march_masses(pairs, period, self.masses)
         force_h = period.force_t @ basis.analysis
         force_h[:, 1:] /= basis.step_mean
-        return self.marched(period, force_h, np.zeros(pairs.size, bool))
+        return self.left_by(period, force_h, np.zeros(pairs.size, bool))
 
     def friction_tangent(  # noqa: D102
         self, pairs: IntArray, period: Period, _: FloatArray, by: tuple[FloatArray, FloatArray], out: Tangents, /

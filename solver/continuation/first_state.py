@@ -124,7 +124,7 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
 
 def relieved_history(joint: Joint, rest: State, fraction: float) -> FloatArray:
     """Tangential history (n_contact, 2), m, that reduces the friction forces of a state at rest by a fraction."""
-    return rest.history + fraction * rest.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
+    return joint.law.relieved(rest.history, fraction * rest.evaluation.force_h[:, 1:, 0])
 
 
 def solve_static_state(joint: Joint, run: Run) -> State | Failure:
@@ -138,7 +138,7 @@ def solve_static_state(joint: Joint, run: Run) -> State | Failure:
     run, contact = run.fresh(), joint.contact
     n_steps = LOAD_STEPS if contact.gap.any() or not contact.has_normal.all() else 1
     unmoved = np.zeros((contact.n_contact, 3, 1))
-    rest = Balance(static_joint(joint, 0.0), unmoved[:, 1:, 0])
+    rest = Balance(static_joint(joint, 0.0), np.zeros((contact.n_contact, joint.law.n_history)))
     state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history)
     for step in range(1, n_steps + 1):
         balance = Balance(static_joint(joint, step / n_steps), state.history)

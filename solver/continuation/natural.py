@@ -137,7 +137,8 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
         if not ratchets(joint, state.evaluation, fraction):
             break
         before = state.evaluation.history
-        shift = joint.law.origin(state.evaluation.displacement_h[:, 1:, 0] - before)
+        after = joint.law.final_history(state.evaluation, state.evaluation.displacement_h)
+        shift = np.where(joint.law.moves_on[:, None], after - before, 0.0)
 
         def balance_at(
             part: float,
