@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import first_response, largest_responses
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Ended, Outcome
 from solver.presentation import Presented
@@ -124,7 +124,7 @@ def frequency_response(
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found = dict(follow_branch(model, friction, load, ascending, sweep, settings))
+    found = dict(FrequencySweep(model, friction, load, sweep, settings).states(ascending))
     starts = [found[index] for index in place.tolist()]
     response, peak, outcome, message = zip(*(_read(model, friction, settings, start) for start in starts), strict=True)
     return FrequencyResponse(
@@ -194,7 +194,7 @@ def balance_at_start(
     """State to which a sweep comes at a frequency, Hz, the case with its harmonics and samples, its balance and its
     evaluation; where there is no state, None and a balance without history.
     """
-    ((_, start),) = follow_branch(model, friction, load, np.array([frequency]), sweep, settings)
+    ((_, start),) = FrequencySweep(model, friction, load, sweep, settings).states(np.array([frequency]))
     fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)
     case = build_case(model, friction, start.penalty_omega, fixed, start.resolution)
     joint = case.joint(2.0 * np.pi * frequency, load)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from solver.arguments import check_case, check_kind, check_number, check_numbers, check_word, worn_model
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.missions.history import integrate_missions
 from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest
 from solver.model import ReducedModel
@@ -110,7 +110,7 @@ def march_wear(
     model = worn_model(model, wear_depth)
     # a law that does not fit the pairs is an error of the caller: raise it before the computation
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
-    _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
+    _, start = next(FrequencySweep(model, friction, load, sweep, settings).states(follow or np.array([at])))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     steps = steps_of(scheme, length, settings.rtol)
     request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)

@@ -12,6 +12,7 @@ from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import HarmonicBalance, balance_at_start, functions_of
+from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.loading_history.path import LoadingPath
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
@@ -132,7 +133,8 @@ def response_curve(
         # a branch may turn back behind its start before it comes to the last value
         back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
         span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
-        arc = Arc(path.balance_at, State(at, balance.history, float(first)), span, Run(settings.tolerance))
+        begun, run = State(at, balance.history, float(first)), Run(settings.tolerance)
+        arc = Arc(lambda parameter: Balance(path.joint_at(parameter), balance.history), begun, span, run)
         branch = _follow_branch(arc, last, back, most, over_frequency)
     return _reported(path, branch, errors)
 
@@ -177,7 +179,7 @@ def _reported(path: LoadingPath, branch: _Branch, errors: bool) -> ResponseCurve
     stability: list[Stability] = []
     balances: list[HarmonicBalance] = []
     for index, point in enumerate(points):
-        balance, at = path.balance_at(point.parameter, point.history), point.evaluation
+        balance, at = Balance(path.joint_at(point.parameter), point.history), point.evaluation
         joint, run = balance.joint, Run(case.settings.tolerance)
         response[index], peak[index] = first_response(joint, at), largest_responses(joint, at)
         if errors:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -16,13 +15,6 @@ from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC, Resolution
 from solver.structure.condensation import SingularStructureError, build_structure
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
 from solver.structure.joint import Case, Joint
-
-
-class BalanceAt(Protocol):
-    """Balances over a parameter."""
-
-    def __call__(self, parameter: float, history: FloatArray, first: FloatArray | None = None, /) -> Balance:
-        """The balance at a value for a tangential history (n_contact, 2), m; first: as in `Balance`."""
 
 
 @packable
@@ -45,6 +37,11 @@ class Failure(Ended):
 
     outcome: Outcome
     message: str
+
+
+def balance_after(joint: Joint, state: State) -> Balance:
+    """Balance of a joint whose forces have slowly come from those of a state."""
+    return Balance(joint, state.history, first=state.evaluation.predicted_t)
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:

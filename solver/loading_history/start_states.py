@@ -22,8 +22,7 @@ from solver.accuracy.resolved_state import UNKNOWN, ResolvedState
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State
+from solver.harmonic_balance.state import Failure, State, balance_after
 from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, cell_of, edge_of, first_frequency
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep
 from solver.model import FloatArray, ReducedModel
@@ -43,38 +42,16 @@ OTHER_START = Resolution((1,), 64)
 """Harmonics and samples of a further attempt to find a first state: four of 54 random scenes need it."""
 
 
-def follow_branch(
-    model: ReducedModel,
-    friction_coefficient: float | FloatArray | None,
-    excitation_amplitude: float,
-    frequencies: FloatArray | FollowedFrequency,
-    sweep: Direction,
-    settings: SolverSettings,
-    keep: Callable[[Packed | str], None] = lambda _: None,
-    resume: Packed | None = None,
-) -> Iterator[tuple[int, StartState]]:
-    """Unworn periodic states, one by one, in the order of the sweep, as `FrequencySweep.states`.
-
-    friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
-    keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
-        position and the activity of the sweep, in words.
-    resume: progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there
-        to frequencies not yet passed. The states are equal to the last bit, except `run_time`.
-    """
-    sweeps = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings, keep=keep)
-    if resume is not None:
-        sweeps.load(resume)
-    return sweeps.states(frequencies)
-
-
 @dataclass(eq=False)
 class FrequencySweep:
     """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
+    friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
+    keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
+        position and the activity of the sweep, in words.
     with_switching: for which states stability is tested, as in `find_instability`.
     known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
         is not estimated, and there is no reference sweep.
-    keep: called with the saved state, and with the position in words.
     present, cell, omega: the present sweep, its cell, and the frequency of a ramp, rad/s, else None.
     run: of the state at the current frequency, without the sweep to this frequency.
     """
@@ -84,9 +61,9 @@ class FrequencySweep:
     excitation_amplitude: float
     direction: Direction
     settings: SolverSettings
+    keep: Callable[[Packed | str], None] = lambda _: None
     with_switching: bool = True
     known: tuple[tuple[float, Resolution], ...] = ()
-    keep: Callable[[Packed | str], None] = lambda _: None
     present: Sweep[State] | None = None
     cell: int = 0
     omega: float | None = None
@@ -96,7 +73,7 @@ class FrequencySweep:
         self.run = Run(self.settings.tolerance, Budget(report=self.keep))
 
     def states(self, frequencies: FloatArray | FollowedFrequency) -> Iterator[tuple[int, StartState]]:
-        """Index and state, one by one, in the order of the sweep. A state depends on its own frequency only.
+        """Index and unworn state, one by one, in the order of the sweep. A state depends on its own frequency only.
 
         frequencies: Hz, ascending. Or the resonance that is sought: the first one that the sweep meets in a range.
         """
@@ -122,7 +99,9 @@ class FrequencySweep:
             self.keep(pack((self.cell, self.omega, self.present.saved)))
 
     def load(self, saved: Packed) -> None:
-        """Go on from what another sweep has given to `keep`."""
+        """Go on from what another sweep, which may differ in its frequencies, has given to `keep`: to frequencies not yet
+        passed. The states are equal to the last bit, except `run_time`.
+        """
         cell, omega, present = unpack(saved)
         self._new_sweep(cell, omega).load(present)
 
@@ -186,16 +165,10 @@ class FrequencySweep:
 
     def _without_state(self, failure: Failure) -> StartState:
         """No state at the current frequency, and why."""
-        case = None if self.present is None else self.present.path.case
-        return StartState(
-            outcome=failure.outcome,
-            state=None,
-            penalty_omega=math.nan if case is None else case.penalty_omega,
-            resolution=Resolution((1,), 4) if case is None else case.resolution,
-            response_error=math.inf,
-            wear_rate_error=math.inf,
-            message=failure.message,
-        )
+        omega, resolution = math.nan, Resolution((1,), 4)
+        if self.present is not None:
+            omega, resolution = self.present.path.case.penalty_omega, self.present.path.case.resolution
+        return StartState(failure.outcome, None, omega, resolution, math.inf, math.inf, message=failure.message)
 
     def _new_sweep(self, cell: int, omega: float | None) -> Sweep[State]:
         """A sweep before its first node. omega: of a ramp, rad/s, else None."""
@@ -304,11 +277,10 @@ def _resonance_between(
         return None
     part = 0.0 if step.folds else one / (one - other)
     joint = path.case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
-    before, first = here.evaluation.predicted_h, here.evaluation.predicted_t
-    balance = Balance(joint, here.history, first=first)
+    before = here.evaluation.predicted_h
     run = Run(sweeps.settings.tolerance, Budget(deadline=sweeps.run.budget.deadline))
     start = before + part * (ahead.evaluation.predicted_h - before)
-    found = solve_at_lag(path.case, balance, start, 0.5 * math.pi, run)
+    found = solve_at_lag(path.case, balance_after(joint, here), start, 0.5 * math.pi, run)
     omega = math.nan if found is None else float(found.values[0])
     if not abs(omega - joint.omega) <= 2.0 * abs(ahead.parameter - here.parameter):
         # none, or another resonance

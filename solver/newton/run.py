@@ -43,8 +43,7 @@ from 273.7 Hz on: 128 samples find four unstable, 512 samples none. A stable sta
 class Bordered:
     """Balance and evaluation at values of the further unknowns (k,), with the errors (k,) of the further equations, 1.
 
-    reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
-    extra: what the problem needs again for its derivatives.
+    reduced: that of the last `bordered_step`; None without one. extra: what the problem needs again.
     """
 
     balance: Balance
@@ -131,7 +130,7 @@ class BorderedProblem(Protocol):
 def bordered_step(
     problem: BorderedProblem, here: Bordered, solver: JacobianSolver, residual: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Newton step of all unknowns (n_rel m + k,), and the derivative `reduced` (k, k) as in `Bordered`.
+    """Newton step of all unknowns (n_rel m + k,), and the derivative (k, k) of the errors by the values, p eliminated.
 
     With the Jacobian J = dR/dp, J a = -R and J B = -dR/dq (Govaerts, Numerical Methods for Bifurcations of Dynamical
     Equilibria, 2000, section 3.6):
@@ -182,9 +181,9 @@ class Budget:
 
 @dataclass
 class Run:
-    """The solves of a computation. Each raises OutOfTimeError after the deadline of the budget.
+    """The solves of a computation. Each raises OutOfTimeError after the deadline of the budget, which all parts share.
 
-    tolerance: of the scaled residual. budget: shared by all parts of the computation. solver: keeps a factorisation.
+    tolerance: of the scaled residual. solver: keeps a factorisation.
     """
 
     tolerance: float
@@ -207,8 +206,7 @@ class Run:
         """
 
         def direction(at: Evaluation, residual: float) -> FloatArray:
-            (step,) = self.steps(balance, at, [-at.residual], residual)
-            return np.asarray(step)
+            return np.asarray(self.steps(balance, at, [-at.residual], residual)[0])
 
         at = self._iterate(balance.evaluate, direction, start, most)
         return None if at is None else State(at, final_history(balance, at), parameter)

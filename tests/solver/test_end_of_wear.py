@@ -7,7 +7,7 @@ import pytest
 
 from solver import march_wear as march_model
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
@@ -102,7 +102,7 @@ COARSE = SolverSettings(harmonics=3, samples=64)
 def unworn():
     """A cylinder in partial slip."""
     model = build_scene("cylinder_on_flat", strips=12)
-    ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", COARSE)
+    ((_, start),) = FrequencySweep(model, 0.6, 1.0, "ramp", COARSE).states(np.array([20.0]))
     return model, start
 
 
