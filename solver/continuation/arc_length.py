@@ -1,7 +1,5 @@
-"""Pseudo-arc-length continuation of a branch through its folds.
-
-The parameter is the further unknown of a bordered system, whose further equation puts the point in a plane across the
-tangent of the branch.
+"""Pseudo-arc-length continuation of a branch through its folds: the parameter is the further unknown of a bordered
+system, whose further equation puts the point in a plane across the tangent of the branch.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,8 +16,7 @@ from solver.newton.run import Bordered, Run
 from solver.settings import DIFFERENCE
 
 FIRST_ARC = SMOOTH_CHANGE / 10.0
-"""Length of the first step, in unknowns divided by the norm of the first predicted force; the longest one is
-`SMOOTH_CHANGE`."""
+"""Length of the first step, in unknowns over the norm of the first predicted force; the longest is `SMOOTH_CHANGE`."""
 
 CORNER_ARC = 1e-3
 """Length of the step behind a corner, and least length after a step: without it seven branches with folds take 46 %
@@ -113,7 +110,8 @@ class Arc:
         turned = self.tangent(self.state_of(plane.evaluate(*plane.first())), tangent)
         if turned is None:
             return None
-        for reached in (self.step(state, sign * turned, CORNER_ARC) for sign in (1.0, -1.0)):
+        for sign in (1.0, -1.0):
+            reached = self.step(state, sign * turned, CORNER_ARC)
             if reached is None:
                 continue
             chord = self.place(reached) - plane.base

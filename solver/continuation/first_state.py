@@ -20,7 +20,7 @@ from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
 from solver.continuation.transient import RUNAWAY, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, State, balance_after
-from solver.model import ComplexArray, FloatArray
+from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import NEGLIGIBLE
@@ -99,18 +99,12 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
 
     The motion is that without friction; friction acts against it with its first harmonic, 4 / pi times its limit.
     """
-    joint, at = balance.joint, rest.evaluation
-    load, stiffness = joint.structure.harmonic_force, joint.structure.dynamic_stiffness[0]
-    limit = friction_limit(joint.friction_coefficient, at.force_h[:, 0, 0])
-
-    def of_pairs(amplitudes: ComplexArray) -> ComplexArray:
-        spread = np.zeros(3 * limit.size, complex)
-        spread[joint.component_index] = amplitudes
-        return spread.reshape(-1, 3)
-
-    if (np.linalg.norm(of_pairs(load)[:, 1:], axis=1) <= limit).any():
+    structure, at, rows = balance.joint.structure, rest.evaluation, balance.joint.contact.pair_rows
+    load, limit = structure.harmonic_force, friction_limit(balance.joint.friction_coefficient, at.force_h[:, 0, 0])
+    pushed = np.where(rows >= 0, load[rows], 0.0)
+    if (np.linalg.norm(pushed[:, 1:], axis=1) <= limit).any():
         return None
-    moved = of_pairs(np.asarray(np.linalg.solve(stiffness, load), np.complex128))
+    moved = np.where(rows >= 0, np.linalg.solve(structure.dynamic_stiffness[0], load)[rows], 0.0)
     friction, size = np.zeros_like(moved), np.maximum(np.linalg.norm(moved[:, 1:], axis=1), 1e-300)
     friction[:, 1:] = (4j / np.pi * limit / size)[:, None] * moved[:, 1:]
     motion_h, force_h = at.displacement_h.copy(), at.force_h.copy()

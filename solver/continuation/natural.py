@@ -1,8 +1,8 @@
 """Steps along a parameter, natural steps, shakedown of sliding masses by them, and constants that all searches share.
 
 The length of a step along frequency, load, amplitude, cycles or missions follows from the change of the state over the
-step, or its local error, over the one allowed (`take_step`). Natural steps of Newton's method alone are halved where it
-fails (`follow_naturally`). Changes of the vibration are those of `vibration_change`.
+step, or its local error, over the one allowed (`take_step`). Natural steps, by Newton's method alone, are halved where
+it fails (`follow_naturally`).
 """
 
 import math
@@ -57,10 +57,10 @@ class SteppedProblem(Protocol[HereT, EndT]):
 
 @dataclass(frozen=True)
 class Lengths:
-    """The rule for the length of a step.
+    """The rule for the length of a step, at least the shortest. safety: as `STEP_SAFETY`.
 
-    order: power of the length with which the ratio of `SteppedProblem` grows. safety: as `STEP_SAFETY`.
-    shortest: shortest step. rescue: length at and below which a step that is not found is left to the rescue.
+    order: power of the length with which the ratio of `SteppedProblem` grows.
+    rescue: length at and below which a step that is not found is left to the rescue.
     """
 
     order: int
@@ -102,7 +102,7 @@ def follow_naturally(
     """
     state, whole = start, target - start.parameter
     # fractions of two: sums of them are exact, so that the last step ends at the target
-    fraction = longest = 2.0 ** min(math.floor(math.log2(fine / max(abs(whole), 1e-300))), 0) if fine < np.inf else 1.0
+    fraction = longest = 2.0 ** math.floor(math.log2(min(fine / max(abs(whole), 1e-300), 1.0)))
     shortest, done, failures = min(SHORTEST_STEP, 0.25 * longest), 0.0, 0
     while state.parameter != target:
         ahead = min(done + fraction, 1.0)

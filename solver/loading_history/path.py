@@ -44,8 +44,7 @@ CHANGE_LIMITS = (0.05, 0.2)
 with 0.05."""
 
 LINEAR_CHANGE = 1.0
-"""Largest change over a step between two states in which no pair slips or opens. The reversal of phase at a linear
-resonance is a change of 2."""
+"""Largest change over a step between states in which no pair slips or opens; over a linear resonance it would be 2."""
 
 SMALL_VIBRATION = 0.3
 """Fraction of the friction limits to which changes of a smaller vibration are relative. With 1 the error of the motion
@@ -69,7 +68,7 @@ S = TypeVar("S", bound=State)
 
 @dataclass(frozen=True)
 class Step(Generic[S]):
-    """End of a step: its state, and values of the parameter at the folds that the step has jumped over."""
+    """End of a step: its state, and the parameter at each of the folds that the step has jumped over."""
 
     state: S
     folds: tuple[float, ...] = ()

@@ -77,11 +77,11 @@ class FrequencySweep:
 
         frequencies: Hz, ascending. Or the resonance that is sought: the first one that the sweep meets in a range.
         """
-        n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
+        wanted = [frequencies] if isinstance(frequencies, FollowedFrequency) else frequencies.tolist()
         started = computing_time()
-        for index in np.arange(n_states)[:: -1 if self.direction == "down" else 1].tolist():
+        for index in range(len(wanted))[:: -1 if self.direction == "down" else 1]:
             self.set_deadline(started + self.settings.time_limit)
-            found = guarded(partial(self._next, frequencies, index))
+            found = guarded(partial(self._next, wanted[index]))
             iterations = self.run.budget.iterations + (0 if self.present is None else self.present.budget.iterations)
             start, now = self._without_state(found) if isinstance(found, Failure) else found, computing_time()
             yield index, replace(start, newton_iterations=iterations, run_time=now - started)
@@ -90,8 +90,9 @@ class FrequencySweep:
 
     def set_deadline(self, deadline: float) -> None:
         """Set the CPU time of the thread, s, after which the search for the present state ends."""
-        for budget in (self.run.budget, *([] if self.present is None else [self.present.budget])):
-            budget.deadline = deadline
+        self.run.budget.deadline = deadline
+        if self.present is not None:
+            self.present.budget.deadline = deadline
 
     def save(self) -> None:
         """Give `keep` what another sweep needs to go on."""
@@ -99,8 +100,8 @@ class FrequencySweep:
             self.keep(pack((self.cell, self.omega, self.present.saved)))
 
     def load(self, saved: Packed) -> None:
-        """Go on from what another sweep, which may differ in its frequencies, has given to `keep`: to frequencies not yet
-        passed. The states are equal to the last bit, except `run_time`.
+        """Go on from what another sweep, which may differ in its frequencies, has given to `keep`, to frequencies not
+        yet passed. The states are equal to the last bit, except `run_time`.
         """
         cell, omega, present = unpack(saved)
         self._new_sweep(cell, omega).load(present)
@@ -138,14 +139,11 @@ class FrequencySweep:
             present.begin(*first)
         return present
 
-    def _next(self, frequencies: FloatArray | FollowedFrequency, index: int) -> StartState | Failure:
+    def _next(self, wanted: float | FollowedFrequency) -> StartState | Failure:
         """State at the next frequency, with the harmonics it needs, or why there is none. Raises as `guarded`."""
-        if isinstance(frequencies, FollowedFrequency):
-            frequency = find_resonance(self, frequencies)
-            if isinstance(frequency, Failure):
-                return frequency
-        else:
-            frequency = float(frequencies[index])
+        frequency = find_resonance(self, wanted) if isinstance(wanted, FollowedFrequency) else wanted
+        if isinstance(frequency, Failure):
+            return frequency
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
         run.budget.iterations, run.budget.most_iterations = 0, NODE_ITERATIONS
@@ -214,7 +212,7 @@ class FrequencySweep:
         reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
-        elif present.here is not None and present.reference is not None:
+        elif present.here is not None and present.reference:
             estimate, found = UNKNOWN, replace(found, accurate=False)
         known = estimate.response, estimate.wear_rate
         # folds of a ramp are load factors

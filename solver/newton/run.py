@@ -34,9 +34,9 @@ state. Also the shortest natural step over the range to the target, the shortest
 wanted one, and the shortest relaxation step in periods."""
 
 SAMPLES_OF_SIGN = 16
-"""Samples over those of a state that is unstable with fewer. Underplatform damper of nodal diameter 2, 30 stable states
-from 273.7 Hz on: 128 samples find four unstable, 512 samples none. A stable state of the dovetail, nodal diameter 3,
-1.5 N, is unstable with 64 to 320 samples, and stable with 384 to 4096."""
+"""Samples over those of a state that is unstable with fewer: the sign of the determinant may turn where many pairs slip
+and open. Underplatform damper of nodal diameter 2, 30 stable states from 273.7 Hz on: 128 samples find four unstable,
+512 none. Dovetail, nodal diameter 3, 1.5 N: unstable with 64 to 320 samples, stable with 384 to 4096."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,8 @@ def solve_newton(
     tolerance: float,
     most: int = MOST_ITERATIONS,
 ) -> tuple[EvaluationT | None, int]:
-    """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
-
-    Returns the evaluation of the solution, None where none is found, and the number of iterations.
+    """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance. Returns the
+    evaluation of the solution, None where none is found, and the number of iterations.
 
     The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution. So full
     steps come first, as long as the lowest norm is improved once in `FULL_STEPS` iterations. Then the iteration returns
@@ -164,8 +163,7 @@ class OutOfTimeError(Exception):
 class Budget:
     """Limits of a computation: Newton iterations so far, and those after which no new step of a search begins.
 
-    deadline: CPU time of the thread, s, after which the whole computation ends.
-    report: called with a description of the progress, in words, at every change.
+    deadline: CPU time of the thread, s, after which all ends. report: called with the progress in words.
     """
 
     iterations: int = 0
@@ -257,8 +255,7 @@ class Run:
 
     def is_stable(self, joint: Joint, at: Evaluation) -> bool:
         """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`) at
-        its wear depth, as the vibration is fast and the wear is slow. With more samples, too: with too few the sign of
-        the determinant may turn where many pairs slip and open.
+        its wear depth, as the vibration is fast and the wear is slow; with more samples, too (`SAMPLES_OF_SIGN`).
         """
         if self.solver.determinant_sign(Balance(joint, at.history).linearise(at)) >= 0.0:
             return True
