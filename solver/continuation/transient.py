@@ -109,7 +109,8 @@ def relax_to_periodic(
     Returns the state, or ADRIFT (the mean positions run away: only friction holds the parts), UNSTABLE (the motion does
     not leave an unstable periodic state) or UNSETTLED (it does not settle within `SEARCH_ITERATIONS`).
     """
-    budget, at = run.budget, f"at {joint.omega / (2.0 * np.pi):.6g} Hz"
+    budget = run.budget
+    at = f"at {joint.omega / (2.0 * np.pi):.6g} Hz"
     budget.report(f"{at}, where the vibration is left to settle in time")
     transient = Transient(joint)
     begun, history = Transient(start_joint).periodic(start.evaluation).displacement, start.history
@@ -118,7 +119,8 @@ def relax_to_periodic(
     predicted, period = start.evaluation.predicted_h, 2.0 * np.pi / joint.omega
     # the longest step, in periods, is practically infinite: the step is the harmonic balance itself
     length, longest, tried = 1.0, 1.0 / ROUND_OFF, np.inf
-    size, left = float(np.abs(start.evaluation.displacement_h).max()), SEARCH_ITERATIONS
+    size = float(np.abs(start.evaluation.displacement_h).max())
+    left = SEARCH_ITERATIONS
     # whether an unstable state has been found, which the motion leaves
     grows = False
     while left > 0 and length >= SHORTEST_STEP and not budget.exhausted:

@@ -76,7 +76,7 @@ class Step(Generic[S]):
 
 @dataclass(frozen=True)
 class Path(ABC, Generic[S]):
-    """The joint along a parameter, with the harmonics and samples of its case. Steps have a least and a most length."""
+    """The joint along a parameter, with the harmonics and samples of its case. shortest, longest: limits of a step."""
 
     case: Case
     shortest: ClassVar[float]
