@@ -249,18 +249,17 @@ def mass_tangent(
     period: Period,
     steps: tuple[FloatArray, FloatArray],
     step: float,
-    by_column_t: FloatArray,
-    by_mean_t: FloatArray,
+    by_column_t: tuple[FloatArray, FloatArray],
     analysis_h: FloatArray,
     out: Tangents,
 ) -> None:
     """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity, into `out`.
 
-    steps: as `mass_slopes` gives them. step: between samples, s. by_column_t, by_mean_t: synthesis of samples
-    and of means over steps, as `by_columns` gives them. analysis_h (m, N): harmonics from such means; contiguous.
+    steps: as `mass_slopes` gives them. step: between samples, s. by_column_t: synthesis of samples and of means over
+    steps, as `by_columns` gives them. analysis_h (m, N): harmonics from such means; contiguous.
     """
     m, n_samples = analysis_h.shape
-    w, (slopes, speed_t) = 3 * m + 2, steps
+    w, (slopes, speed_t), (sample_t, mean_t) = 3 * m + 2, steps, by_column_t
     dforce_t, after, dstart = np.empty((n_samples, 2 * w)), np.empty((5, w)), np.zeros((2, w))
     for place, pair in enumerate(pairs):
         work, velocity = np.zeros(w), np.zeros((2, w))
@@ -268,7 +267,7 @@ def mass_tangent(
         for n in range(n_samples):
             normal = max(period.predicted_t[pair, 0, n], 0.0)
             by_limit = period.friction[pair] if normal > 0.0 else 0.0
-            by_0, by_1, by_2 = by_column_t[n, 2 * m :], by_mean_t[n, m:], by_mean_t[n]
+            by_0, by_1, by_2 = sample_t[n, 2 * m :], mean_t[n, m:], mean_t[n]
             for row in range(5):
                 by = slopes[place, n, row]
                 for j in range(w):
@@ -280,4 +279,4 @@ def mass_tangent(
                 velocity[0, j], velocity[1, j] = after[2, j], after[3, j]
                 work[j] = work[j] + normal * step * after[4, j] + speed * step * by_0[j]
         periodic_start(velocity, dstart)
-        assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_h)
+        assemble(out, pair, dforce_t, work, dstart, analysis_h)
