@@ -137,9 +137,7 @@ class WearingWork:
         work = self._without_table(slip_work)
         return work if self.table is None else work * self._table_at(normal_force, depth)[0]
 
-    def slopes(
-        self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def slopes(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> tuple[FloatArray, ...]:
         """Derivatives (n_contact,) of `work` by slip work, 1, normal force, m, and depth, N."""
         by_work, none = np.where(slip_work >= self.least, self.factor, 0.0), np.zeros_like(slip_work)
         if self.table is None:
