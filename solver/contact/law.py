@@ -63,11 +63,11 @@ class ContactLaw:
 
     @staticmethod
     def _history(element: Element, history: FloatArray) -> FloatArray:
-        """That of one element."""
+        """The history of one element from that of all pairs."""
         return history[element.places, : element.n_history]
 
     def _histories(self, parts: list[FloatArray]) -> FloatArray:
-        """That of all pairs from those of each element."""
+        """The history of all pairs from those of each element."""
         return self._joined([np.pad(each, ((0, 0), (0, self.n_history - each.shape[1]))) for each in parts])
 
     def _of(self, element: Element, at: Marched) -> Marched:
@@ -77,8 +77,6 @@ class ContactLaw:
     def _each(self, compute: Callable[[Element, Marched], FloatArray], at: Marched) -> FloatArray:
         """Values of all pairs from what each element says of its part."""
         return self._joined([compute(each, self._of(each, at)) for each in self.elements])
-
-    # --- forces ---
 
     def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None = None) -> Marched:  # noqa: D102
         parts = list[Marched]()
@@ -126,8 +124,6 @@ class ContactLaw:
         order = np.argsort(np.concatenate([places for places, _ in parts]))
         return SampledLaw(*(np.concatenate(each, 1)[:, order] for each in zip(*(of for _, of in parts), strict=True)))
 
-    # --- motion ---
-
     @cached_property
     def compliance(self) -> ComplexArray:  # noqa: D102
         return self._joined([each.compliance for each in self.elements])
@@ -142,8 +138,6 @@ class ContactLaw:
 
     def origin(self, history: FloatArray) -> FloatArray:  # noqa: D102
         return self._joined([each.origin(self._history(each, history)) for each in self.elements])
-
-    # --- history ---
 
     @cached_property
     def state_stiffness(self) -> FloatArray:  # noqa: D102
@@ -163,8 +157,6 @@ class ContactLaw:
 
     def begun_at(self, mean: FloatArray, last: FloatArray) -> FloatArray:  # noqa: D102
         return self._histories([each.begun_at(mean[each.places], last[each.places]) for each in self.elements])
-
-    # --- masses on rigid ground: ratcheting, and harmonics above the highest one ---
 
     def drift(self, at: Marched) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.drift(part), at)

@@ -33,7 +33,6 @@ from solver.model import FloatArray, IntArray
 PARTS = 8  # parts of a step of a pair with two tangents
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
 
-
 Pair = tuple[float, float]
 
 
@@ -203,12 +202,10 @@ def march_masses(pairs: IntArray, period: Period, masses: Masses) -> None:
             start[0], start[1] = velocity[0], velocity[1]
             work = 0.0
             for n in range(n_samples):
-                normal = max(predicted_t[0, n], 0.0)
+                normal, force = max(predicted_t[0, n], 0.0), (predicted_t[1, n], predicted_t[2, n])
                 rests = velocity[0] == 0.0 and velocity[1] == 0.0
                 limit = friction_limit(period.friction[pair], normal)
-                step_mass(
-                    (predicted_t[1, n], predicted_t[2, n]), velocity, limit, gains, masses.line[pair], out, tangent
-                )
+                step_mass(force, velocity, limit, gains, masses.line[pair], out, tangent)
                 force_t[0, n], force_t[1, n], force_t[2, n] = normal, out[0], out[1]
                 for i in range(2):
                     velocity[i] = out[2 + i]
