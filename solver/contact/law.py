@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from solver.contact.elastic import CoulombPairs
-from solver.contact.element import Element, Marched, SampledLaw
+from solver.contact.element import Element, Marched, SampledLaw, Tangents
 from solver.contact.masses import SlidingMasses
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
 
@@ -90,12 +90,8 @@ class ContactLaw:
             joined[name] = self._joined([getattr(each, name) for each in parts])
         return Marched(**joined)
 
-    def tangent(
-        self, at: Marched, history: FloatArray | None = None, first: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """As in `Element`; returns what is there `out`. Entries of displacements that a pair does not have are without
-        meaning.
-        """
+    def tangent(self, at: Marched, history: FloatArray | None = None, first: FloatArray | None = None) -> Tangents:
+        """As in `Element`, returned. Entries of displacements that a pair does not have are without meaning."""
         found, size = [], 3 * at.force_h.shape[2]
         for each in self.elements:
             part, own = self._of(each, at), each.places

@@ -41,9 +41,7 @@ class WearTable:
 class WearLaw:
     """A wear law in the terms of a study.
 
-    - name: one of `LAWS`.
-    - threshold: q of the law "threshold", J/m2 per cycle.
-    - table: of the law "table".
+    - name: one of `LAWS`. threshold: q, J/m2 per cycle. table: f.
     - surfaces: factor of the wear coefficient for each label of a surface; a pair "flat/cylinder" has the sum of both.
       Empty: factor 1 for each pair.
     - worn: depth of each pair at the start of a history, m, from which the depths of the law "table" count; empty: 0.
@@ -143,7 +141,9 @@ class WearingWork:
         work = self._without_table(slip_work)
         return work if self.table is None else work * self.table.at(normal_force, depth)[0]
 
-    def slopes(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> tuple[FloatArray, ...]:
+    def slopes(
+        self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Derivatives (n_contact,) of `work` by slip work, 1, normal force, m, and depth, N."""
         by_work, none = np.where(slip_work >= self.least, self.factor, 0.0), np.zeros_like(slip_work)
         if self.table is None:
