@@ -186,14 +186,10 @@ class ResolvedState:
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:
-    """Resolution so many levels up, or one level down for -1, as `with_highest`."""
-    if levels > 0:
-        above = [highest for highest in HARMONIC_LEVELS if highest > resolution.highest]
-        highest = above[levels - 1] if len(above) >= levels else (levels + 1) * resolution.highest
-    else:
-        below = (highest for highest in HARMONIC_LEVELS if highest < resolution.highest)
-        highest = max(below, default=resolution.highest)
-    return with_highest(resolution, highest)
+    """Resolution so many levels up, as `with_highest`."""
+    above = [highest for highest in HARMONIC_LEVELS if highest > resolution.highest]
+    beyond = (levels + 1) * resolution.highest
+    return with_highest(resolution, above[levels - 1] if len(above) >= levels else beyond)
 
 
 def with_highest(resolution: Resolution, highest: int) -> Resolution:
@@ -206,8 +202,10 @@ def with_highest(resolution: Resolution, highest: int) -> Resolution:
 
 def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
     """Resolution with one level fewer harmonics and half the samples, as far as these are automatic."""
-    orders = shifted(resolution, -1).orders if settings.harmonics == "auto" else resolution.orders
-    samples = resolution.samples
+    orders, samples = resolution.orders, resolution.samples
+    if settings.harmonics == "auto":
+        below = (highest for highest in HARMONIC_LEVELS if highest < resolution.highest)
+        orders = with_highest(resolution, max(below, default=resolution.highest)).orders
     if settings.samples == "auto":
         samples = max(samples // 2, samples_for(orders[-1]))
     return Resolution(orders, samples)
@@ -218,11 +216,10 @@ def nothing_happens(evaluation: Evaluation) -> bool:
 
     A pair that reaches its friction limit without slip counts as stuck.
     """
-    separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
-    rests = np.ptp(state_t, axis=2) <= ROUND_OFF * np.abs(state_t).max(axis=2)
-    still = rests.all(axis=1) & ((evaluation.status_t == STICK) | (evaluation.status_t == SLIP)).all(axis=1)
-    sticks = (evaluation.status_t == STICK).all(axis=1)
-    return bool((sticks | still | separated.all(axis=1)).all())
+    status_t, state_t = evaluation.status_t, evaluation.state_t
+    rests = (np.ptp(state_t, axis=2) <= ROUND_OFF * np.abs(state_t).max(axis=2)).all(axis=1)
+    closed = ((status_t == STICK) | (status_t == SLIP)).all(axis=1)
+    return bool((rests & closed | (status_t == SEPARATED).all(axis=1)).all())
 
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:

@@ -22,34 +22,23 @@ class CoulombPairs(Element):
 
     def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None, /) -> Marched:  # noqa: D102
         predicted_t = predicted_h @ self.basis.synthesis
-        start, slid = history * self.penalty.tangential[:, None], np.zeros(len(history), bool)
+        pairs, begin = np.arange(len(history)), history * self.penalty.tangential[:, None]
+        start = begin.copy()
         if first is not None:
-            path = Path(first, predicted_t, self.friction_coefficient, start)
-            start = start.copy()
-            slide_along(np.arange(slid.size), path, start)
-            slid = (start != path.state).any(axis=1)
+            slide_along(pairs, Path(first, predicted_t, self.friction_coefficient, begin), start)
         period = new_period(predicted_t, self.friction_coefficient, start)
         limit = friction_limit(self.friction_coefficient, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
         # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
         periodicity = 0.1 * ROUND_OFF * float(limit.max(initial=0.0))
-        march_period(np.arange(slid.size), period, periodicity, MOST_PERIODS)
-        return self.left_by(period, period.force_t @ self.basis.analysis, slid)
+        march_period(pairs, period, periodicity, MOST_PERIODS)
+        return self.left_by(period, period.force_t @ self.basis.analysis, (start != begin).any(axis=1))
 
     def left_by(self, period: Period, force_h: FloatArray, slid: BoolArray) -> Marched:
         """What a march has left. force_h (k, 3, m): harmonics of the contact force, N, the normal one in place."""
         force_h[:, 0] = mean_normal_force(period.predicted_t) @ self.basis.analysis
-        return self.marched(
-            period.predicted_t,
-            period.force_t,
-            force_h=force_h,
-            state_t=period.state_t,
-            start=period.start,
-            slid=slid,
-            status_t=period.status_t,
-            periods=period.periods,
-            periodicity_error=float(period.change.max(initial=0.0)),
-            slip_work=period.slip_work / self.state_stiffness,
-        )
+        own = period._asdict() | {"slip_work": period.slip_work / self.state_stiffness}
+        del own["friction"], own["change"]
+        return Marched(**own, force_h=force_h, slid=slid, periodicity_error=float(period.change.max(initial=0.0)))
 
     def period(self, at: Marched) -> Period:
         """The period that a march has left, for derivatives."""

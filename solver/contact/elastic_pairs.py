@@ -173,7 +173,7 @@ def march_tangent(
             for _ in range(plain):
                 end = _pass_tangent(dstart, unused_t, unused, predicted_t, friction, first, second, by_column_t)
                 first, second = end
-        assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_h)
+        assemble(out, pair, dforce_t, work, dstart, analysis_h)
 
 
 @register_jitable
@@ -236,19 +236,14 @@ def periodic_start(dend: FloatArray, dstart: FloatArray) -> bool:
 
 @register_jitable
 def assemble(
-    tangent: FloatArray,
-    work_tangent: FloatArray,
-    dforce_t: FloatArray,
-    work: FloatArray,
-    dstart: FloatArray,
-    analysis_h: FloatArray,
+    out: Tangents, pair: int, dforce_t: FloatArray, work: FloatArray, dstart: FloatArray, analysis_h: FloatArray
 ) -> None:
-    """Derivatives of a pair: of the harmonics of friction into `tangent` (3m, 3m), of the slip work into (3m,).
+    """Derivatives of the harmonics of friction and of the slip work of a pair, into `out`.
 
     dforce_t (N, 2w), work (w,): derivatives, in the last two columns by the start of the period. dstart (2, w): of the
     start.
     """
-    m, w = analysis_h.shape[0], work.size
+    tangent, work_tangent, m, w = out[0][pair], out[1][pair], analysis_h.shape[0], work.size
     dforce_h = np.empty((m, 2 * w))
     np.dot(analysis_h, dforce_t, dforce_h)
     for k in range(w - 2):

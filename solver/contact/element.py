@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -60,8 +59,9 @@ class Marched:
 
     def at(self, places: IntArray) -> Marched:
         """Those of some pairs (k,)."""
-        own: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(Marched)}
-        return Marched(**{name: each[places] if name != "periodicity_error" else each for name, each in own.items()})
+        of_pairs = (each.name for each in fields(Marched) if each.name != "periodicity_error")
+        own: dict[str, Any] = {name: getattr(self, name)[places] for name in of_pairs}
+        return Marched(**own, periodicity_error=self.periodicity_error)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Element(ABC):
         """Time between two samples, s."""
         return 2.0 * np.pi / (self.omega * self.basis.n_samples)
 
-    @cached_property
+    @property
     def compliance(self) -> ComplexArray:
         """Displacement per force (k, 3, H+1), m/N, in each harmonic: 1 / eps."""
         return np.repeat((1.0 + 0.0j) / self.penalty.stiffness[:, :, None], len(self.basis.orders) + 1, axis=2)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from solver.contact.elastic import CoulombPairs
-from solver.contact.element import Element, Marched, SampledLaw
+from solver.contact.element import Element, Marched, SampledLaw, Tangents
 from solver.contact.masses import SlidingMasses
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
 
@@ -27,7 +27,7 @@ A = TypeVar("A", FloatArray, ComplexArray, BoolArray)
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """The law of the n_contact pairs of a joint at one frequency; arrays as in `Element`, of all pairs.
+    """The law of the n_contact pairs of a joint at one frequency: methods as in `Element`, arrays of all pairs.
 
     elements: each pair belongs to one.
     """
@@ -35,8 +35,7 @@ class ContactLaw:
     elements: tuple[Element, ...]
 
     @property
-    def rate_dependent(self) -> bool:
-        """Whether the law depends on velocities: where masses sit on rigid ground."""
+    def rate_dependent(self) -> bool:  # noqa: D102
         return any(each.rate_dependent for each in self.elements)
 
     @property
@@ -45,8 +44,7 @@ class ContactLaw:
         return self._joined([np.full(each.places.size, each.rate_dependent) for each in self.elements])
 
     @property
-    def sample_step(self) -> float:
-        """Time between two samples, s."""
+    def sample_step(self) -> float:  # noqa: D102
         return self.elements[0].sample_step
 
     @cached_property
@@ -80,19 +78,11 @@ class ContactLaw:
         """Values of all pairs from what each element says of its part."""
         return self._joined([compute(each, self._of(each, at)) for each in self.elements])
 
-    # --- forces ---
-
-    def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None = None) -> Marched:
-        """March all pairs through the period under a predicted force (n_contact, 3, m), N.
-
-        first (n_contact, 3, N): predicted force, N, from which it has slowly come; None where it was always the same.
-        """
+    def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None = None) -> Marched:  # noqa: D102
         parts = list[Marched]()
         for each in self.elements:
-            at = each.places
-            parts.append(
-                each.march(predicted_h[at], self._history(each, history), None if first is None else first[at])
-            )
+            begin = None if first is None else first[each.places]
+            parts.append(each.march(predicted_h[each.places], self._history(each, history), begin))
         if len(parts) == 1:
             return parts[0]
         joined: dict[str, Any] = {"periodicity_error": max(each.periodicity_error for each in parts)}
@@ -100,15 +90,8 @@ class ContactLaw:
             joined[name] = self._joined([getattr(each, name) for each in parts])
         return Marched(**joined)
 
-    def tangent(
-        self, at: Marched, history: FloatArray | None = None, first: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Exact derivatives by the harmonics of the predicted force of each pair, with the periodicity and, where the
-        history and the `first` force of `march` are given, the way from there.
-
-        Returns those of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the slip work
-        (n_contact, 3m), m. Entries of displacements that a pair does not have are without meaning.
-        """
+    def tangent(self, at: Marched, history: FloatArray | None = None, first: FloatArray | None = None) -> Tangents:
+        """As in `Element`, returned. Entries of displacements that a pair does not have are without meaning."""
         found, size = [], 3 * at.force_h.shape[2]
         for each in self.elements:
             part, own = self._of(each, at), each.places
@@ -120,18 +103,16 @@ class ContactLaw:
         force, work = (self._joined([each[place] for each in found]) for place in (0, 1))
         return force, work
 
-    def friction_work(self, at: Marched) -> FloatArray:
-        """Work that friction dissipates in a period (n_contact,), J."""
+    def friction_work(self, at: Marched) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.friction_work(part), at)
 
-    def sample_tangents(self, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:
-        """A (n, n_contact, 3, 3) and B (n, n_contact, 2, 2), as in `Element`."""
+    def sample_tangents(self, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:  # noqa: D102
         parts = [each.sample_tangents(self._of(each, at), stride) for each in self.elements]
         own, carried = (self._joined([each[place] for each in parts], 1) for place in (0, 1))
         return own, carried
 
     def sampled(self, at: Marched, pairs: IntArray) -> SampledLaw:
-        """Derivative at the samples of some pairs (p,), ascending."""
+        """As in `Element`; pairs ascend."""
         parts = []
         for each in self.elements:
             wanted = np.flatnonzero(np.isin(each.places, pairs))
@@ -139,11 +120,8 @@ class ContactLaw:
         order = np.argsort(np.concatenate([places for places, _ in parts]))
         return SampledLaw(*(np.concatenate(each, 1)[:, order] for each in zip(*(of for _, of in parts), strict=True)))
 
-    # --- motion ---
-
     @cached_property
-    def compliance(self) -> ComplexArray:
-        """Displacement per force (n_contact, 3, H+1), m/N, in each harmonic."""
+    def compliance(self) -> ComplexArray:  # noqa: D102
         return self._joined([each.compliance for each in self.elements])
 
     def motion(self, correction: FloatArray) -> FloatArray:
@@ -154,56 +132,41 @@ class ContactLaw:
         """Predicted less contact force (n_contact, 3, m), N, of a motion, m, Eqs. (10), (12); undoes `motion`."""
         return _scaled(motion, 1.0 / self.compliance)
 
-    def origin(self, history: FloatArray) -> FloatArray:
-        """Mean tangential position (n_contact, 2), m, without mean force."""
+    def origin(self, history: FloatArray) -> FloatArray:  # noqa: D102
         return self._joined([each.origin(self._history(each, history)) for each in self.elements])
 
-    # --- history ---
-
     @cached_property
-    def state_stiffness(self) -> FloatArray:
-        """Tangential state over slip (n_contact,), N/m; 1 for masses."""
+    def state_stiffness(self) -> FloatArray:  # noqa: D102
         return self._joined([each.state_stiffness for each in self.elements])
 
-    def final_history(self, at: Marched, displacement_h: FloatArray) -> FloatArray:
-        """History (n_contact, n_history), m, that a state leaves; displacement_h (n_contact, 3, m): its motion, m."""
+    def final_history(self, at: Marched, displacement_h: FloatArray) -> FloatArray:  # noqa: D102
         ends = [each.final_history(self._of(each, at), displacement_h[each.places]) for each in self.elements]
         return self._histories(ends)
 
-    def started_from(self, at: Marched, history: FloatArray) -> FloatArray:
-        """As in Element."""
+    def started_from(self, at: Marched, history: FloatArray) -> FloatArray:  # noqa: D102
         begun = [each.started_from(self._of(each, at), self._history(each, history)) for each in self.elements]
         return self._histories(begun)
 
-    def relieved(self, history: FloatArray, force: FloatArray) -> FloatArray:
-        """As in Element."""
+    def relieved(self, history: FloatArray, force: FloatArray) -> FloatArray:  # noqa: D102
         parts = [each.relieved(self._history(each, history), force[each.places]) for each in self.elements]
         return self._histories(parts)
 
-    def begun_at(self, mean: FloatArray, last: FloatArray) -> FloatArray:
-        """As in Element."""
+    def begun_at(self, mean: FloatArray, last: FloatArray) -> FloatArray:  # noqa: D102
         return self._histories([each.begun_at(mean[each.places], last[each.places]) for each in self.elements])
 
-    # --- masses on rigid ground: ratcheting, and harmonics above the highest one ---
-
-    def drift(self, at: Marched) -> FloatArray:
-        """Distance (n_contact, 2), m, by which pairs move on in a period."""
+    def drift(self, at: Marched) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.drift(part), at)
 
-    def change_force(self, at: Marched) -> FloatArray:
-        """Change of the tangential state over the period (n_contact,), N."""
+    def change_force(self, at: Marched) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.change_force(part), at)
 
-    def driving_force(self, at: Marched) -> float:
-        """Largest force, N, that drives a sliding mass; 0 without masses."""
+    def driving_force(self, at: Marched) -> float:  # noqa: D102
         return max(each.driving_force(self._of(each, at)) for each in self.elements)
 
-    def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:
-        """Friction on masses in other harmonics (n_contact, 3, 2j+1), N."""
+    def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.tail(part, basis), at)
 
-    def beyond_series(self, at: Marched, series_t: FloatArray) -> FloatArray:
-        """As in Element."""
+    def beyond_series(self, at: Marched, series_t: FloatArray) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.beyond_series(part, series_t[each.places]), at)
 
 
@@ -211,9 +174,7 @@ def build_law(
     penalty: Penalty, friction_coefficient: FloatArray, contact: ContactInterface, basis: FourierBasis, omega: float
 ) -> ContactLaw:
     """The law of a joint at omega, rad/s. friction_coefficient: (n_contact,)."""
-    rubs = np.ones(contact.n_contact, bool)
-    for each in contact.laws:
-        rubs[list(each.pairs)] = False
+    rubs = ~np.isin(np.arange(contact.n_contact), [pair for each in contact.laws for pair in each.pairs])
     makers: list[tuple[Callable[..., Element], IntArray]] = [
         (CoulombPairs, np.flatnonzero(rubs & ~penalty.inertial)),
         (SlidingMasses, np.flatnonzero(rubs & penalty.inertial)),

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from solver.contact.coulomb import friction_limit
 from solver.contact.elastic import CoulombPairs
 from solver.contact.elastic_pairs import Period, by_columns, new_period
 from solver.contact.element import Marched, SampledLaw, Tangents
@@ -34,11 +33,10 @@ class SlidingMasses(CoulombPairs):
         line = np.where(tangents.sum(axis=1) == 1, np.argmax(tangents, axis=1), -1)
         return Masses(self.penalty.mass, self.penalty.drag, line, self.sample_step)
 
-    @cached_property
+    @property
     def compliance(self) -> ComplexArray:
         """As in Element; tangential ones are those of the marched masses."""
-        penalty, orders = self.penalty, np.array(self.basis.orders, np.float64)
-        found: ComplexArray = np.repeat((1.0 + 0.0j) / penalty.stiffness[:, :, None], orders.size + 1, axis=2)
+        found, penalty, orders = super().compliance, self.penalty, np.array(self.basis.orders, np.float64)
         if orders.size:
             angle = np.pi * orders / self.basis.n_samples
             mass, drag, mean = (part[:, None] for part in (penalty.mass, penalty.drag, penalty.mean))
@@ -56,7 +54,7 @@ class SlidingMasses(CoulombPairs):
         basis, pairs = self.basis, np.arange(len(history))
         predicted_t = predicted_h @ basis.synthesis
         predicted_t[:, 1:] = (predicted_h[:, 1:] * basis.step_mean) @ basis.synthesis
-        period = new_period(predicted_t, self.friction_coefficient, history * self.penalty.tangential[:, None])
+        period = new_period(predicted_t, self.friction_coefficient, np.zeros((pairs.size, 2)))
         march_masses(pairs, period, self.masses)
         force_h = period.force_t @ basis.analysis
         force_h[:, 1:] /= basis.step_mean
@@ -68,34 +66,29 @@ class SlidingMasses(CoulombPairs):
         (basis_t, analysis_h), step_mean = by, self.basis.step_mean
         slopes, means = mass_slopes(pairs, period, self.masses), by_columns(basis_t * step_mean)
         analysis = analysis_h / step_mean[:, None]
-        mass_tangent(pairs, period, slopes, self.sample_step, by_columns(basis_t), means, analysis, out)
+        mass_tangent(pairs, period, slopes, self.sample_step, (by_columns(basis_t), means), analysis, out)
 
     def sampled(self, at: Marched, pairs: IntArray) -> SampledLaw:
         """As in Element. With the derivatives T of the steps `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N`, and
         `dp = dlambda + gain dv - loss dv'`.
         """
-        found = super().sampled(at, pairs)
+        found, step, friction = super().sampled(at, pairs), self.sample_step, self.friction_coefficient
+        slopes_t, _ = mass_slopes(pairs, self.period(at), self.masses)
         for place, pair in enumerate(pairs.tolist()):
-            self._take_steps(found, place, at, pair)
+            slopes, there = slopes_t[place], np.flatnonzero(self.dofs[pair, 1:] >= 0)
+            rows = 1 + there
+            by_predicted, by_before = (slopes[:, there[:, None], first + there] for first in (0, 2))
+            for part in (found.by_force, found.by_motion, found.by_last_motion):
+                part[:, place, rows] = 0.0
+            block = (slice(None), place, rows[:, None], rows)
+            found.by_force[block] = np.eye(there.size) - by_predicted
+            if self.has_normal[pair]:
+                presses = at.predicted_t[pair, 0, :, None] > 0.0
+                found.by_force[:, place, rows, 0] = np.where(presses, -friction[pair] * slopes[:, there, 4], 0.0)
+            gain, loss = step_gains(self.penalty.mass[pair], self.penalty.drag[pair], step)
+            found.by_speed[block] = -gain / step * by_predicted
+            found.by_last_speed[block] = (by_before - loss * by_predicted) / step
         return found
-
-    def _take_steps(self, found: SampledLaw, place: int, at: Marched, pair: int) -> None:
-        """Tangential rows of the law of a mass, in place; place: index among the pairs of `found`."""
-        step, line = self.sample_step, int(self.masses.line[pair])
-        gain, loss = step_gains(self.penalty.mass[pair], self.penalty.drag[pair], step)
-        there = np.array([0, 1]) if line < 0 else np.array([line])
-        rows, friction = 1 + there, float(self.friction_coefficient[pair])
-        limit = friction_limit(friction, np.maximum(at.predicted_t[pair, 0], 0.0))
-        slopes = mass_slopes(np.array([pair]), self.period(at), self.masses)[0][0]
-        by_predicted, by_before = (slopes[:, there[:, None], first + there] for first in (0, 2))
-        block = (slice(None), place, rows[:, None], rows)
-        for part in (found.by_force, found.by_motion, found.by_last_motion):
-            part[:, place, rows] = 0.0
-        found.by_force[block] = np.eye(there.size) - by_predicted
-        if self.has_normal[pair]:
-            found.by_force[:, place, rows, 0] = np.where(limit[:, None] > 0.0, -friction * slopes[:, there, 4], 0.0)
-        found.by_speed[block] = -gain / step * by_predicted
-        found.by_last_speed[block] = (by_before - loss * by_predicted) / step
 
     def origin(self, history: FloatArray) -> FloatArray:  # noqa: D102
         return history

@@ -53,8 +53,8 @@ class Joint:
         """Penalty (n_rel,), N/m, of each relative displacement."""
         return self.penalty.stiffness.ravel()[self.component_index]
 
-    def rows_of(self, pairs: IntArray | int) -> IntArray:
-        """Indices of the relative displacements of one pair, or of ascending pairs, ascending."""
+    def rows_of(self, pairs: IntArray) -> IntArray:
+        """Indices of the relative displacements of ascending pairs, ascending."""
         rows = self.contact.pair_rows[pairs].ravel()
         return rows[rows >= 0]
 

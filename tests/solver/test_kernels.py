@@ -217,7 +217,7 @@ FREE, ELASTIC = [1, 3, 4], [0, 2, 5]
 
 def of_pairs(joint, pairs):
     """The law of some of the pairs alone."""
-    contact = replace(joint.contact, dofs=joint.contact.dofs[pairs])
+    contact = replace(joint.contact, dofs=joint.contact.dofs[pairs], area=joint.contact.area[pairs])
     return build_law(joint.penalty.at(pairs), joint.friction_coefficient[pairs], contact, joint.basis, joint.omega)
 
 
