@@ -37,8 +37,7 @@ def with_contact_stiffness(model: ReducedModel, contact_stiffness: float) -> Red
     if not 0.0 < contact_stiffness <= LARGEST_CONTACT_STIFFNESS:
         remedy = f"give a positive number, at most {LARGEST_CONTACT_STIFFNESS:g} N/m3"
         raise ValueError(f"contact_stiffness is {contact_stiffness}: {remedy}")
-    components = np.flatnonzero(model.contact.dofs.ravel() >= 0)
-    relative = model.contact.dofs.ravel()[components]
+    components, relative = model.contact.component_index, model.contact.relative
     share = np.where(components % 3 == 0, 1.0, TANGENTIAL_RATIO)
     springs = contact_stiffness * share * model.contact.area[components // 3]
     # Compressions of stiff springs are small. Their scale leaves all displacements with stiffnesses of one size.
