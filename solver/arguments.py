@@ -19,7 +19,7 @@ def check_case(
     friction_coefficient: ArrayLike | None,
     sweep: Direction,
     settings: SolverSettings | None,
-) -> tuple[float, float | FloatArray | None, SolverSettings]:
+) -> tuple[float, FloatArray | None, SolverSettings]:
     """Checked excitation amplitude, friction coefficient and settings."""
     load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
     friction = check_friction(model, friction_coefficient)
@@ -55,14 +55,11 @@ def worn_model(model: ReducedModel, wear_depth: ArrayLike | None) -> ReducedMode
     return replace(model, contact=replace(model.contact, gap=model.contact.gap + depth))
 
 
-def check_friction(model: ReducedModel, given: ArrayLike | None) -> float | FloatArray | None:
-    """One number, one for each pair (n_contact,), or None for those of the model, which must be one."""
+def check_friction(model: ReducedModel, given: ArrayLike | None) -> FloatArray | None:
+    """One number (), one for each pair (n_contact,), or None for those of the model, which must be one."""
     remedy = f"give what build_scene, read_scene or build_model gives, instead of {model!r}"
     check("model", isinstance(model, ReducedModel), remedy)
-    friction: float | FloatArray | None = None
-    if given is not None:
-        numbers = check_numbers("friction_coefficient", given, least=0.0)
-        friction = numbers if numbers.size > 1 else float(numbers[0])
+    friction = None if given is None else np.squeeze(check_numbers("friction_coefficient", given, least=0.0))
     friction_of_pairs(model, friction)
     return friction
 

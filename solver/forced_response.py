@@ -139,7 +139,7 @@ def frequency_response(
 
 
 def _read(
-    model: ReducedModel, friction: float | FloatArray | None, settings: SolverSettings, start: StartState
+    model: ReducedModel, friction: FloatArray | None, settings: SolverSettings, start: StartState
 ) -> tuple[ComplexArray, FloatArray, Outcome, str]:
     """Response, peak, outcome and message of a point, as in `FrequencyResponse`."""
     state, outcome, message = start.state, start.outcome, start.message
@@ -183,7 +183,7 @@ def balance_of(
 
 def balance_at_start(
     model: ReducedModel,
-    friction: float | FloatArray | None,
+    friction: FloatArray | None,
     load: float,
     frequency: float,
     sweep: Direction,

@@ -88,8 +88,7 @@ class ToTheEnd:
 class FollowedFrequency:
     """Excitation whose frequency follows the structure while the joint wears.
 
-    of: "resonance" for phase resonance, where the product `F^H x` of the first harmonics of excitation and motion has
-    no real part; "peak" for the largest amplitude of the first response, in its first harmonic. low, high: Hz.
+    of: as `frequency` of `solver.march_wear`. low, high: Hz.
     """
 
     of: Followed

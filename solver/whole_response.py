@@ -17,7 +17,7 @@ from solver.loading_history.path import LoadingPath
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome, check
-from solver.presentation import NOT_IN_DATASETS, Presented, new_axes, unit_of
+from solver.presentation import NOT_IN_DATASETS, Presented, unit_of
 from solver.settings import Direction, SolverSettings
 from solver.stability.floquet import Multipliers, Stability, find_multipliers
 
@@ -73,7 +73,9 @@ class ResponseCurve(Presented):
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
         """As for other results, over the parameter that changes along the curve; solid where it is stable."""
-        axes = axes or new_axes()
+        from matplotlib import pyplot
+
+        axes = axes or pyplot.subplots()[1]
         at, stable = getattr(self, self.parameter), np.array(self.stability) == "stable"
         for size in np.abs(self.response).T:
             (line,) = axes.plot(at, size, ":")

@@ -80,13 +80,18 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
     """
     linear = joint.model.harmonic_structure(1)
-    relative = joint.contact.relative
     force = joint.excitation_amplitude * linear.load_harmonic
-    first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
-    moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
+    moved = first_motion(joint, evaluation.displacement_h, joint.excitation_amplitude)
     inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
     square = joint.omega**2 + work.real / inertia if inertia > 0.0 else -1.0
     return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
+
+
+def first_motion(joint: Joint, displacement_h: FloatArray, excitation_amplitude: float) -> ComplexArray:
+    """First harmonic (n,), m, of all displacements, from the relative ones of the pairs."""
+    linear, first = joint.model.harmonic_structure(1), to_complex(joint.to_relative(displacement_h))[:, 0]
+    force = excitation_amplitude * linear.load_harmonic
+    return whole_motion(linear, 1j * joint.omega, joint.contact.relative, force, first)
 
 
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
