@@ -65,8 +65,9 @@ def march_wear(
       `cycles` = inf.
     - law: of wear (`solver.contact.wear_law`).
     - until: wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
-    - outputs, final_share: for `cycles` = inf: number of reported states, spaced evenly in worn volume and cycles; the
-      history ends where the wear rate of each pair is below this share of its own largest wear rate.
+    - outputs, final_share: for `cycles` = inf: number of reported states, at least 2, the first and the last one
+      included, spaced evenly in worn volume and cycles; the history ends where the wear rate of each pair is below this
+      share of its largest one so far, which counts as at least this share of the largest of all pairs.
     - wear_depth: (n_contact,), m, of a joint that is worn before. Depths and volumes of the history count from there.
     - between: range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance
       that the sweep meets in the range. "resonance" is phase resonance: `F^H x` of the first harmonics of excitation

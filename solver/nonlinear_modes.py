@@ -95,8 +95,7 @@ class ModalResponse:
 
     - frequency (n,): Hz. The curve may pass a frequency several times.
     - amplitude (n,): modal amplitude, m sqrt(kg).
-    - response (n, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)) to a harmonic load
-      Re(F exp(i omega t)).
+    - response (n, n_response): complex first harmonic, m, to a harmonic load Re(F exp(i omega t)).
     - damping_ratio (n,): of the mode at this amplitude.
 
     Where the resonance is beyond the largest amplitude of the mode, a row of NaN stands between the sides.
