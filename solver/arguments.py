@@ -57,8 +57,8 @@ def worn_model(model: ReducedModel, wear_depth: ArrayLike | None) -> ReducedMode
 
 def check_friction(model: ReducedModel, given: ArrayLike | None) -> FloatArray | None:
     """One number (), one for each pair (n_contact,), or None for those of the model, which must be one."""
-    remedy = f"give what build_scene, read_scene or build_model gives, instead of {model!r}"
-    check("model", isinstance(model, ReducedModel), remedy)
+    if not isinstance(model, ReducedModel):
+        raise ValueError(f"model: give what build_scene, read_scene or build_model gives, instead of {model!r}")
     friction = None if given is None else np.squeeze(check_numbers("friction_coefficient", given, least=0.0))
     friction_of_pairs(model, friction)
     return friction

@@ -189,7 +189,9 @@ def balance_at_start(
     sweep: Direction,
     settings: SolverSettings,
 ) -> tuple[StartState, Case, Balance, Evaluation | None]:
-    """State to which a sweep comes at a frequency, Hz, its case, balance and evaluation; None without a state."""
+    """State to which a sweep comes at a frequency, Hz, with its case, its balance and its evaluation. Where there is no
+    state, the evaluation is None, and the balance has no history.
+    """
     ((_, start),) = follow_branch(model, friction, load, np.array([frequency]), sweep, settings)
     fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)
     case = build_case(model, friction, start.penalty_omega, fixed, start.resolution)
