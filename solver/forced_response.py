@@ -11,7 +11,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import first_response, largest_responses
 from solver.loading_history.start_states import FrequencySweep
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.outcome import Ended, Outcome
+from solver.outcome import Ended, Outcome, check
 from solver.presentation import Presented
 from solver.results.history import StartState, describe_cut_off, first_cut_off
 from solver.results.state_report import PeriodicMotion, evaluated, periodic_motion
@@ -90,8 +90,8 @@ class HarmonicBalance(Ended):
 
     def _evaluate(self, z: ArrayLike) -> Evaluation:
         given = np.array(z, np.float64)
-        if given.shape != self.state.shape or not np.isfinite(given).all():
-            raise ValueError(f"z: give {self.size} finite numbers in shape ({self.size},), not shape {given.shape}")
+        right = given.shape == self.state.shape and np.isfinite(given).all()
+        check("z", right, f"give {self.size} finite numbers in shape ({self.size},), not shape {given.shape}")
         return self._balance.evaluate(given.reshape(-1, self._balance.joint.basis.synthesis.shape[0]))
 
 
@@ -119,9 +119,8 @@ def frequency_response(
     Raises ValueError where a number is out of its range, where the model lacks nodal diameters that the harmonics need,
     and where friction coefficients are given twice, not at all, or not to each pair.
     """
-    settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("frequency", frequency, above=0.0)
-    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    load, friction, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
     found = dict(FrequencySweep(model, friction, load, sweep, settings).states(ascending))
@@ -140,7 +139,7 @@ def frequency_response(
 
 
 def _read(
-    model: ReducedModel, friction: float | FloatArray | None, settings: SolverSettings, start: StartState
+    model: ReducedModel, friction: FloatArray | None, settings: SolverSettings, start: StartState
 ) -> tuple[ComplexArray, FloatArray, Outcome, str]:
     """Response, peak, outcome and message of a point, as in `FrequencyResponse`."""
     state, outcome, message = start.state, start.outcome, start.message
@@ -175,9 +174,8 @@ def balance_of(
 
     All other parameters and errors as in `frequency_response`.
     """
-    settings = SolverSettings() if settings is None else settings
     wanted = check_number("frequency", frequency, above=0.0)
-    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    load, friction, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     start, _, balance, at = balance_at_start(worn_model(model, wear_depth), friction, load, wanted, sweep, settings)
     unknown = np.full((balance.joint.component_index.size, len(balance.joint.basis.synthesis)), np.nan)
     return functions_of(balance, unknown if at is None else at.predicted_h, start.outcome, start.message)
@@ -185,14 +183,14 @@ def balance_of(
 
 def balance_at_start(
     model: ReducedModel,
-    friction: float | FloatArray | None,
+    friction: FloatArray | None,
     load: float,
     frequency: float,
     sweep: Direction,
     settings: SolverSettings,
 ) -> tuple[StartState, Case, Balance, Evaluation | None]:
-    """State to which a sweep comes at a frequency, Hz, the case with its harmonics and samples, its balance and its
-    evaluation; where there is no state, None and a balance without history.
+    """State to which a sweep comes at a frequency, Hz, with its case, its balance and its evaluation. Where there is no
+    state, the evaluation is None, and the balance has no history.
     """
     ((_, start),) = FrequencySweep(model, friction, load, sweep, settings).states(np.array([frequency]))
     fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
+from scipy.spatial.distance import pdist
 
 from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
@@ -51,7 +51,8 @@ def report_state(
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     found = {
         "mean_pressure": evaluation.force_h[:, 0, 0] / joint.contact.area,
-        "slip_range": largest_distance(evaluation.state_t) / joint.law.state_stiffness,
+        # the largest distance between any two tangential states of the period
+        "slip_range": np.array([pdist(pair.T).max() for pair in evaluation.state_t]) / joint.law.state_stiffness,
         "open_fraction": (evaluation.status_t == SEPARATED).mean(axis=1),
         "response": to_complex(response_h)[:, 0],
         "response_mean": response_h[:, 0],
@@ -79,28 +80,18 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
     """
     linear = joint.model.harmonic_structure(1)
-    relative = joint.contact.relative
     force = joint.excitation_amplitude * linear.load_harmonic
-    first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
-    moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
+    moved = first_motion(joint, evaluation.displacement_h, joint.excitation_amplitude)
     inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
     square = joint.omega**2 + work.real / inertia if inertia > 0.0 else -1.0
     return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
 
 
-@njit(cache=True)
-def largest_distance(state_t: FloatArray) -> FloatArray:
-    """Largest distance (n_contact,) between any two tangential states (n_contact, 2, N+1) of a period."""
-    n_contact, _, n_points = state_t.shape
-    largest = np.zeros(n_contact)
-    for pair in range(n_contact):
-        for i in range(n_points):
-            for j in range(i):
-                first = state_t[pair, 0, i] - state_t[pair, 0, j]
-                second = state_t[pair, 1, i] - state_t[pair, 1, j]
-                largest[pair] = max(largest[pair], first * first + second * second)
-        largest[pair] = np.sqrt(largest[pair])
-    return largest
+def first_motion(joint: Joint, displacement_h: FloatArray, excitation_amplitude: float) -> ComplexArray:
+    """First harmonic (n,), m, of all displacements, from the relative ones of the pairs."""
+    linear, first = joint.model.harmonic_structure(1), to_complex(joint.to_relative(displacement_h))[:, 0]
+    force = excitation_amplitude * linear.load_harmonic
+    return whole_motion(linear, 1j * joint.omega, joint.contact.relative, force, first)
 
 
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
