@@ -25,9 +25,11 @@ class _ByRows:
 
 
 class PairLaw(Protocol):
-    """What some pairs of a scene follow in place of friction and separation, with its numbers. pairs: their indices."""
+    """What some pairs of a scene follow in place of friction and separation, with its numbers: a `packable` class."""
 
-    pairs: tuple[int, ...]
+    @property
+    def pairs(self) -> tuple[int, ...]:
+        """Indices of the pairs, ascending."""
 
     def element(self, places: IntArray, *of_pairs: Any) -> Any:
         """The `solver.contact.element.Element` of these pairs in one joint, of which these are the first fields."""
@@ -58,10 +60,24 @@ class ContactInterface(_ByRows):
     edge: BoolArray | None = None
     laws: tuple[PairLaw, ...] = ()
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        others = [pair for law in self.laws for pair in law.pairs]
+        right = all(tuple(np.unique(law.pairs)) == law.pairs for law in self.laws) and len(set(others)) == len(others)
+        if not right or not set(others) <= set(range(self.n_contact)):
+            raise ValueError(
+                f"laws: give to each ascending pairs from 0 to {self.n_contact - 1}, and each pair to one law only"
+            )
+
     @property
     def n_contact(self) -> int:
         """Number of contact pairs."""
         return len(self.area)
+
+    @cached_property
+    def rubs(self) -> BoolArray:
+        """False (n_contact,) for pairs with a law of `laws`."""
+        return ~np.isin(np.arange(self.n_contact), [pair for law in self.laws for pair in law.pairs])
 
     @cached_property
     def has_normal(self) -> BoolArray:

@@ -105,7 +105,7 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
         energy_error=_energy_error(joint, evaluation, flexed),
         periodicity_error=_relative(
             max(evaluation.periodicity_error, float(changed.max(initial=0.0))),
-            max(limit, law.driving_force(evaluation)),
+            max(limit, law.driving_force(evaluation), float(np.abs(force_t[~rubs]).max(initial=0.0))),
         ),
     )
 

@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from solver.accuracy.certificate import SMALL_WORK, certify
-from solver.contact.coulomb import SEPARATED, SLIP, STICK
+from solver.contact.coulomb import OTHER, SEPARATED, SLIP, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import State, first_response, largest_responses, transfer
-from solver.model import ComplexArray, FloatArray
+from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, SolverSettings, all_orders, samples_for
@@ -214,12 +214,18 @@ def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
 def nothing_happens(evaluation: Evaluation) -> bool:
     """Whether every pair sticks or is open throughout the period, so that the joint is linear.
 
-    A pair that reaches its friction limit without slip counts as stuck.
+    A pair that reaches its friction limit without slip counts as stuck. One with another law is linear at rest alone.
     """
-    status_t, state_t = evaluation.status_t, evaluation.state_t
-    rests = (np.ptp(state_t, axis=2) <= ROUND_OFF * np.abs(state_t).max(axis=2)).all(axis=1)
-    closed = ((status_t == STICK) | (status_t == SLIP)).all(axis=1)
-    return bool((rests & closed | (status_t == SEPARATED).all(axis=1)).all())
+    status_t, force_t = evaluation.status_t, evaluation.predicted_t
+    closed = ((status_t == STICK) | (status_t == SLIP)).all(axis=1) & _is_constant(evaluation.state_t)
+    other = (status_t == OTHER).all(axis=1)
+    calm = other & _is_constant(force_t) if other.any() else other
+    return bool((closed | calm | (status_t == SEPARATED).all(axis=1)).all())
+
+
+def _is_constant(values_t: FloatArray) -> BoolArray:
+    """Pairs (n_contact,) with values (n_contact, k, N) that do not change."""
+    return np.asarray((np.ptp(values_t, axis=2) <= ROUND_OFF * np.abs(values_t).max(axis=2)).all(axis=1))
 
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:

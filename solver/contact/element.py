@@ -96,7 +96,7 @@ class Element(ABC):
     basis: FourierBasis
     omega: float
 
-    # whether the law depends on velocities
+    # whether the law depends on velocities, and the length of the history
     rate_dependent: ClassVar[bool] = False
     n_history: ClassVar[int] = 2
 
@@ -122,7 +122,9 @@ class Element(ABC):
 
     @abstractmethod
     def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None, /) -> Marched:
-        """The period under a predicted force (k, 3, m), N.
+        """The period under a predicted force p (k, 3, m), N: the contact force lambda at its samples, by the relative
+        displacement `u = (p - lambda) / eps`, which is 0 where a pair without wear just closes. The force in a
+        direction that a pair does not have is p.
 
         first (k, 3, N): predicted force, N, from which it has slowly come; None where it was always the same.
         """
@@ -186,7 +188,7 @@ class Element(ABC):
         return SampledLaw(-passed, (np.eye(3) - passed) * eps, none, last * eps, none.copy())
 
     def friction_work(self, at: Marched) -> FloatArray:
-        """Work that friction dissipates in a period (k,), J. Friction is at its limit during slip."""
+        """Work that the law dissipates in a period (k,), J: by default that of friction, at its limit during slip."""
         return friction_limit(self.friction_coefficient, at.slip_work)
 
     # --- what a state leaves to the next one ---

@@ -174,11 +174,10 @@ def build_law(
     penalty: Penalty, friction_coefficient: FloatArray, contact: ContactInterface, basis: FourierBasis, omega: float
 ) -> ContactLaw:
     """The law of a joint at omega, rad/s. friction_coefficient: (n_contact,)."""
-    rubs = ~np.isin(np.arange(contact.n_contact), [pair for each in contact.laws for pair in each.pairs])
     makers: list[tuple[Callable[..., Element], IntArray]] = [
-        (CoulombPairs, np.flatnonzero(rubs & ~penalty.inertial)),
-        (SlidingMasses, np.flatnonzero(rubs & penalty.inertial)),
-        *((each.element, np.sort(each.pairs)) for each in contact.laws),
+        (CoulombPairs, np.flatnonzero(contact.rubs & ~penalty.inertial)),
+        (SlidingMasses, np.flatnonzero(penalty.inertial)),
+        *((each.element, np.array(each.pairs)) for each in contact.laws),
     ]
     return ContactLaw(
         tuple(

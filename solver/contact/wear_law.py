@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.model import ContactInterface, FloatArray
+from solver.outcome import check
 
 LAWS = ("archard", "energy", "threshold", "table")
 
@@ -52,6 +53,10 @@ class WearLaw:
     table: WearTable | None = None
     surfaces: tuple[tuple[str, float], ...] = ()
     worn: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        check("law", self.name in LAWS, f'give one of {", ".join(LAWS)} instead of "{self.name}"')
+        check("law", (self.name == "table") == (self.table is not None), 'give a table to the law "table", to no other')
 
     def begun_at(self, depth: FloatArray) -> WearLaw:
         """The law of a history that begins at depths (n_contact,), m; only the factors of a table depend on depths."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine, with_level_above
 from solver.accuracy.resolved_state import Estimate, ResolvedState, left_out, nothing_happens
-from solver.contact.coulomb import SEPARATED, STICK, friction_limit
+from solver.contact.coulomb import SEPARATED, SLIP, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
@@ -260,7 +260,8 @@ class LoadingPath(Path[State]):
 
     def describe(self, state: State) -> str:  # noqa: D102
         at = f"{state.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {state.parameter:.3g}"
-        moving = int(np.count_nonzero((state.evaluation.status_t != STICK).any(axis=1)))
+        status_t = state.evaluation.status_t
+        moving = int(np.count_nonzero(((status_t == SLIP) | (status_t == SEPARATED)).any(axis=1)))
         return f"at {at}, {moving} of {len(state.evaluation.status_t)} pairs slip or open"
 
 

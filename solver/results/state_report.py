@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.spatial.distance import pdist
+from numba import njit
 
 from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
@@ -51,8 +51,7 @@ def report_state(
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     found = {
         "mean_pressure": evaluation.force_h[:, 0, 0] / joint.contact.area,
-        # the largest distance between any two tangential states of the period
-        "slip_range": np.array([pdist(pair.T).max() for pair in evaluation.state_t]) / joint.law.state_stiffness,
+        "slip_range": largest_distance(evaluation.state_t) / joint.law.state_stiffness,
         "open_fraction": (evaluation.status_t == SEPARATED).mean(axis=1),
         "response": to_complex(response_h)[:, 0],
         "response_mean": response_h[:, 0],
@@ -85,6 +84,23 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
     square = joint.omega**2 + work.real / inertia if inertia > 0.0 else -1.0
     return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
+
+
+@njit(cache=True)
+def largest_distance(state_t: FloatArray) -> FloatArray:
+    """Largest distance (n_contact,) between any two tangential states (n_contact, 2, N+1) of a period; `pdist` of scipy
+    takes four to seven times as long.
+    """
+    n_contact, _, n_points = state_t.shape
+    largest = np.zeros(n_contact)
+    for pair in range(n_contact):
+        for i in range(n_points):
+            for j in range(i):
+                first = state_t[pair, 0, i] - state_t[pair, 0, j]
+                second = state_t[pair, 1, i] - state_t[pair, 1, j]
+                largest[pair] = max(largest[pair], first * first + second * second)
+        largest[pair] = np.sqrt(largest[pair])
+    return largest
 
 
 def first_motion(joint: Joint, displacement_h: FloatArray, excitation_amplitude: float) -> ComplexArray:
@@ -137,7 +153,7 @@ class PeriodicMotion:
     - time (N,): s, from 0 on: the samples at which the contact law is applied.
     - displacement_t, velocity_t (n, N), response_t (n_response, N): m and m/s, sums of the Fourier series.
     - contact_force_t (n_contact, 3, N): N, by the contact law; means over a time step for masses on rigid ground.
-    - status_t (n_contact, N): 0 open, 1 sticking, 2 slipping.
+    - status_t (n_contact, N): 0 open, 1 sticking, 2 slipping, 3 another law.
     - residual: scaled residual of the balance, dimensionless: above the tolerance the motion is no solution.
     """
 

@@ -148,7 +148,8 @@ def build_case(
 
 
 def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatArray | None) -> FloatArray:
-    """Friction coefficient (n_contact,) from one number, from (n_contact,), or where None is given from the scene.
+    """Friction coefficient (n_contact,) from one number, from (n_contact,), or where None is given from the scene; 0 of
+    pairs with another law.
 
     Raises ValueError where it is given twice, not at all, or not for each pair.
     """
@@ -160,7 +161,7 @@ def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatAr
     given = np.asarray(friction_coefficient if own is None else own, np.float64)
     if given.shape not in ((), (n_contact,)):
         raise ValueError(f"friction_coefficient has shape {given.shape}: give a number or shape ({n_contact},)")
-    return np.array(np.broadcast_to(given, (n_contact,)))
+    return np.where(model.contact.rubs, given, 0.0)
 
 
 def static_joint(joint: Joint, load_factor: float) -> Joint:

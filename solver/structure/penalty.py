@@ -70,7 +70,7 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     rate, contact = (highest + 1) * omega, model.contact
     size = _stiffness_at(model, rate)
     low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
-    inertial = (contact.dofs[:, 1:] >= 0).any(axis=1) & (high > INERTIAL_RATIO * low)
+    inertial = contact.rubs & (contact.dofs[:, 1:] >= 0).any(axis=1) & (high > INERTIAL_RATIO * low)
     if inertial.any() and highest + 1 > INERTIAL_RATE:
         # a mass behind a spring: where the spring dominates in the harmonics left out, the pair is elastic
         inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > INERTIAL_RATIO * size[:, 1]

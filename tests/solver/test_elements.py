@@ -5,7 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from solver import backbone, frequency_response
 from solver.contact.element import Element
+from solver.harmonic_balance.state import final_history
+from solver.packing import packable
 from solver.settings import SolverSettings
 from tests.solver.models import branch_states, march_wear, random_balance, random_model
 from tests.solver.test_balance import jacobian_by_differences
@@ -31,16 +34,25 @@ class Springs(Element):
         return own, np.zeros((n, len(self.places), 2, 2))
 
 
+class Remembering(Springs):
+    n_history = 3
+
+    def final_history(self, at, _):
+        return np.full((len(at.start), 3), 7.0)
+
+
+@packable
 @dataclass(frozen=True)
 class OnSprings:
     pairs: tuple[int, ...]
+    kind: type = Springs
 
     def element(self, *of_pairs):
-        return Springs(*of_pairs)
+        return self.kind(*of_pairs)
 
 
-def with_springs(model, *pairs):
-    return replace(model, contact=replace(model.contact, laws=(OnSprings(pairs),)))
+def with_springs(model, *pairs, kind=Springs):
+    return replace(model, contact=replace(model.contact, laws=(OnSprings(pairs, kind),)))
 
 
 def test_derivatives_of_a_joint_with_a_law_of_another_kind_are_differences():
@@ -76,3 +88,33 @@ def test_a_joint_on_springs_moves_as_its_matrices_say_and_does_not_wear():
     assert history.response[0] == pytest.approx(linear.response @ moved, rel=1e-6)
     assert history.outcome.meaning == "converged"
     assert not history.worn_volume.any()
+
+
+def test_a_law_that_remembers_more_leaves_what_friction_remembers():
+    model = random_model(4, ("3d", "3d", "one_tangent"))
+    balance, predicted = random_balance(with_springs(model, 1), SETTINGS, 104, wear=False)
+    longer, _ = random_balance(with_springs(model, 1, kind=Remembering), SETTINGS, 104, wear=False)
+    longer = replace(longer, history=np.pad(balance.history, ((0, 0), (0, 1))))
+    short, long = (final_history(each, each.evaluate(predicted)) for each in (balance, longer))
+    assert long[1].tolist() == [7.0, 7.0, 7.0]
+    assert np.array_equal(long[[0, 2], :2], short[[0, 2]])
+    assert not long[[0, 2], 2].any()
+
+
+def test_a_joint_on_springs_at_rest_needs_one_harmonic():
+    model = with_springs(random_model(4, ("3d", "3d")), 0, 1)
+    response = frequency_response(model, [100.0], 0.0, 0.4)
+    assert response.outcome[0].meaning == "converged"
+    assert np.abs(response.response).max() < 1e-15
+    assert response.n_iterations[0] < 100
+
+
+@pytest.mark.parametrize("pairs", [(1, 0), (0, 0), (0, 2), (-1,)])
+def test_pairs_of_a_law_have_to_be_there_in_order(pairs):
+    with pytest.raises(ValueError, match="laws"):
+        with_springs(random_model(4, ("3d", "3d")), *pairs)
+
+
+def test_modes_refuse_another_law():
+    with pytest.raises(ValueError, match=r"^model: "):
+        backbone(with_springs(random_model(4, ("3d", "3d")), 1), [1e-6], 0.4)
