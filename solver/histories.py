@@ -112,7 +112,7 @@ def march_wear(
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
-    steps = steps_of(scheme, length, settings.rtol)
+    steps = steps_of(scheme, length)
     request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
     return next(integrate_together(model, friction, settings, start, (request,)))
 

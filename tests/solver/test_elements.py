@@ -44,7 +44,9 @@ def with_springs(model, *pairs):
 
 
 def test_derivatives_of_a_joint_with_a_law_of_another_kind_are_differences():
-    balance, predicted = random_balance(with_springs(random_model(4, ("3d", "3d", "one_tangent")), 1), SETTINGS, 104, wear=False)
+    balance, predicted = random_balance(
+        with_springs(random_model(4, ("3d", "3d", "one_tangent")), 1), SETTINGS, 104, wear=False
+    )
     tangent = balance.linearise(balance.evaluate(predicted)).dense(np.arange(3))
     differences = jacobian_by_differences(balance, predicted, 1e-4)
     assert (np.abs(tangent - differences).max(axis=1) < 1e-7 * np.abs(differences).max(axis=1)).all()
