@@ -245,8 +245,7 @@ class Solution:
     state: the last one; None where there is no first state. failure: why it ends before it is complete, else None; or
         INACCURATE where it is not known whether a complete history is stable.
     ended: False when it is saved on its way.
-    compared: the solution whose difference is the error: of a history with given steps the adaptive one, of an adaptive
-        one its reference solution; None where there is none.
+    compared: the solution whose difference is the error (`solver.wear.errors`); None where there is none.
     """
 
     state: Any
