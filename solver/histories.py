@@ -105,7 +105,7 @@ def march_wear(
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(FrequencySweep(model, friction, load, sweep, settings).states(follow or np.array([at])))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
-    steps = steps_of(scheme, length, settings.rtol)
+    steps = steps_of(scheme, length)
     request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
     return next(integrate_together(model, friction, settings, start, (request,)))
 

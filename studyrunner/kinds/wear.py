@@ -245,7 +245,7 @@ class History(_FromRest):
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
         return WearRequest(
             integrated.wear_coefficients[0],
-            steps_of(integrated.scheme, integrated.step, self.settings.rtol, integrated.largest_depth),
+            steps_of(integrated.scheme, integrated.step, integrated.largest_depth),
             counts,
             law=self.law,
             until=self.until,

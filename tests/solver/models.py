@@ -166,7 +166,7 @@ def march_wear(
     model, friction, start, wear_coefficient, step, scheme, cycles, settings, *, keep=None, resume=None, **asked
 ) -> WearHistory:
     """The history from a start state; asked: what else `WearRequest` has."""
-    wanted = WearRequest(wear_coefficient, steps_of(scheme, step, settings.rtol, None), cycles, **asked)
+    wanted = WearRequest(wear_coefficient, steps_of(scheme, step), cycles, **asked)
     return next(integrate_together(model, friction, settings, start, (wanted,), keep, resume))
 
 
