@@ -12,6 +12,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from solver.wear import problem
+from solver.wear.wearing_joint import Given
 from studies import build_scene
 from tests.solver.models import assert_same, march_wear
 from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
@@ -43,6 +44,19 @@ def test_the_count_is_that_at_which_the_history_has_the_wear(scheme):
 def test_the_error_of_a_life_is_not_known_where_the_reference_solution_has_no_state(monkeypatch):
     monkeypatch.setattr(problem, "report_only", lambda *_, **__: Failure(Outcome.MARCH_FAILED, "lost"))
     found = march(4000.0, "adaptive", until=WearTarget("wear_depth", 2.3e-5))
+    assert found.cycles_to_target > 0.0
+    assert found.cycles_to_target_error == np.inf
+
+
+def test_the_error_of_a_life_is_not_known_where_the_adaptive_history_has_no_state(monkeypatch):
+    own = problem.WearProblem.advance
+
+    def advance(self, state, course):
+        given = isinstance(self.request.steps, Given)
+        return own(self, state, course) if given else Failure(Outcome.MARCH_FAILED, "lost")
+
+    monkeypatch.setattr(problem.WearProblem, "advance", advance)
+    found = march(4000.0, "implicit", until=WearTarget("frequency_shift", 1e-4))
     assert found.cycles_to_target > 0.0
     assert found.cycles_to_target_error == np.inf
 
