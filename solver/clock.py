@@ -5,17 +5,13 @@ import time
 
 from numba.core.event import Event, Listener, register
 
-_LOCK = "numba:compiler_lock"
-"""Event of numba: the lock is held while a kernel is compiled or read from the cache."""
-
 
 class _Compiler(Listener, threading.local):
     """CPU time, s, that each thread spends on compiling or loading kernels, which may be nested."""
 
-    def __init__(self) -> None:
-        self.spent = 0.0
-        self._depth = 0
-        self._began = 0.0
+    spent = 0.0
+    _depth = 0
+    _began = 0.0
 
     def on_start(self, _: Event) -> None:
         if self._depth == 0:
@@ -29,7 +25,8 @@ class _Compiler(Listener, threading.local):
 
 
 _compiler = _Compiler()
-register(_LOCK, _compiler)  # type: ignore[no-untyped-call]
+# this lock is held while a kernel is compiled or read from the cache
+register("numba:compiler_lock", _compiler)  # type: ignore[no-untyped-call]
 
 
 def computing_time() -> float:

@@ -17,6 +17,7 @@ from typing import cast
 import numpy as np
 
 from solver.model import FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.outcome import check
 
 TANGENTIAL_RATIO = 2.0 * (1.0 - 0.3) / (2.0 - 0.3)
 """Tangential over normal contact stiffness: Mindlin's ratio for Poisson's ratio 0.3."""
@@ -34,11 +35,10 @@ def with_contact_stiffness(model: ReducedModel, contact_stiffness: float) -> Red
     contact_stiffness: kappa_N per area, N/m3; the tangential one is `TANGENTIAL_RATIO` times as large.
     Raises ValueError where it is not between 0 and `LARGEST_CONTACT_STIFFNESS`.
     """
-    if not 0.0 < contact_stiffness <= LARGEST_CONTACT_STIFFNESS:
-        remedy = f"give a positive number, at most {LARGEST_CONTACT_STIFFNESS:g} N/m3"
-        raise ValueError(f"contact_stiffness is {contact_stiffness}: {remedy}")
-    components = np.flatnonzero(model.contact.dofs.ravel() >= 0)
-    relative = model.contact.dofs.ravel()[components]
+    right = 0.0 < contact_stiffness <= LARGEST_CONTACT_STIFFNESS
+    remedy = f"give a positive number, at most {LARGEST_CONTACT_STIFFNESS:g} N/m3"
+    check(f"contact_stiffness is {contact_stiffness}", right, remedy)
+    components, relative = model.contact.component_index, model.contact.relative
     share = np.where(components % 3 == 0, 1.0, TANGENTIAL_RATIO)
     springs = contact_stiffness * share * model.contact.area[components // 3]
     # Compressions of stiff springs are small. Their scale leaves all displacements with stiffnesses of one size.
@@ -60,11 +60,5 @@ def _softened(linear: LinearModel, relative: IntArray, scale: FloatArray, spring
     )
     own = np.arange(n, len(places))
     stiffness[own, own] += springs
-    return LinearModel(
-        mass=mass,
-        damping=damping,
-        stiffness=stiffness,
-        load_static=linear.load_static[places] * factor,
-        load_harmonic=linear.load_harmonic[places] * factor,
-        response=linear.response[:, places] * factor,
-    )
+    load_static, load_harmonic = linear.load_static[places] * factor, linear.load_harmonic[places] * factor
+    return LinearModel(mass, damping, stiffness, load_static, load_harmonic, linear.response[:, places] * factor)

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import first_response, largest_responses
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.outcome import Ended, Outcome
+from solver.outcome import Ended, Outcome, check
 from solver.presentation import Presented
 from solver.results.history import StartState, describe_cut_off, first_cut_off
 from solver.results.state_report import PeriodicMotion, evaluated, periodic_motion
@@ -90,8 +90,8 @@ class HarmonicBalance(Ended):
 
     def _evaluate(self, z: ArrayLike) -> Evaluation:
         given = np.array(z, np.float64)
-        if given.shape != self.state.shape or not np.isfinite(given).all():
-            raise ValueError(f"z: give {self.size} finite numbers in shape ({self.size},), not shape {given.shape}")
+        right = given.shape == self.state.shape and np.isfinite(given).all()
+        check("z", right, f"give {self.size} finite numbers in shape ({self.size},), not shape {given.shape}")
         return self._balance.evaluate(given.reshape(-1, self._balance.joint.basis.synthesis.shape[0]))
 
 
@@ -119,12 +119,11 @@ def frequency_response(
     Raises ValueError where a number is out of its range, where the model lacks nodal diameters that the harmonics need,
     and where friction coefficients are given twice, not at all, or not to each pair.
     """
-    settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("frequency", frequency, above=0.0)
-    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    load, friction, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found = dict(follow_branch(model, friction, load, ascending, sweep, settings))
+    found = dict(FrequencySweep(model, friction, load, sweep, settings).states(ascending))
     starts = [found[index] for index in place.tolist()]
     response, peak, outcome, message = zip(*(_read(model, friction, settings, start) for start in starts), strict=True)
     return FrequencyResponse(
@@ -140,7 +139,7 @@ def frequency_response(
 
 
 def _read(
-    model: ReducedModel, friction: float | FloatArray | None, settings: SolverSettings, start: StartState
+    model: ReducedModel, friction: FloatArray | None, settings: SolverSettings, start: StartState
 ) -> tuple[ComplexArray, FloatArray, Outcome, str]:
     """Response, peak, outcome and message of a point, as in `FrequencyResponse`."""
     state, outcome, message = start.state, start.outcome, start.message
@@ -175,9 +174,8 @@ def balance_of(
 
     All other parameters and errors as in `frequency_response`.
     """
-    settings = SolverSettings() if settings is None else settings
     wanted = check_number("frequency", frequency, above=0.0)
-    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    load, friction, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     start, _, balance, at = balance_at_start(worn_model(model, wear_depth), friction, load, wanted, sweep, settings)
     unknown = np.full((balance.joint.component_index.size, len(balance.joint.basis.synthesis)), np.nan)
     return functions_of(balance, unknown if at is None else at.predicted_h, start.outcome, start.message)
@@ -185,21 +183,21 @@ def balance_of(
 
 def balance_at_start(
     model: ReducedModel,
-    friction: float | FloatArray | None,
+    friction: FloatArray | None,
     load: float,
     frequency: float,
     sweep: Direction,
     settings: SolverSettings,
 ) -> tuple[StartState, Case, Balance, Evaluation | None]:
-    """State to which a sweep comes at a frequency, Hz, the case with its harmonics and samples, its balance and its
-    evaluation; where there is no state, None and a balance without history.
+    """State to which a sweep comes at a frequency, Hz, with its case, its balance and its evaluation. Where there is no
+    state, the evaluation is None, and the balance has no history.
     """
-    ((_, start),) = follow_branch(model, friction, load, np.array([frequency]), sweep, settings)
+    ((_, start),) = FrequencySweep(model, friction, load, sweep, settings).states(np.array([frequency]))
     fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)
     case = build_case(model, friction, start.penalty_omega, fixed, start.resolution)
     joint = case.joint(2.0 * np.pi * frequency, load)
     if start.state is None:
-        return start, case, Balance(joint, np.zeros((model.contact.n_contact, 2))), None
+        return start, case, Balance(joint, np.zeros((model.contact.n_contact, joint.law.n_history))), None
     return start, case, *evaluated(joint, start.state)
 
 

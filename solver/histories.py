@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 
 from solver.arguments import check_case, check_kind, check_number, check_numbers, check_word, worn_model
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.missions.history import integrate_missions
 from solver.missions.mission import Begin, Block, MissionHistory, MissionRequest
 from solver.model import ReducedModel
+from solver.outcome import check
 from solver.results.history import WearHistory
 from solver.settings import (
     FOLLOWED,
@@ -55,64 +56,56 @@ def march_wear(
 
     A failure is no exception: `outcome` and `message` of the history give the reason and the last cycle count.
 
-    - model: from `build_model`, `studies.build_scene` or `studies.read_scene`.
     - frequency: of the excitation, Hz; or "resonance" or "peak", which it follows while the joint wears, see `between`.
-    - excitation_amplitude: N, multiplies the unit harmonic load of the model.
-    - friction_coefficient: one number for all pairs, or (n_contact,). None for a model with its own.
     - wear_coefficient: k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
     - cycles: ascending cycle counts at which the history is reported, or the last count alone. A missing 0 is added.
       With inf the history ends where wear has come to an end, see `outputs`.
     - scheme, step: "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step`
       cycles, Eqs. (23), (24). "final" is "adaptive" to the final state, in which nothing wears any more; with
       `cycles` = inf.
-    - sweep: way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one
-      frequency.
     - law: of wear (`solver.contact.wear_law`).
     - until: wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
-    - outputs, final_share: for `cycles` = inf: number of reported states, spaced evenly in worn volume and cycles; the
-      history ends where the wear rate of each pair is below this share of its own largest wear rate.
-    - wear_depth: (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of
-      the history count from there.
+    - outputs, final_share: for `cycles` = inf: number of reported states, at least 2, the first and the last one
+      included, spaced evenly in worn volume and cycles; the history ends where the wear rate of each pair is below this
+      share of its largest one so far, which counts as at least this share of the largest of all pairs.
+    - wear_depth: (n_contact,), m, of a joint that is worn before. Depths and volumes of the history count from there.
     - between: range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance
       that the sweep meets in the range. "resonance" is phase resonance: `F^H x` of the first harmonics of excitation
       and motion has no real part. "peak" is the largest amplitude of the first response in its first harmonic, over
       the frequency at constant wear depth; for one degree of freedom with the damping ratio zeta it lies lower by a
       factor sqrt(1 - 2 zeta^2).
 
-    Raises ValueError where a number is out of its range; where counts do not ascend; where the scheme needs a step that
-    is not given; where model, friction or law do not fit together; where the law "table", whose factors depend on the
-    depth, is given with `wear_depth`.
+    All others as in `frequency_response`. Raises ValueError as there; where counts do not ascend; where the scheme
+    needs a step that is not given; where the law does not fit, or is a "table", whose factors depend on the depth, and
+    `wear_depth` is given.
     """
-    settings = SolverSettings() if settings is None else settings
-    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    load, friction, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     at, follow = _check_frequency(frequency, between, sweep, scheme)
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
     to_the_end = np.ndim(cycles) == 0 and cycles == math.inf
     counts = check_numbers("cycles", 0.0 if to_the_end else cycles, least=0.0)
-    if (np.diff(counts) <= 0.0).any():
-        raise ValueError("cycles: give ascending counts")
+    check("cycles", (np.diff(counts) > 0.0).all(), "give ascending counts")
     counts = counts if counts[0] == 0.0 else np.append(0.0, counts)
     check_word("scheme", scheme, (*get_args(Scheme), "final"))
-    if scheme == "final" and (not to_the_end or until is not None):
-        raise ValueError('scheme: "final" goes with cycles = inf and without until')
-    if to_the_end and scheme == "explicit":
-        raise ValueError('scheme: explicit steps cannot grow: give "adaptive" or "implicit" with cycles inf')
-    if step is None and scheme not in ("adaptive", "final"):
-        raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
+    ends = scheme != "final" or (to_the_end and until is None)
+    check("scheme", ends, '"final" goes with cycles = inf and without until')
+    grows = not to_the_end or scheme != "explicit"
+    check("scheme", grows, 'explicit steps cannot grow: give "adaptive" or "implicit" with cycles inf')
+    known = step is not None or scheme in ("adaptive", "final")
+    check("step", known, f'give the length of a step in cycles to the scheme "{scheme}"')
     length = math.inf if step is None else check_number("step", step, above=0.0)
-    if to_the_end and outputs < 2:
-        raise ValueError(f"outputs = {outputs}: give at least 2, the unworn and the final state")
+    check(f"outputs = {outputs}", not to_the_end or outputs >= 2, "give at least 2, the unworn and the final state")
     check_number("final_share", final_share, above=0.0)
     _check_target(until, TARGETS)
     check_kind("law", law, WearLaw)
-    if wear_depth is not None and law.name == "table":
-        raise ValueError('wear_depth: give another law: the factors of a "table" depend on depths that count from 0')
+    counted = wear_depth is None or law.name != "table"
+    check("wear_depth", counted, 'give another law: the factors of a "table" depend on depths that count from 0')
     model = worn_model(model, wear_depth)
     # a law that does not fit the pairs is an error of the caller: raise it before the computation
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
-    _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
+    _, start = next(FrequencySweep(model, friction, load, sweep, settings).states(follow or np.array([at])))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
-    steps = steps_of(scheme, length, settings.rtol)
+    steps = steps_of(scheme, length)
     request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
     return next(integrate_together(model, friction, settings, start, (request,)))
 
@@ -120,24 +113,21 @@ def march_wear(
 def _check_frequency(
     frequency: float | Followed, between: tuple[float, float] | None, sweep: Direction, scheme: str
 ) -> tuple[float, FollowedFrequency | None]:
-    """The given frequency, Hz, or NaN and what the frequency follows. Raises ValueError."""
+    """The given frequency, Hz, or NaN and what the frequency follows."""
     if not isinstance(frequency, str):
-        if between is not None:
-            raise ValueError('between: leave it out, or give "resonance" or "peak" as the frequency')
+        check("between", between is None, 'leave it out, or give "resonance" or "peak" as the frequency')
         return check_number("frequency", frequency, above=0.0), None
     check_word("frequency", frequency, FOLLOWED)
     ends = np.zeros(0) if between is None else check_numbers("between", between, above=0.0)
-    if ends.size != 2 or not ends[0] < ends[1]:
-        raise ValueError("between: give the lowest and the highest frequency in Hz, as (205, 215)")
-    if sweep == "ramp":
-        raise ValueError('sweep: give "up" or "down": a ramp holds the frequency that is sought')
-    if scheme == "final":
-        raise ValueError('scheme: the scheme "final" holds the frequency: give "adaptive" with cycles = inf')
+    ascend = ends.size == 2 and ends[0] < ends[1]
+    check("between", ascend, "give the lowest and the highest frequency in Hz, as (205, 215)")
+    check("sweep", sweep != "ramp", 'give "up" or "down": a ramp holds the frequency that is sought')
+    check("scheme", scheme != "final", 'the scheme "final" holds the frequency: give "adaptive" with cycles = inf')
     return math.nan, FollowedFrequency(frequency, float(ends[0]), float(ends[1]))
 
 
 def _check_target(until: WearTarget | None, known: tuple[str, ...]) -> None:
-    """Raises ValueError where a target is not one of the known quantities, or not above 0."""
+    """Whether a target is one of the known quantities, and above 0."""
     if until is not None:
         check_kind("until", until, WearTarget)
         check_word("until.quantity", until.quantity, known)
@@ -170,24 +160,23 @@ def integrate_mission(
     - largest_step: most missions that are computed at once; 1: every mission by itself. By default the error decides.
 
     Raises ValueError where a number is out of its range; where numbers of missions are not whole or do not ascend;
-    where there is no block; where the blocks do not have equal contact pairs; where a block continues another one with
-    another model or friction; where a model, friction or law does not fit.
+    where there is no block; where a model, friction, law or block does not fit to the others.
     """
     settings = SolverSettings() if settings is None else settings
     check_word("sweep", sweep, get_args(Direction))
-    if isinstance(blocks, Block) or not blocks:
-        raise ValueError("blocks: give a list with at least one block")
+    check("blocks", not isinstance(blocks, Block) and bool(blocks), "give a list with at least one block")
     check_kind("law", law, WearLaw)
     checked = tuple(_checked(block, place, settings, law) for place, block in enumerate(blocks))
     for place, block in enumerate(checked):
-        if (reason := _does_not_follow(checked[place - 1], block)) is not None:
-            raise ValueError(f"{_called(place, block)}: {reason}")
+        reason = _does_not_follow(checked[place - 1], block)
+        check(_called(place, block), not reason, reason)
     counts = check_numbers("missions", missions, least=0.0)
-    if (np.diff(counts) <= 0.0).any() or (counts != np.round(counts)).any() or counts[-1] < 1.0:
-        raise ValueError("missions: give ascending whole numbers, the last of at least 1")
+    right = (np.diff(counts) > 0.0).all() and (counts == np.round(counts)).all() and counts[-1] >= 1.0
+    check("missions", right, "give ascending whole numbers, the last of at least 1")
     _check_target(until, TARGETS[:2])
-    if largest_step is not None and largest_step != round(check_number("largest_step", largest_step, least=1.0)):
-        raise ValueError(f"largest_step: give a whole number instead of {largest_step:g}")
+    if largest_step is not None:
+        whole = check_number("largest_step", largest_step, least=1.0).is_integer()
+        check("largest_step", whole, f"give a whole number instead of {largest_step:g}")
     wanted = tuple(sorted({0, *(int(count) for count in counts)}))
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
     return integrate_missions(
@@ -200,7 +189,8 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
     check_kind(f"blocks[{place}]", block, Block)
     try:
         check_word("begin", block.way, get_args(Begin))
-        load, friction = check_case(block.model, block.excitation_amplitude, block.friction_coefficient, "up", settings)
+        given = block.model, block.excitation_amplitude, block.friction_coefficient
+        load, friction, _ = check_case(*given, "up", settings)
         wearing_work(law, block.model.contact, friction_of_pairs(block.model, friction))
         if block.way == "continue":
             # the way from another amplitude is a ramp of this one
@@ -208,12 +198,9 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
         at, cycles = block.frequency, block.cycles
         if isinstance(at, Passage):
             at = Passage(*(check_number(f"frequency.{name}", value, above=0.0) for name, value in vars(at).items()))
-            if at.start == at.stop:
-                raise ValueError("frequency.stop: give another frequency than start")
-            if cycles is not None:
-                raise ValueError("cycles: the cycles of a passage follow from its rate: leave them out")
-            if block.way != at.sweep:
-                raise ValueError(f'begin: this passage goes {at.sweep}: give "{at.sweep}"')
+            check("frequency.stop", at.start != at.stop, "give another frequency than start")
+            check("cycles", cycles is None, "the cycles of a passage follow from its rate: leave them out")
+            check("begin", block.way == at.sweep, f'this passage goes {at.sweep}: give "{at.sweep}"')
         elif cycles is None:
             raise ValueError("cycles: missing: only a passage has cycles of its own")
         else:
@@ -223,8 +210,8 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
         raise ValueError(f"{_called(place, block)}: {error}") from error
 
 
-def _does_not_follow(before: Block, block: Block) -> str | None:
-    """Why a block does not have the pairs of the block before, or cannot continue it; else None."""
+def _does_not_follow(before: Block, block: Block) -> str:
+    """Why a block does not have the pairs of the block before, or cannot continue it; else ""."""
     one, other = before.model.contact, block.model.contact
     same = one.n_contact == other.n_contact and (one.area == other.area).all() and one.surface == other.surface
     if not same or ((one.dofs < 0) != (other.dofs < 0)).any():
@@ -232,12 +219,12 @@ def _does_not_follow(before: Block, block: Block) -> str | None:
     if before.model.response_names != block.model.response_names:
         return "model: give equal responses to all blocks"
     if block.way != "continue":
-        return None
+        return ""
     if before.excitation_amplitude == 0.0:
         return "begin: the block before does not vibrate: begin with a ramp"
     friction = [friction_of_pairs(each.model, each.friction_coefficient) for each in (before, block)]
     if before.model is block.model and (friction[0] == friction[1]).all():
-        return None
+        return ""
     return 'begin: continue goes with the model and friction of the block before: give "ramp", "up" or "down"'
 
 

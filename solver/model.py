@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,17 @@ class _ByRows:
                 object.__setattr__(self, name, np.asarray(value, order="C"))
 
 
+class PairLaw(Protocol):
+    """What some pairs of a scene follow in place of friction and separation, with its numbers: a `packable` class."""
+
+    @property
+    def pairs(self) -> tuple[int, ...]:
+        """Indices of the pairs, ascending."""
+
+    def element(self, places: IntArray, *of_pairs: Any) -> Any:
+        """The `solver.contact.element.Element` of these pairs in one joint, of which these are the first fields."""
+
+
 @dataclass(frozen=True)
 class ContactInterface(_ByRows):
     """Contact pairs, `n_contact` of them.
@@ -35,6 +47,7 @@ class ContactInterface(_ByRows):
     - friction_coefficient (n_contact,): None where the study gives it.
     - edge (n_contact,): True for pairs at which the modelled contact ends but the bodies continue: load or wear of such
       a pair shows that the contact is cut off. None where the bodies end with their pairs.
+    - laws: of pairs that do not rub and open; each pair belongs to one at most.
     """
 
     dofs: IntArray
@@ -45,11 +58,26 @@ class ContactInterface(_ByRows):
     surface: tuple[str, ...]
     friction_coefficient: FloatArray | None = None
     edge: BoolArray | None = None
+    laws: tuple[PairLaw, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        others = [pair for law in self.laws for pair in law.pairs]
+        right = all(tuple(np.unique(law.pairs)) == law.pairs for law in self.laws) and len(set(others)) == len(others)
+        if not right or not set(others) <= set(range(self.n_contact)):
+            raise ValueError(
+                f"laws: give to each ascending pairs from 0 to {self.n_contact - 1}, and each pair to one law only"
+            )
 
     @property
     def n_contact(self) -> int:
         """Number of contact pairs."""
         return len(self.area)
+
+    @cached_property
+    def rubs(self) -> BoolArray:
+        """False (n_contact,) for pairs with a law of `laws`."""
+        return ~np.isin(np.arange(self.n_contact), [pair for law in self.laws for pair in law.pairs])
 
     @cached_property
     def has_normal(self) -> BoolArray:
@@ -72,12 +100,6 @@ class ContactInterface(_ByRows):
     def relative(self) -> IntArray:
         """Indices (n_rel,) of the relative displacements in a `LinearModel`."""
         return self.dofs.ravel()[self.component_index]
-
-    @cached_property
-    def line(self) -> IntArray:
-        """0 or 1 (n_contact,) where a pair has the first or the second tangent only, else -1."""
-        tangents = self.dofs[:, 1:] >= 0
-        return np.where(tangents.sum(axis=1) == 1, np.argmax(tangents, axis=1), -1)
 
 
 @dataclass(frozen=True, eq=False)

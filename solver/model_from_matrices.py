@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, IntArray, LinearModel, ReducedModel, needed_nodal_diameters
+from solver.outcome import check
 
 OfWaves = ArrayLike | Mapping[int, ArrayLike]
 
@@ -72,9 +73,9 @@ def build_model(
     symmetric or Hermitian, an area is not positive, an index is out of range or used twice, or nothing presses a pair.
     """
     waves = stiffness if isinstance(stiffness, Mapping) else {0: stiffness}
-    _check("nodal_diameter", 0 <= nodal_diameter < max(n_sectors, 1), "give 0 to n_sectors - 1")
+    check("nodal_diameter", 0 <= nodal_diameter < max(n_sectors, 1), "give 0 to n_sectors - 1")
     for k in needed_nodal_diameters(nodal_diameter, n_sectors, 1):
-        _check("stiffness", k in waves, f"give the matrix of nodal diameter {k}")
+        check("stiffness", k in waves, f"give the matrix of nodal diameter {k}")
     excited = min(nodal_diameter, n_sectors - nodal_diameter) if nodal_diameter else 0
     tables = {"stiffness": waves, "mass": mass, "damping": damping, "response": response}
     linear = {
@@ -83,8 +84,8 @@ def build_model(
     dofs = _array("contact_dofs", contact_dofs, (-1, 3))
     dofs = _indices("contact_dofs", dofs, -1, min(len(each.stiffness) for each in linear.values()))
     used, n_contact, n_response = dofs[dofs >= 0], len(dofs), len(linear[0].response)
-    _check("contact_dofs", len(np.unique(used)) == used.size, "give each displacement to one pair only")
-    _check("contact_dofs", n_contact > 0 and bool((dofs >= 0).any(axis=1).all()), "give every pair a displacement")
+    check("contact_dofs", len(np.unique(used)) == used.size, "give each displacement to one pair only")
+    check("contact_dofs", n_contact > 0 and (dofs >= 0).any(axis=1).all(), "give every pair a displacement")
     nowhere = np.full((n_contact, 3), np.nan)
     contact = ContactInterface(
         dofs=dofs,
@@ -94,9 +95,9 @@ def build_model(
         position=nowhere if position is None else _array("position", position, nowhere.shape),
         surface=_names("surface", ("",) * n_contact if surface is None else surface, n_contact),
     )
-    _check("area", bool((contact.area > 0.0).all()), "give a positive area, m2, to every contact pair")
+    check("area", (contact.area > 0.0).all(), "give a positive area, m2, to every contact pair")
     for pair in np.flatnonzero(~contact.has_normal & (contact.normal_load <= 0.0))[:1]:
-        _check("normal_load", False, f"give pair {pair} more than 0 N, as it has no closing displacement to press it")
+        check("normal_load", False, f"give pair {pair} more than 0 N, as it has no closing displacement to press it")
     default_names = [f"response {index}" for index in range(n_response)]
     names = _names("response_names", default_names if response_names is None else response_names, n_response)
     return ReducedModel(linear, contact, names, n_sectors, nodal_diameter)
@@ -109,7 +110,7 @@ def _linear(
     given: dict[str, Any] = {}
     for name, table in tables.items():
         if isinstance(table, Mapping):
-            _check(name, k in table, f"give it for nodal diameter {k}, as the stiffness")
+            check(name, k in table, f"give it for nodal diameter {k}, as the stiffness")
         given[name] = table[k] if isinstance(table, Mapping) else table
     real, n = k == 0, len(np.atleast_1d(_array("stiffness", given["stiffness"], None, real=k == 0)))
     nothing, matrices = np.zeros(n), {}
@@ -117,12 +118,12 @@ def _linear(
         found = _array(name, np.zeros((n, n)) if given[name] is None else given[name], (n, n), real=real)
         if places := find_asymmetry(found):
             kind = "symmetric" if real else "Hermitian"
-            _check(name, False, f"give a {kind} matrix: the entries at {places} and {places[::-1]} differ")
+            check(name, False, f"give a {kind} matrix: the entries at {places} and {places[::-1]} differ")
         matrices[name] = found
     # matrix (n_response, n) of the responses, from a matrix or from indices
     response = np.eye(n) if given["response"] is None else _array("response", given["response"], None, real=real)
     response = np.eye(n)[_indices("response", response, 0, n)] if response.ndim == 1 else response
-    _check("response", len(response) > 0, "give at least one displacement")
+    check("response", len(response) > 0, "give at least one displacement")
     static, harmonic = (nothing if load is None else load for load in (load_static, load_harmonic))
     return LinearModel(
         **matrices,
@@ -140,11 +141,11 @@ def _array(
         found = np.array(given)
     except ValueError:
         raise ValueError(f"{name}: give rows of equal length") from None
-    _check(name, found.dtype.kind in "iufc", "give numbers")
+    check(name, found.dtype.kind in "iufc", "give numbers")
     # matrices that are real often come as complex ones
-    _check(name, not (real and np.imag(found).any()), "give real numbers")
+    check(name, not (real and np.imag(found).any()), "give real numbers")
     found = found.real.astype(np.float64) if real or found.dtype.kind != "c" else found.astype(np.complex128)
-    _check(name, bool(np.isfinite(found).all()), "give finite numbers")
+    check(name, np.isfinite(found).all(), "give finite numbers")
     if shape is None:
         return found
     return np.full(shape, found) if repeat and found.ndim == 0 else _shaped(name, found, shape)
@@ -153,22 +154,17 @@ def _array(
 def _shaped(name: str, found: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """The array, of a shape in which -1 stands for any length."""
     fits = found.ndim == len(shape) and all(want in (-1, size) for want, size in zip(shape, found.shape, strict=True))
-    _check(name, fits, f"give shape {shape} instead of {found.shape}".replace("(-1,", "(any number,"))
+    check(name, fits, f"give shape {shape} instead of {found.shape}".replace("(-1,", "(any number,"))
     return found
 
 
 def _indices(name: str, found: FloatArray, least: int, n: int) -> IntArray:
-    right = bool(((found == np.round(found)) & (found >= least) & (found < n)).all())
-    _check(name, right, f"give whole numbers from {least} to {n - 1}")
+    right = (found == np.round(found)) & (found >= least) & (found < n)
+    check(name, right.all(), f"give whole numbers from {least} to {n - 1}")
     return found.astype(np.int64)
 
 
 def _names(name: str, given: Sequence[str], number: int) -> tuple[str, ...]:
     found = tuple(str(each) for each in given)
-    _check(name, len(found) == number and not isinstance(given, str), f"give {number} texts")
+    check(name, len(found) == number and not isinstance(given, str), f"give {number} texts")
     return found
-
-
-def _check(name: str, right: bool, remedy: str) -> None:
-    if not right:
-        raise ValueError(f"{name}: {remedy}")

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from solver.arguments import check_friction, check_numbers, check_settings, check_word, worn_model
+from solver.arguments import check_friction, check_number, check_numbers, check_settings, check_word, worn_model
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.modes.points import Direction, follow_mode
-from solver.outcome import Outcome
+from solver.outcome import Outcome, check
 from solver.presentation import Presented
 from solver.settings import SolverSettings
 
@@ -28,9 +28,7 @@ class Backbone(Presented):
     - shape (n_amplitude, n): complex x_1, m. Divided by the amplitude, the mass-normalised shape of the mode.
     - slip_fraction, open_fraction (n_amplitude, n_contact): fraction of the period in which a pair slips, or is open.
     - harmonics_used, samples_used (n_amplitude,): highest harmonic and samples; 0 where there is no state.
-    - outcome, message: how the computation of each point ended.
-
-    Values are NaN where no state was found.
+    - outcome, message: how the computation of each point ended. Values are NaN where no state was found.
     """
 
     OVER = ("amplitude", "modal_amplitude")
@@ -66,27 +64,22 @@ def backbone(
 
     By the extended periodic motion concept (`solver.modes.modal_model`). A point that fails spoils no other one.
 
-    - model: from `build_model`, `studies.build_scene` or `studies.read_scene`. Its harmonic load is not used.
     - amplitude: (n_amplitude,) or one number, m sqrt(kg), in any order: modal amplitude, as in `Backbone`. The mode at
       an amplitude does not depend on the other amplitudes.
-    - friction_coefficient: of all pairs, or (n_contact,). None for a model with its own, e.g. from a scene file.
     - mode: number of the linear mode, from 1 on in ascending frequency, from which the nonlinear one begins: closed
       pairs stick. Of a joint that has fewer such modes, as a mass on a rigid slider: closed pairs slide.
     - sweep: the amplitude is raised from zero ("up"), or raised to at least twice the amplitude of the point and then
       lowered ("down"). A joint whose mode exists only while it slides has "down" alone.
-    - settings: the defaults of `SolverSettings` if not given.
-    - wear_depth: (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
 
-    Raises ValueError where a number is out of its range, where the model lacks nodal diameters that the harmonics need,
-    and where friction coefficients are given twice, not at all, or not to each pair.
+    All others, and ValueError, as in `frequency_response`. The harmonic load of the model is not used.
     """
-    settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("amplitude", amplitude, above=0.0)
     friction = check_friction(model, friction_coefficient)
     check_word("sweep", sweep, get_args(Direction))
-    check_settings(model, settings)
-    if isinstance(mode, bool) or int(mode) != mode or mode < 1:
-        raise ValueError(f"mode: give a whole number from 1 on instead of {mode!r}")
+    settings = check_settings(model, settings)
+    whole = not isinstance(mode, bool) and int(mode) == mode and mode >= 1
+    check("mode", whole, f"give a whole number from 1 on instead of {mode!r}")
+    check("model", not model.contact.laws, "give one all pairs of which rub and open: modes know no other law")
     worn = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
     found = dict(follow_mode(worn, friction, ascending, int(mode), sweep, settings))
@@ -103,8 +96,7 @@ class ModalResponse:
 
     - frequency (n,): Hz. The curve may pass a frequency several times.
     - amplitude (n,): modal amplitude, m sqrt(kg).
-    - response (n, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)) to a harmonic load
-      Re(F exp(i omega t)).
+    - response (n, n_response): complex first harmonic, m, to a harmonic load Re(F exp(i omega t)).
     - damping_ratio (n,): of the mode at this amplitude.
 
     Where the resonance is beyond the largest amplitude of the mode, a row of NaN stands between the sides.
@@ -136,14 +128,12 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
     where mode and model do not belong together.
     """
     linear = model.harmonic_structure(1)
-    if not 0.0 < excitation_amplitude < np.inf:
-        raise ValueError(f"excitation_amplitude: give a finite number above 0 instead of {excitation_amplitude!r}")
-    if mode.shape.shape[1] != len(linear.mass):
-        raise ValueError("mode: give a mode of this model: the number of its displacements is another one")
+    check_number("excitation_amplitude", excitation_amplitude, above=0.0)
+    same = mode.shape.shape[1] == len(linear.mass)
+    check("mode", same, "give a mode of this model: the number of its displacements is another one")
     _, order = np.unique(mode.amplitude, return_index=True)
     order = order[np.isfinite(mode.frequency[order])]
-    if len(order) < 2:
-        raise ValueError("mode: give a mode with a state at two amplitudes or more")
+    check("mode", len(order) >= 2, "give a mode with a state at two amplitudes or more")
     known = np.log(mode.amplitude[order])
     at = np.unique(np.concatenate([np.linspace(*ends, points + 1) for ends in pairwise(known.tolist())]))
 

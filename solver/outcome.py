@@ -140,6 +140,12 @@ class Ended:
             raise ValueError(f"{self.outcome.meaning} without a sentence about the reason")
 
 
+def check(name: str, right: bool | np.bool_, remedy: str) -> None:
+    """Raises ValueError with a sentence about an argument that is not right: its name, and what to give."""
+    if not right:
+        raise ValueError(f"{name}: {remedy}")
+
+
 def known_to(error: float, rtol: float) -> str:
     """Text of a relative error above `rtol`, as "is known to 2.6 % only", with enough digits to show the excess; or why
     the error of a state, inf, is not known.

@@ -5,7 +5,7 @@ changes the last bits of sums: a computation that may be resumed goes on from th
 """
 
 import json
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from typing import Any, TypeVar, cast, get_type_hints
 
@@ -66,17 +66,12 @@ def in_rows(value: T) -> T:
     return cast("T", unpack(pack(value)))
 
 
-def pack_model(model: ReducedModel) -> Packed:
-    """The model, whose arrays are stored by rows."""
-    return pack((tuple(model.linear.items()), replace(model, linear={})))
-
-
 def unpack_model(packed: Packed) -> ReducedModel:
-    """The model that was packed, equal to the last bit; errors as `unpack`, where it does not describe a model."""
-    linear, model = unpack(packed)
+    """As `unpack`; TypeError also where another value was packed."""
+    model = unpack(packed)
     if not isinstance(model, ReducedModel):
         raise TypeError(type(model).__name__)
-    return replace(model, linear=dict(linear))
+    return model
 
 
 def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:
@@ -93,15 +88,13 @@ def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:
     if isinstance(value, tuple | list):
         return [name, [_described(item, arrays) for item in value]]
     if isinstance(value, dict):
-        return {key: _described(item, arrays) for key, item in value.items()}
+        return [name, [[key, _described(item, arrays)] for key, item in value.items()]]
     if is_dataclass(value) and _CLASSES.get(name) is type(value):
         return [name, {field.name: _described(getattr(value, field.name), arrays) for field in fields(value)}]
     raise TypeError(f"{name} is not a value that can be packed")
 
 
 def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> Any:
-    if isinstance(node, dict):
-        return {key: _rebuilt(item, arrays) for key, item in node.items()}
     if not isinstance(node, list):
         return node
     kind, content = node
@@ -114,7 +107,9 @@ def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> Any:
     if kind in ("tuple", "list"):
         items = [_rebuilt(item, arrays) for item in content]
         return tuple(items) if kind == "tuple" else items
-    made = _CLASSES[kind](**_rebuilt(content, arrays))
+    if kind == "dict":
+        return {key: _rebuilt(item, arrays) for key, item in content}
+    made = _CLASSES[kind](**{name: _rebuilt(item, arrays) for name, item in dict(content).items()})
     for name, annotation in _annotations(kind).items():
         value = getattr(made, name)
         if not isinstance(value, _PLAIN.get(annotation, object)):

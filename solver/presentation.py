@@ -77,12 +77,14 @@ class Presented:
         data: dict[str, Any] = {}
         for field in fields(self):  # type: ignore[arg-type]
             if field.name != name and field.metadata.get("dataset", True):
-                data |= _variables(field.name, getattr(self, field.name), over, len(points))
+                data |= _variables(field.name, getattr(self, field.name), over)
         return xr.Dataset(data, {over: (over, points, {"units": unit_of(name)})})
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
         """Draws the main values over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
-        axes = axes or new_axes()
+        from matplotlib import pyplot
+
+        axes = axes or pyplot.subplots()[1]
         at = getattr(self, self.OVER[0])
         order = np.argsort(at)
         for number, name in enumerate(self.DRAWN):
@@ -108,7 +110,7 @@ class Presented:
         return "\n".join((first, *(f"  {name.replace('_', ' '):<18} {text}" for name, text in rows)))
 
 
-def _variables(name: str, value: Any, over: str, n_points: int) -> dict[str, tuple[Any, Any, dict[str, str]]]:
+def _variables(name: str, value: Any, over: str) -> dict[str, tuple[Any, Any, dict[str, str]]]:
     """The variables of one value: dimensions, values, units; two of complex values, none of empty ones."""
     units = {"units": unit_of(name)}
     if isinstance(value, tuple):
@@ -118,9 +120,6 @@ def _variables(name: str, value: Any, over: str, n_points: int) -> dict[str, tup
     dims = _OF_MISSIONS.get(name) if over == "mission" else None
     if dims is None:
         dims = (over, *_row_of(_DIMENSIONS, name, "").split())
-        if len(value) == 1:
-            # the same at all points
-            value = np.broadcast_to(value, (n_points, *value.shape[1:]))
     if not value.size:
         return {}
     if np.iscomplexobj(value):
@@ -128,14 +127,6 @@ def _variables(name: str, value: Any, over: str, n_points: int) -> dict[str, tup
         amplitude, phase = ("_".join((first, part, *rest)) for part in ("amplitude", "phase"))
         return {amplitude: (dims, np.abs(value), units), phase: (dims, np.angle(value), {"units": "rad"})}
     return {name: (dims, value, units)}
-
-
-def new_axes() -> "Axes":
-    """Axes of a new figure of matplotlib."""
-    from matplotlib import pyplot
-
-    axes: Axes = pyplot.subplots()[1]
-    return axes
 
 
 def _span(values: Any, unit: str) -> str:

@@ -72,13 +72,7 @@ class WearTarget:
 
 @dataclass(frozen=True)
 class ToTheEnd:
-    """In place of cycle counts: a history until wear has come to an end.
-
-    - n_outputs: states in the result, with the first and the last one, spaced evenly in worn volume and cycles; at
-      least 2.
-    - final_share: the history ends where the wear rate of each pair is below this share of its largest one so far,
-      which counts as at least `final_share` of the largest of all pairs.
-    """
+    """In place of cycle counts: until nothing wears any more; as `outputs`, `final_share` of `solver.march_wear`."""
 
     n_outputs: int
     final_share: float = 1e-4
@@ -88,8 +82,7 @@ class ToTheEnd:
 class FollowedFrequency:
     """Excitation whose frequency follows the structure while the joint wears.
 
-    of: "resonance" for phase resonance, where the product `F^H x` of the first harmonics of excitation and motion has
-    no real part; "peak" for the largest amplitude of the first response, in its first harmonic. low, high: Hz.
+    of: as `frequency` of `solver.march_wear`. low, high: Hz.
     """
 
     of: Followed

@@ -12,12 +12,13 @@ from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import HarmonicBalance, balance_at_start, functions_of
+from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.loading_history.path import LoadingPath
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
-from solver.outcome import Outcome
-from solver.presentation import NOT_IN_DATASETS, Presented, new_axes, unit_of
+from solver.outcome import Outcome, check
+from solver.presentation import NOT_IN_DATASETS, Presented, unit_of
 from solver.settings import Direction, SolverSettings
 from solver.stability.floquet import Multipliers, Stability, find_multipliers
 
@@ -73,7 +74,9 @@ class ResponseCurve(Presented):
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":
         """As for other results, over the parameter that changes along the curve; solid where it is stable."""
-        axes = axes or new_axes()
+        from matplotlib import pyplot
+
+        axes = axes or pyplot.subplots()[1]
         at, stable = getattr(self, self.parameter), np.array(self.stability) == "stable"
         for size in np.abs(self.response).T:
             (line,) = axes.plot(at, size, ":")
@@ -111,28 +114,27 @@ def response_curve(
     most_points: largest number of points. errors: False leaves out `response_error`, which takes most of the time.
     All others, and ValueError, as in `frequency_response`.
     """
-    settings = SolverSettings() if settings is None else settings
     omegas = 2.0 * np.pi * check_numbers("frequency", frequency, above=0.0)
     loads = check_numbers("excitation_amplitude", excitation_amplitude, least=0.0)
     over_frequency = omegas.size == 2
-    if sorted((omegas.size, loads.size)) != [1, 2]:
-        raise ValueError("frequency, excitation_amplitude: give one number for one of them, two for the other one")
+    both, one_and_two = "frequency, excitation_amplitude", sorted((omegas.size, loads.size)) == [1, 2]
+    check(both, one_and_two, "give one number for one of them, two for the other one")
     first, last = (omegas if over_frequency else loads).tolist()
-    if first == last:
-        raise ValueError("frequency, excitation_amplitude: give two different numbers as first and last value")
+    check(both, first != last, "give two different numbers as first and last value")
     most = int(check_number("most_points", most_points, least=2.0))
     sweep: Direction = ("up" if first < last else "down") if over_frequency else "ramp"
-    load, friction = check_case(model, loads[0], friction_coefficient, sweep, settings)
+    load, friction, settings = check_case(model, loads[0], friction_coefficient, sweep, settings)
     worn, omega = worn_model(model, wear_depth), float(omegas[0])
     start, case, balance, at = balance_at_start(worn, friction, load, omega / (2.0 * np.pi), sweep, settings)
     path = LoadingPath(case, load) if over_frequency else LoadingPath(case, 1.0, omega)
-    if at is None or not start.outcome.complete:
+    if at is None:
         branch: _Branch = [], [], start.outcome, start.message
     else:
         # a branch may turn back behind its start before it comes to the last value
         back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
         span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
-        arc = Arc(path.balance_at, State(at, balance.history, float(first)), span, Run(settings.tolerance))
+        begun, run = State(at, balance.history, float(first)), Run(settings.tolerance)
+        arc = Arc(lambda parameter: Balance(path.joint_at(parameter), balance.history), begun, span, run)
         branch = _follow_branch(arc, last, back, most, over_frequency)
     return _reported(path, branch, errors)
 
@@ -177,7 +179,7 @@ def _reported(path: LoadingPath, branch: _Branch, errors: bool) -> ResponseCurve
     stability: list[Stability] = []
     balances: list[HarmonicBalance] = []
     for index, point in enumerate(points):
-        balance, at = path.balance_at(point.parameter, point.history), point.evaluation
+        balance, at = Balance(path.joint_at(point.parameter), point.history), point.evaluation
         joint, run = balance.joint, Run(case.settings.tolerance)
         response[index], peak[index] = first_response(joint, at), largest_responses(joint, at)
         if errors:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from solver.model import ReducedModel
-from solver.packing import Packed, pack_model, unpack_model
+from solver.packing import Packed, pack, unpack_model
 from studies.model_check import check_model
 from studies.scene import Progress
 from studies.scene_error import SceneError
@@ -202,4 +202,4 @@ def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt
     except UserError as error:
         yield SceneBuilt(None, error=error)
         return
-    yield SceneBuilt(describe_scene(model), variables, pack_model(model) if known is None else None)
+    yield SceneBuilt(describe_scene(model), variables, pack(model) if known is None else None)

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.contact.coulomb import friction_limit
+from solver.contact.coulomb import OTHER, friction_limit
 from solver.harmonic_balance.dlft import Evaluation
-from solver.model import FloatArray
+from solver.model import BoolArray, FloatArray
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import build_basis
@@ -84,26 +84,28 @@ NOT_CERTIFIED = Certificate(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
 def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     """Certificate of an evaluated state, without truncation errors and stability, which need other states."""
     force_t, friction, law = evaluation.force_t, joint.friction_coefficient, joint.law
-    largest = force_t[:, 0].max(axis=1, initial=0.0)
+    rubs = (evaluation.status_t != OTHER).all(axis=1)
+    largest = force_t[:, 0].max(axis=1, initial=0.0) * rubs
     normal = float(largest.max(initial=0.0))
     # without friction there is no limit to compare with: any tangential force is too much
     limit = float(friction_limit(friction, largest).max(initial=0.0)) if friction.any() else normal
     # weights of the Fejer mean
     weights = 1.0 - np.array([0.0, *joint.basis.orders]) / (max(joint.basis.orders, default=0) + 1.0)
     both = np.concatenate([force_t, _series(joint, evaluation.force_h * np.repeat(weights, 2)[1:])], axis=2)
+    both, friction = both[rubs], friction[rubs]
     excess = np.hypot(both[:, 1], both[:, 2]) - friction_limit(friction[:, None], both[:, 0])
     changed = law.change_force(evaluation)[largest > 0.0]
     # motion (n_contact, 3, m), m, that the contact forces cause by the stiffness of the pairs alone
     flexed = joint.to_pairs(joint.to_relative(law.motion(evaluation.force_h)))
     return Certificate(
         residual=_residual(joint, evaluation),
-        penetration=_penetration(joint, evaluation, flexed),
+        penetration=_penetration(joint, evaluation, flexed, rubs & joint.contact.has_normal),
         tension=_relative(float((-both[:, 0]).max(initial=0.0)), normal),
         cone_violation=_relative(float(excess.max(initial=0.0)), limit),
         energy_error=_energy_error(joint, evaluation, flexed),
         periodicity_error=_relative(
             max(evaluation.periodicity_error, float(changed.max(initial=0.0))),
-            max(limit, law.driving_force(evaluation)),
+            max(limit, law.driving_force(evaluation), float(np.abs(force_t[~rubs]).max(initial=0.0))),
         ),
     )
 
@@ -131,11 +133,13 @@ def _residual(joint: Joint, evaluation: Evaluation) -> float:
     return max(evaluation.scaled_residual(), replace(evaluation, residual=left).scaled_residual(), hidden)
 
 
-def _penetration(joint: Joint, evaluation: Evaluation, flexed: FloatArray) -> float:
-    """Largest penetration over the largest vibration: the relative one, or the elastic one by the contact forces."""
+def _penetration(joint: Joint, evaluation: Evaluation, flexed: FloatArray, pairs: BoolArray) -> float:
+    """Largest penetration of some pairs (n_contact,) over the largest vibration: the relative one, or the elastic one
+    by the contact forces.
+    """
     closing = evaluation.displacement_h[:, 0].copy()
     closing[:, 0] -= joint.contact.gap + evaluation.wear_depth
-    depth = _series(joint, closing[joint.contact.has_normal])
+    depth = _series(joint, closing[pairs])
     sizes = [NEGLIGIBLE * np.abs(flexed[..., 0])]  # as in `_amplitude`
     for values_h in (evaluation.displacement_h, flexed):
         vibrating = values_h.copy()

@@ -94,7 +94,6 @@ def refine(here: ResolvedState, run: Run, *, node: bool = False) -> ResolvedStat
 
     Returns the state with the harmonics and samples that it needs, or the last state found where none is accurate.
 
-    here: the state with its harmonics and samples.
     node: whether the state is a node of a sweep: with at least the first harmonics of automatic settings, as the next
         node may slip, and limited unknowns, as the difference to the reference sweep shows what they miss.
     """
@@ -117,7 +116,7 @@ def with_level_above(here: ResolvedState, run: Run, *, node: bool = False) -> Re
     found = here.solve_at(above, run)
     if found is None:
         return here
-    estimate = here.estimate if node else search.estimate(found)
+    estimate = here.estimate if node else search.samples_error(found) + search.harmonics_error(found)
     better = node or estimate.largest < here.estimate.largest
     return replace(found, estimate=estimate, accurate=here.accurate) if better else here
 
@@ -131,7 +130,6 @@ class _Search:
     node: bool
 
     def refined(self, here: ResolvedState) -> ResolvedState:
-        """The state at the resolution that suffices, or the last state found."""
         settings, faint = here.case.settings, False
         while True:
             if nothing_happens(here.point.evaluation):
@@ -140,7 +138,7 @@ class _Search:
                     return here
             if settings.harmonics == "auto":
                 here = here.with_its_symmetry(self.run)
-            by_samples, by_harmonics = self._samples_error(here), self._harmonics_error(here)
+            by_samples, by_harmonics = self.samples_error(here), self.harmonics_error(here)
             estimate = by_samples + by_harmonics
             if not settings.automatic:
                 return replace(here, estimate=estimate, accurate=math.isfinite(estimate.largest))
@@ -183,11 +181,7 @@ class _Search:
                 return level, True
         return finest, True
 
-    def estimate(self, here: ResolvedState) -> Estimate:
-        """Estimated error of a state by its samples and harmonics."""
-        return self._samples_error(here) + self._harmonics_error(here)
-
-    def _samples_error(self, here: ResolvedState) -> Estimate:
+    def samples_error(self, here: ResolvedState) -> Estimate:
         """Estimated error by missing samples, by a state with 3 N + 2, as an event may stay next to the same one of 2 N
         samples. Many unknowns mean many events: then 2 N suffice. Unknown where this state is not found.
         """
@@ -199,7 +193,7 @@ class _Search:
             return UNKNOWN
         return here.difference(finer).times(TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY)
 
-    def _harmonics_error(self, here: ResolvedState) -> Estimate:
+    def harmonics_error(self, here: ResolvedState) -> Estimate:
         """Estimated error by missing harmonics: the change in Newton steps towards a much longer series, the largest
         change where they do not contract. Unknown where the model has no more harmonics.
 
@@ -224,34 +218,30 @@ class _Search:
             # with more samples, too, these harmonics are not allowed: nodes of the dovetail had 13 where 27 are
             fewest = shifted(now, 1).samples if here.case.settings.samples == "auto" else now.samples
             wanted = replace(wanted, samples=min(wanted.samples, fewest))
-        for resolution in (wanted, shifted(wanted, 1)) if more else (wanted,):
-            # impacts: Newton's method diverges from a start without force in the new harmonics
-            for with_tail in (False, True) if more else (False,):
-                if not self.allows(here, resolution):
-                    return None
-                found = here.solve_at(resolution, self.run, with_tail=with_tail)
-                if found is not None:
-                    return found
+        # impacts: Newton's method diverges from a start without force in the new harmonics
+        starts = [(each, tail) for each in (wanted, shifted(wanted, 1)) for tail in (False, True)]
+        for resolution, with_tail in starts if more else starts[:1]:
+            if not self.allows(here, resolution):
+                return None
+            found = here.solve_at(resolution, self.run, with_tail=with_tail)
+            if found is not None:
+                return found
         return None
 
     def allows(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
         unknowns, most = here.unknowns(resolution), here.most_unknowns(NODE_UNKNOWNS if self.node else MOST_UNKNOWNS)
-        if 2 * resolution.highest >= resolution.samples:  # which are given
-            return False
-        # the contact law costs unknowns times samples
-        if unknowns * resolution.samples > SAMPLES_OF_UNKNOWNS * most:
-            return False
+        # samples that are given may be few; the contact law costs unknowns times samples
+        fewest, largest = 2 * resolution.highest + 1, min(MOST_SAMPLES, SAMPLES_OF_UNKNOWNS * most / unknowns)
         if here.joint.component_index.size <= SMALL_JOINT:
             most = min(most, NODE_UNKNOWNS)
-        if self.node and resolution.highest > MOST_OF_NODE:
-            return False
         if resolution.highest > MOST_MIXED_HARMONICS:
             # more harmonics for friction without impacts only, whose harmonics are odd
             most = min(most, EXPENSIVE_UNKNOWNS) if all(order % 2 for order in resolution.orders) else 0
         # the two highest levels serve for a comparison only
-        in_levels = resolution.highest <= HARMONIC_LEVELS[-3] and here.case.model.has_harmonics(resolution.highest)
-        return in_levels and resolution.samples <= MOST_SAMPLES and unknowns <= most
+        highest = MOST_OF_NODE if self.node else HARMONIC_LEVELS[-3]
+        in_levels = resolution.highest <= highest and here.case.model.has_harmonics(resolution.highest)
+        return in_levels and fewest <= resolution.samples <= largest and unknowns <= most
 
     def _relaxed(self, here: ResolvedState, estimate: Estimate) -> ResolvedState:
         """An accurate state with as few harmonics and samples as it needs for a fraction of rtol."""

@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from solver.accuracy.certificate import SMALL_WORK, certify
-from solver.contact.coulomb import SEPARATED, STICK
+from solver.contact.coulomb import OTHER, SEPARATED, SLIP, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import State, first_response, largest_responses, transfer
-from solver.model import ComplexArray, FloatArray
+from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, SolverSettings, all_orders, samples_for
@@ -186,14 +186,10 @@ class ResolvedState:
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:
-    """Resolution so many levels up, or one level down for -1, as `with_highest`."""
-    if levels > 0:
-        above = [highest for highest in HARMONIC_LEVELS if highest > resolution.highest]
-        highest = above[levels - 1] if len(above) >= levels else (levels + 1) * resolution.highest
-    else:
-        below = (highest for highest in HARMONIC_LEVELS if highest < resolution.highest)
-        highest = max(below, default=resolution.highest)
-    return with_highest(resolution, highest)
+    """Resolution so many levels up, as `with_highest`."""
+    above = [highest for highest in HARMONIC_LEVELS if highest > resolution.highest]
+    beyond = (levels + 1) * resolution.highest
+    return with_highest(resolution, above[levels - 1] if len(above) >= levels else beyond)
 
 
 def with_highest(resolution: Resolution, highest: int) -> Resolution:
@@ -206,8 +202,10 @@ def with_highest(resolution: Resolution, highest: int) -> Resolution:
 
 def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
     """Resolution with one level fewer harmonics and half the samples, as far as these are automatic."""
-    orders = shifted(resolution, -1).orders if settings.harmonics == "auto" else resolution.orders
-    samples = resolution.samples
+    orders, samples = resolution.orders, resolution.samples
+    if settings.harmonics == "auto":
+        below = (highest for highest in HARMONIC_LEVELS if highest < resolution.highest)
+        orders = with_highest(resolution, max(below, default=resolution.highest)).orders
     if settings.samples == "auto":
         samples = max(samples // 2, samples_for(orders[-1]))
     return Resolution(orders, samples)
@@ -216,13 +214,18 @@ def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
 def nothing_happens(evaluation: Evaluation) -> bool:
     """Whether every pair sticks or is open throughout the period, so that the joint is linear.
 
-    A pair that reaches its friction limit without slip counts as stuck.
+    A pair that reaches its friction limit without slip counts as stuck. One with another law is linear at rest alone.
     """
-    separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
-    rests = np.ptp(state_t, axis=2) <= ROUND_OFF * np.abs(state_t).max(axis=2)
-    still = rests.all(axis=1) & ~separated.any(axis=1)
-    sticks = (evaluation.status_t == STICK).all(axis=1)
-    return bool((sticks | still | separated.all(axis=1)).all())
+    status_t, force_t = evaluation.status_t, evaluation.predicted_t
+    closed = ((status_t == STICK) | (status_t == SLIP)).all(axis=1) & _is_constant(evaluation.state_t)
+    other = (status_t == OTHER).all(axis=1)
+    calm = other & _is_constant(force_t) if other.any() else other
+    return bool((closed | calm | (status_t == SEPARATED).all(axis=1)).all())
+
+
+def _is_constant(values_t: FloatArray) -> BoolArray:
+    """Pairs (n_contact,) with values (n_contact, k, N) that do not change."""
+    return np.asarray((np.ptp(values_t, axis=2) <= ROUND_OFF * np.abs(values_t).max(axis=2)).all(axis=1))
 
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:

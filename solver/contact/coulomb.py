@@ -30,6 +30,7 @@ from solver.model import FloatArray, IntArray
 SEPARATED = 0
 STICK = 1
 SLIP = 2
+OTHER = 3  # of a law without these states
 
 Force = TypeVar("Force", float, FloatArray)
 
@@ -72,9 +73,8 @@ def contact_sample(
     """Normal force, 2 friction forces, 2 states, N, and status at one sample, Eqs. (3), (4), (11)-(15)."""
     if normal <= 0.0:
         return 0.0, 0.0, 0.0, tangent_1, tangent_2, SEPARATED
-    force_1, force_2, sticks = friction_force(
-        tangent_1 - state_1, tangent_2 - state_2, friction_limit(friction, normal)
-    )
+    limit = friction_limit(friction, normal)
+    force_1, force_2, sticks = friction_force(tangent_1 - state_1, tangent_2 - state_2, limit)
     if sticks:
         return normal, force_1, force_2, state_1, state_2, STICK
     return normal, force_1, force_2, tangent_1 - force_1, tangent_2 - force_2, SLIP

@@ -17,6 +17,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from solver.contact.coulomb import STICK, advance_monodromy, contact_sample, contact_tangent
+from solver.contact.element import Tangents
 from solver.model import FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
@@ -27,13 +28,9 @@ Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""
 PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
 SMALLEST_DETERMINANT = ROUND_OFF  # of 1 - monodromy: below it a part of the state does not fade
 
-Tangents = tuple[FloatArray, FloatArray]
-"""Derivatives by the harmonics of the predicted force: of those of friction, in the last 2m rows of
-(n_contact, 3m, 3m), and of the slip work as in `Period`, (n_contact, 3m)."""
-
 
 class Period(NamedTuple):
-    """A period of pairs, as in `law.Marched`; the marches fill all but predicted_t, friction and start.
+    """A period of pairs, as in `Marched`; the marches fill all but predicted_t, friction and start.
 
     friction (n_contact,): coefficients. change (n_contact,): of the tangential state over the last period, of masses of
     the velocity, as a force m v / dt, N. slip_work: of elastic pairs times the tangential penalty, N * N.
@@ -176,7 +173,7 @@ def march_tangent(
             for _ in range(plain):
                 end = _pass_tangent(dstart, unused_t, unused, predicted_t, friction, first, second, by_column_t)
                 first, second = end
-        assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_h)
+        assemble(out, pair, dforce_t, work, dstart, analysis_h)
 
 
 @register_jitable
@@ -239,19 +236,14 @@ def periodic_start(dend: FloatArray, dstart: FloatArray) -> bool:
 
 @register_jitable
 def assemble(
-    tangent: FloatArray,
-    work_tangent: FloatArray,
-    dforce_t: FloatArray,
-    work: FloatArray,
-    dstart: FloatArray,
-    analysis_h: FloatArray,
+    out: Tangents, pair: int, dforce_t: FloatArray, work: FloatArray, dstart: FloatArray, analysis_h: FloatArray
 ) -> None:
-    """Derivatives of a pair: of the harmonics of friction into `tangent` (3m, 3m), of the slip work into (3m,).
+    """Derivatives of the harmonics of friction and of the slip work of a pair, into `out`.
 
     dforce_t (N, 2w), work (w,): derivatives, in the last two columns by the start of the period. dstart (2, w): of the
     start.
     """
-    m, w = analysis_h.shape[0], work.size
+    tangent, work_tangent, m, w = out[0][pair], out[1][pair], analysis_h.shape[0], work.size
     dforce_h = np.empty((m, 2 * w))
     np.dot(analysis_h, dforce_t, dforce_h)
     for k in range(w - 2):

@@ -26,18 +26,20 @@ from numba import njit
 from numba.extending import register_jitable
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_force, friction_limit, slip_tangent
-from solver.contact.elastic_pairs import MOST_PERIODS, Period, Tangents, assemble, periodic_start
+from solver.contact.elastic_pairs import MOST_PERIODS, Period, assemble, periodic_start
+from solver.contact.element import Tangents
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # parts of a step of a pair with two tangents
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
 
-
 Pair = tuple[float, float]
 
 
 class Masses(NamedTuple):
-    """Mass, kg, drag, N s/m, and line (`ContactInterface`) of each pair (n_contact,); time between two samples, s."""
+    """Mass, kg, and drag, N s/m, of each pair (n,); its line, 0 or 1 where it has the first or the second tangent only,
+    else -1; time between two samples, s.
+    """
 
     mass: FloatArray
     drag: FloatArray
@@ -200,12 +202,10 @@ def march_masses(pairs: IntArray, period: Period, masses: Masses) -> None:
             start[0], start[1] = velocity[0], velocity[1]
             work = 0.0
             for n in range(n_samples):
-                normal = max(predicted_t[0, n], 0.0)
+                normal, force = max(predicted_t[0, n], 0.0), (predicted_t[1, n], predicted_t[2, n])
                 rests = velocity[0] == 0.0 and velocity[1] == 0.0
                 limit = friction_limit(period.friction[pair], normal)
-                step_mass(
-                    (predicted_t[1, n], predicted_t[2, n]), velocity, limit, gains, masses.line[pair], out, tangent
-                )
+                step_mass(force, velocity, limit, gains, masses.line[pair], out, tangent)
                 force_t[0, n], force_t[1, n], force_t[2, n] = normal, out[0], out[1]
                 for i in range(2):
                     velocity[i] = out[2 + i]
@@ -246,18 +246,17 @@ def mass_tangent(
     period: Period,
     steps: tuple[FloatArray, FloatArray],
     step: float,
-    by_column_t: FloatArray,
-    by_mean_t: FloatArray,
+    by_column_t: tuple[FloatArray, FloatArray],
     analysis_h: FloatArray,
     out: Tangents,
 ) -> None:
     """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity, into `out`.
 
-    steps: as `mass_slopes` gives them. step: between samples, s. by_column_t, by_mean_t: synthesis of samples
-    and of means over steps, as `by_columns` gives them. analysis_h (m, N): harmonics from such means; contiguous.
+    steps: as `mass_slopes` gives them. step: between samples, s. by_column_t: synthesis of samples and of means over
+    steps, as `by_columns` gives them. analysis_h (m, N): harmonics from such means; contiguous.
     """
     m, n_samples = analysis_h.shape
-    w, (slopes, speed_t) = 3 * m + 2, steps
+    w, (slopes, speed_t), (sample_t, mean_t) = 3 * m + 2, steps, by_column_t
     dforce_t, after, dstart = np.empty((n_samples, 2 * w)), np.empty((5, w)), np.zeros((2, w))
     for place, pair in enumerate(pairs):
         work, velocity = np.zeros(w), np.zeros((2, w))
@@ -265,7 +264,7 @@ def mass_tangent(
         for n in range(n_samples):
             normal = max(period.predicted_t[pair, 0, n], 0.0)
             by_limit = period.friction[pair] if normal > 0.0 else 0.0
-            by_0, by_1, by_2 = by_column_t[n, 2 * m :], by_mean_t[n, m:], by_mean_t[n]
+            by_0, by_1, by_2 = sample_t[n, 2 * m :], mean_t[n, m:], mean_t[n]
             for row in range(5):
                 by = slopes[place, n, row]
                 for j in range(w):
@@ -277,4 +276,4 @@ def mass_tangent(
                 velocity[0, j], velocity[1, j] = after[2, j], after[3, j]
                 work[j] = work[j] + normal * step * after[4, j] + speed * step * by_0[j]
         periodic_start(velocity, dstart)
-        assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_h)
+        assemble(out, pair, dforce_t, work, dstart, analysis_h)

@@ -71,7 +71,7 @@ class Way(NamedTuple):
 
 def slide_along(pairs: IntArray, path: Path, out: FloatArray) -> None:
     """Tangential states of some pairs (n,) at the end of a path into out (n_contact, 2), N."""
-    _slide(pairs, path, out, np.empty((pairs.size, 0, NOTES)))
+    _slide(pairs, path, out, np.empty((pairs.size, 1, NOTES)))
 
 
 def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: FloatArray) -> None:
@@ -79,13 +79,13 @@ def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: Float
     out (n_contact, 2, 3m). synthesis (m, N): as in `FourierBasis`.
     """
     # with the same function: each one more is a second of compiling
-    notes = np.empty((pairs.size, 2 * PARTS + 2, NOTES))
+    notes = np.empty((pairs.size, 2 * PARTS + 3, NOTES))
     _trace_back(pairs, _slide(pairs, path, np.empty_like(path.state), notes), notes, synthesis, out)
 
 
 @njit(cache=True)
 def _slide(pairs: IntArray, path: Path, out: FloatArray, notes: FloatArray) -> IntArray:
-    """As `slide_along`; returns the numbers of steps (n,), which are noted (n, k, NOTES) where there is room."""
+    """As `slide_along`; returns the numbers of steps (n,). notes (n, k, NOTES): of the first k - 1 steps."""
     n_samples, counts = path.first.shape[2], np.zeros(pairs.size, np.int64)
     near, margin, discs = np.empty(n_samples, np.int64), np.empty(n_samples), np.empty((3, n_samples))
     for place, pair in enumerate(pairs):
@@ -115,7 +115,10 @@ def _slide(pairs: IntArray, path: Path, out: FloatArray, notes: FloatArray) -> I
 
 @njit(cache=True)
 def _trace_back(pairs: IntArray, counts: IntArray, notes: FloatArray, synthesis: FloatArray, out: FloatArray) -> None:
-    """As `slide_tangent`, from the noted steps."""
+    """As `slide_tangent`, from the noted steps.
+
+    later (2, 2), weights (N, 6): derivatives of the end of a path by the place after a step and by the forces, by rows.
+    """
     m, n_samples = synthesis.shape
     weights, later = np.empty((n_samples, 6)), np.empty(4)
     for place, pair in enumerate(pairs):
@@ -126,7 +129,16 @@ def _trace_back(pairs: IntArray, counts: IntArray, notes: FloatArray, synthesis:
         for step in range(counts[place] - 1, -1, -1):
             if max(abs(later[0]), abs(later[1]), abs(later[2]), abs(later[3])) <= ROUND_OFF:
                 break
-            _weigh(notes[place, step], later, weights)
+            note = notes[place, step]
+            for row in range(2):
+                one, other = later[2 * row], later[2 * row + 1]
+                for of in range(2):
+                    sample, start = int(note[of]), 2 + 6 * of
+                    if sample >= 0:
+                        for k in range(3):
+                            weights[sample, 3 * row + k] += one * note[start + k] + other * note[start + 3 + k]
+                for k in range(2):
+                    later[2 * row + k] = one * note[14 + k] + other * note[16 + k]
         for n in range(n_samples):
             for entry in range(6):
                 weight = weights[n, entry]
@@ -136,26 +148,10 @@ def _trace_back(pairs: IntArray, counts: IntArray, notes: FloatArray, synthesis:
 
 
 @register_jitable
-def _weigh(note: FloatArray, later: FloatArray, weights: FloatArray) -> None:
-    """Add the derivatives of the end of a path by what a step depends on to `weights` (N, 6); later (2, 2): derivative
-    of the end by the place after the step, then by that before it, row by row.
-    """
-    for row in range(2):
-        one, other = later[2 * row], later[2 * row + 1]
-        for place in range(2):
-            sample, start = int(note[place]), 2 + 6 * place
-            if sample >= 0:
-                for k in range(3):
-                    weights[sample, 3 * row + k] += one * note[start + k] + other * note[start + 3 + k]
-        for k in range(2):
-            later[2 * row + k] = one * note[14 + k] + other * note[16 + k]
-
-
-@register_jitable
 def _follow(way: Way, state: FloatArray, notes: FloatArray) -> tuple[float, float, int, float]:
     """As `_slide` for one pair, with the discs of some samples, and the farthest distance from the start."""
     x_1, x_2, count, farthest, slips = state[0], state[1], 0, 0.0, False
-    unused = np.empty(NOTES)
+    last = len(notes) - 1
     for part in range(PARTS + 1):
         along = part / PARTS
         common, one, other = _nearest(way, along, x_1, x_2)
@@ -173,12 +169,12 @@ def _follow(way: Way, state: FloatArray, notes: FloatArray) -> tuple[float, floa
                     low = middle
             _, one, other = _nearest(way, begin, x_1, x_2)
             if one >= 0:
-                x_1, x_2 = _project(way, begin, x_1, x_2, one, other, unused)
-            x_1, x_2 = _meet(way, begin, x_1, x_2, notes[count] if count < len(notes) else unused)
+                x_1, x_2 = _project(way, begin, x_1, x_2, one, other, notes[last])
+            x_1, x_2 = _meet(way, begin, x_1, x_2, notes[min(count, last)])
             count, farthest = count + 1, max(farthest, np.hypot(x_1 - state[0], x_2 - state[1]))
             common, one, other = _nearest(way, along, x_1, x_2)
         if one >= 0:
-            x_1, x_2 = _project(way, along, x_1, x_2, one, other, notes[count] if count < len(notes) else unused)
+            x_1, x_2 = _project(way, along, x_1, x_2, one, other, notes[min(count, last)])
             count, farthest = count + 1, max(farthest, np.hypot(x_1 - state[0], x_2 - state[1]))
     return x_1, x_2, count, farthest
 
@@ -276,12 +272,8 @@ def _project(
         size = np.hypot(x_1 - c_1, x_2 - c_2)
         u_1, u_2, ratio = (x_1 - c_1) / size, (x_2 - c_2) / size, radius / size
         # across the normal the place before counts with the ratio, the centre with the rest
-        note[14], note[15], note[16], note[17] = (
-            ratio * u_2 * u_2,
-            -ratio * u_1 * u_2,
-            -ratio * u_1 * u_2,
-            ratio * u_1 * u_1,
-        )
+        note[14], note[17] = ratio * u_2 * u_2, ratio * u_1 * u_1
+        note[15] = note[16] = -ratio * u_1 * u_2
         note[2], note[3], note[4] = along * grown * u_1, along * (1.0 - note[14]), -along * note[15]
         note[5], note[6], note[7] = along * grown * u_2, -along * note[16], along * (1.0 - note[17])
         return c_1 + radius * u_1, c_2 + radius * u_2

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.model import ContactInterface, FloatArray
+from solver.outcome import check
 
 LAWS = ("archard", "energy", "threshold", "table")
 
@@ -41,12 +42,12 @@ class WearTable:
 class WearLaw:
     """A wear law in the terms of a study.
 
-    - name: one of `LAWS`.
-    - threshold: q of the law "threshold", J/m2 per cycle.
-    - table: of the law "table".
+    - name: one of `LAWS`. threshold: q, J/m2 per cycle. table: f.
     - surfaces: factor of the wear coefficient for each label of a surface; a pair "flat/cylinder" has the sum of both.
       Empty: factor 1 for each pair.
     - worn: depth of each pair at the start of a history, m, from which the depths of the law "table" count; empty: 0.
+
+    Raises ValueError where the name is another one, the law "table" has no table, or another law has one.
     """
 
     name: str = "archard"
@@ -54,6 +55,10 @@ class WearLaw:
     table: WearTable | None = None
     surfaces: tuple[tuple[str, float], ...] = ()
     worn: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        check("law", self.name in LAWS, f'give one of {", ".join(LAWS)} instead of "{self.name}"')
+        check("law", (self.name == "table") == (self.table is not None), 'give a table to the law "table", to no other')
 
     def begun_at(self, depth: FloatArray) -> WearLaw:
         """The law of a history that begins at depths (n_contact,), m; only the factors of a table depend on depths."""
@@ -106,6 +111,12 @@ class PairFactors:
         slope = np.divide(high - low, width, out=np.zeros_like(width), where=width > 0.0)
         return low + fraction * (high - low), slope
 
+    def at(self, normal_force: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Factor of each pair (n_contact,), and its derivatives by normal force, 1/N, and depth, 1/m."""
+        by_depth, by_depth_slope = self.at_pressure(normal_force)
+        value, slope = self.at_depth(by_depth, depth)
+        return value, self.at_depth(by_depth_slope, depth)[0], slope
+
 
 def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
     """Index of the knot before each value, fraction of the interval, and its width; both are 0 beyond the ends."""
@@ -135,7 +146,7 @@ class WearingWork:
     def work(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> FloatArray:
         """Wearing work X (n_contact,), J, from slip work, J, mean normal force, N, and depth, m, each (n_contact,)."""
         work = self._without_table(slip_work)
-        return work if self.table is None else work * self._table_at(normal_force, depth)[0]
+        return work if self.table is None else work * self.table.at(normal_force, depth)[0]
 
     def slopes(
         self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray
@@ -144,7 +155,7 @@ class WearingWork:
         by_work, none = np.where(slip_work >= self.least, self.factor, 0.0), np.zeros_like(slip_work)
         if self.table is None:
             return by_work, none, none
-        work, (value, by_force, by_depth) = self._without_table(slip_work), self._table_at(normal_force, depth)
+        work, (value, by_force, by_depth) = self._without_table(slip_work), self.table.at(normal_force, depth)
         return by_work * value, work * by_force, work * by_depth
 
     def amplification(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> float:
@@ -190,21 +201,12 @@ class WearingWork:
         at: slip work, J, mean normal force, N, and depth, m, at the end of the step, (n_contact,) each.
         """
         by_work, by_force, by_depth = self.slopes(*at)
-        if self.table is None:
-            return (gain * by_work)[:, None] * slip_work_tangent
         follows = gain / (1.0 - gain * by_depth)
         grown: FloatArray = (follows * by_work)[:, None] * slip_work_tangent
         return grown + (follows * by_force)[:, None] * normal_force_tangent
 
     def _without_table(self, slip_work: FloatArray) -> FloatArray:
         return self.factor * np.maximum(slip_work - self.least, 0.0)
-
-    def _table_at(self, normal_force: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Factor of each pair (n_contact,), and its derivatives by normal force, 1/N, and depth, 1/m."""
-        assert self.table is not None
-        by_depth, by_depth_slope = self.table.at_pressure(normal_force)
-        value, slope = self.table.at_depth(by_depth, depth)
-        return value, self.table.at_depth(by_depth_slope, depth)[0], slope
 
 
 ARCHARDS_WORK = WearingWork()
@@ -214,15 +216,13 @@ ARCHARDS_WORK = WearingWork()
 def wearing_work(law: WearLaw, contact: ContactInterface, friction_coefficient: FloatArray) -> WearingWork:
     """The wearing work of the pairs of a joint. friction_coefficient: (n_contact,).
 
-    Raises ValueError where the law is not in `LAWS`, or where its surfaces are not the surfaces of the pairs.
+    Raises ValueError where the surfaces of the law are not those of the pairs.
     """
-    if law.name not in LAWS:
-        raise ValueError(f'wear law "{law.name}": give one of {", ".join(LAWS)}')
     factor = surface_factors(contact.surface, law.surfaces) if law.surfaces else 1.0
     if law.name == "energy":
         factor = factor * friction_coefficient
     least, table = law.threshold * contact.area if law.name == "threshold" else 0.0, None
-    if law.name == "table" and law.table is not None:
+    if law.table is not None:
         pressure, depth, values = (np.array(part) for part in (law.table.pressure, law.table.depth, law.table.factor))
         table = PairFactors(pressure, depth, values, contact.area, np.array(law.worn) if law.worn else 0.0)
     return WearingWork(factor, least, table)

@@ -1,24 +1,22 @@
-"""Pseudo-arc-length continuation of a branch through its folds.
-
-The parameter is the further unknown of a bordered system, whose further equation puts the point in a plane across the
-tangent of the branch.
+"""Pseudo-arc-length continuation of a branch through its folds: the parameter is the further unknown of a bordered
+system, whose further equation puts the point in a plane across the tangent of the branch.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
-from solver.harmonic_balance.dlft import Evaluation, Linearisation
-from solver.harmonic_balance.state import BalanceAt, State
+from solver.harmonic_balance.dlft import Balance, Linearisation
+from solver.harmonic_balance.state import State
 from solver.model import FloatArray
 from solver.newton.run import Bordered, Run
 from solver.settings import DIFFERENCE
 
 FIRST_ARC = SMOOTH_CHANGE / 10.0
-"""Length of the first step, in unknowns divided by the norm of the first predicted force; the longest one is
-`SMOOTH_CHANGE`."""
+"""Length of the first step, in unknowns over the norm of the first predicted force; the longest is `SMOOTH_CHANGE`."""
 
 CORNER_ARC = 1e-3
 """Length of the step behind a corner, and least length after a step: without it seven branches with folds take 46 %
@@ -35,21 +33,22 @@ FOLD_HALVINGS = 10
 """Halvings of a step with a fold; the parameter at the fold is off by the square of the length."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Arc:
     """A branch and its arc-length steps in scaled unknowns (p / size, parameter / span), with the history of its start.
 
-    span: natural length of the parameter.
+    balance_at: balance at a value of the parameter, with this history. span: natural length of the parameter.
     """
 
-    balance_at: BalanceAt
+    balance_at: Callable[[float], Balance]
     start: State
     span: float
     run: Run
-    size: float = field(init=False)
 
-    def __post_init__(self) -> None:
-        self.size = max(float(np.linalg.norm(self.start.evaluation.predicted_h)), 1e-300)
+    @cached_property
+    def size(self) -> float:
+        """Norm of the first predicted force, N."""
+        return max(float(np.linalg.norm(self.start.evaluation.predicted_h)), 1e-300)
 
     def steps(self, toward: float) -> Iterator[tuple[State, State, State | None]]:
         """Start and end of each step along the branch, and the state at the fold between both, None if none.
@@ -59,7 +58,7 @@ class Arc:
         state, length = self.start, FIRST_ARC
         along = np.zeros(state.evaluation.predicted_h.size + 1)
         along[-1] = toward
-        tangent = self.tangent(state.parameter, state.evaluation, along)
+        tangent = self.tangent(state, along)
         while tangent is not None and not self.run.budget.exhausted:
             reached = None
             while reached is None and length > SHORTEST_ARC:
@@ -69,7 +68,7 @@ class Arc:
             if reached is None:
                 return
             back = state is self.start and (reached.parameter - state.parameter) * toward < 0.0
-            ahead = self.tangent(reached.parameter, reached.evaluation, self.place(reached) - self.place(state))
+            ahead = self.tangent(reached, self.place(reached) - self.place(state))
             turns = ahead is not None and ahead[-1] * tangent[-1] < 0.0
             yield state, reached, state if back else self._fold(state, tangent, reached) if turns else None
             state, tangent, length = reached, ahead, max(length, CORNER_ARC)
@@ -78,15 +77,19 @@ class Arc:
         """Scaled unknowns of a state."""
         return np.append(state.evaluation.predicted_h.ravel() / self.size, state.parameter / self.span)
 
-    def slope(self, parameter: float, evaluation: Evaluation) -> FloatArray:
-        """Derivative (n_rel, m), N, of the residual by parameter / span, by a difference: enough for a direction."""
-        ahead = self.balance_at(parameter + DIFFERENCE * self.span, self.start.history).evaluate(evaluation.predicted_h)
-        return (ahead.residual - evaluation.residual) / DIFFERENCE
+    def state_of(self, here: Bordered) -> State:
+        """State of the branch from an evaluation with the scaled parameter."""
+        return State(here.at, self.start.history, float(here.values[0] * self.span))
 
-    def tangent(self, parameter: float, evaluation: Evaluation, along: FloatArray) -> FloatArray | None:
+    def slope(self, state: State) -> FloatArray:
+        """Derivative (n_rel, m), N, of the residual by parameter / span, by a difference: enough for a direction."""
+        ahead = self.balance_at(state.parameter + DIFFERENCE * self.span).evaluate(state.evaluation.predicted_h)
+        return (ahead.residual - state.evaluation.residual) / DIFFERENCE
+
+    def tangent(self, state: State, along: FloatArray) -> FloatArray | None:
         """Unit tangent of the branch, of the sign of a direction `along`; None where the tangent is not defined."""
-        balance, slope = self.balance_at(parameter, self.start.history), self.slope(parameter, evaluation)
-        tangent = np.append((self.run.steps(balance, evaluation, [-slope]) / self.size).ravel(), 1.0)
+        steps = self.run.steps(self.balance_at(state.parameter), state.evaluation, [-self.slope(state)])
+        tangent = np.append((steps / self.size).ravel(), 1.0)
         largest = float(np.abs(tangent).max())
         if not np.isfinite(largest):
             return None
@@ -97,27 +100,21 @@ class Arc:
 
     def step(self, state: State, tangent: FloatArray, length: float) -> State | None:
         """State of the branch at the given length along the tangent; None where the corrector does not converge."""
-        base = self.place(state)
-        ahead = base + length * tangent
-        start = ahead[:-1].reshape(state.evaluation.predicted_h.shape) * self.size
-        plane = _Plane(self, base, tangent, length)
-        found = self.run.solve_bordered(plane, start, ahead[-1:], NEAR_ITERATIONS - 1)
-        return None if found is None else State(found.at, self.start.history, float(found.values[0] * self.span))
+        plane = _Plane(self, self.place(state), tangent, length)
+        found = self.run.solve_bordered(plane, *plane.first(), NEAR_ITERATIONS - 1)
+        return None if found is None else self.state_of(found)
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
         """State behind a corner, along the tangent a little ahead, with both signs; None where none is found."""
-        base = self.place(state)
-        ahead = base + CORNER_ARC * tangent
-        parameter, predicted_h = float(ahead[-1] * self.span), ahead[:-1].reshape(state.evaluation.predicted_h.shape)
-        behind = self.balance_at(parameter, self.start.history).evaluate(predicted_h * self.size)
-        turned = self.tangent(parameter, behind, tangent)
+        plane = _Plane(self, self.place(state), tangent, CORNER_ARC)
+        turned = self.tangent(self.state_of(plane.evaluate(*plane.first())), tangent)
         if turned is None:
             return None
         for sign in (1.0, -1.0):
             reached = self.step(state, sign * turned, CORNER_ARC)
             if reached is None:
                 continue
-            chord = self.place(reached) - base
+            chord = self.place(reached) - plane.base
             # a chord within 8 degrees of the backward tangent lies on the branch before the corner
             if chord @ tangent > -0.99 * np.linalg.norm(chord):
                 return reached
@@ -127,9 +124,8 @@ class Arc:
         """State at the target between two states of the branch; None where Newton's method fails."""
         fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
-        balance = self.balance_at(target, self.start.history)
-        found = self.run.state(balance, one + fraction * (other - one), target, NEAR_ITERATIONS)
-        return None if found is None else replace(found, history=self.start.history)
+        found = self.run.state(self.balance_at(target), one + fraction * (other - one), target, NEAR_ITERATIONS)
+        return None if found is None else State(found.evaluation, self.start.history, target)
 
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
         """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""
@@ -138,7 +134,7 @@ class Arc:
         for _ in range(FOLD_HALVINGS):
             place = 0.5 * (low + high)
             found = self.step(state, tangent, place)
-            ahead = None if found is None else self.tangent(found.parameter, found.evaluation, tangent)
+            ahead = None if found is None else self.tangent(found, tangent)
             if found is None or ahead is None:
                 break
             best = max(best, found, key=lambda each: sign * each.parameter)
@@ -155,14 +151,19 @@ class _Plane:
     tangent: FloatArray
     length: float
 
+    def first(self) -> tuple[FloatArray, FloatArray]:
+        """Predicted force (n_rel, m), N, and scaled parameter (1,) where the tangent meets the plane."""
+        ahead = self.base + self.length * self.tangent
+        return ahead[:-1].reshape(self.arc.start.evaluation.predicted_h.shape) * self.arc.size, ahead[-1:]
+
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        balance = self.arc.balance_at(float(values[0] * self.arc.span), self.arc.start.history)
+        balance = self.arc.balance_at(float(values[0] * self.arc.span))
         moved = np.append(predicted_h.ravel() / self.arc.size, values) - self.base
         ahead = float(self.tangent @ moved) - self.length
         return Bordered(balance, balance.evaluate(predicted_h), values, np.array([ahead]), extra=moved)
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
-        return [self.arc.slope(float(here.values[0] * self.arc.span), here.at)], self.tangent[-1:, None]
+        return [self.arc.slope(self.arc.state_of(here))], self.tangent[-1:, None]
 
     def by_step(self, _: Bordered, __: Linearisation, step: FloatArray) -> FloatArray:
         return np.array([self.tangent[:-1] @ step.ravel() / self.arc.size])

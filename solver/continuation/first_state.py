@@ -19,8 +19,8 @@ from solver.contact.coulomb import friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
 from solver.continuation.transient import RUNAWAY, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import Failure, State
-from solver.model import ComplexArray, FloatArray
+from solver.harmonic_balance.state import Failure, State, balance_after
+from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import NEGLIGIBLE
@@ -43,8 +43,7 @@ Other fractions lead to other states that friction allows: 5 % for a mass that r
 
 
 def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run: Run) -> State | Failure:
-    """First periodic state of a joint, unworn or with its depths as gaps. These ways are tried in turn until one leads
-    to a stable state:
+    """First stable periodic state of a joint, unworn or with its depths as gaps, by the first way that finds one:
 
     1. Where friction can hold no pair against the whole excitation, Newton's method starts from a vibration in which
        all slide (four iterations for the slider, which takes 50 with the next way).
@@ -53,28 +52,27 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
        limit slip under the smallest vibration, in states far from the static one, and shake down.
     4. The vibration builds up in time under the whole excitation (`transient`).
 
-    omega, excitation_amplitude: rad/s, N.
-    Returns the state, or START_FAILED, UNSTABLE, UNSETTLED, ADRIFT or the failure of `solve_static_state`.
+    omega, excitation_amplitude: rad/s, N. Returns the state, or the failure of `state_at_rest` or `relax_to_periodic`.
     """
     rest = state_at_rest(case, omega, run)
     if isinstance(rest, Failure):
         return rest
     quiet, unstable = case.joint(omega, 0.0), False
+    whole = Balance(case.joint(omega, excitation_amplitude), rest.history)
 
-    def balance_at(load_factor: float, history: FloatArray, first: FloatArray | None = None) -> Balance:
-        return Balance(case.joint(omega, load_factor * excitation_amplitude), history, first=first)
+    def balance_from(load_factor: float, state: State) -> Balance:
+        return balance_after(case.joint(omega, load_factor * excitation_amplitude), state)
 
-    whole = balance_at(1.0, rest.history)
     sliding = sliding_start(whole, rest)
     slid = None if sliding is None else run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
     if slid is not None and run.is_stable(whole.joint, slid.evaluation):
         return slid
     for fraction in (0.0, *RELIEF):
-        relieved = balance_at(0.0, relieved_history(quiet, rest, fraction))
+        relieved = Balance(quiet, relieved_history(quiet, rest, fraction))
         begun = run.state(relieved, rest.evaluation.predicted_h, 0.0) if fraction else rest
         if begun is None:
             continue
-        raised, arrived = follow_naturally(balance_at, begun, 1.0, run)
+        raised, arrived = follow_naturally(balance_from, begun, 1.0, run)
         if arrived and run.is_stable(whole.joint, raised.evaluation):
             return raised
         unstable |= arrived
@@ -83,9 +81,8 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
 
 
 def state_at_rest(case: Case, omega: float, run: Run) -> State | Failure:
-    """The static state with the harmonics of a case, none of which vibrates, and with the parameter 0.
-
-    Arguments as in `solve_first_state`. Returns the state, START_FAILED or the failure of `solve_static_state`.
+    """The static state with the harmonics of a case, none of which vibrates, at the frequency omega, rad/s, and with
+    the parameter 0; or START_FAILED or the failure of `solve_static_state`.
     """
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, run)
@@ -102,18 +99,12 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
 
     The motion is that without friction; friction acts against it with its first harmonic, 4 / pi times its limit.
     """
-    joint, at = balance.joint, rest.evaluation
-    load, stiffness = joint.structure.harmonic_force, joint.structure.dynamic_stiffness[0]
-    limit = friction_limit(joint.friction_coefficient, at.force_h[:, 0, 0])
-
-    def of_pairs(amplitudes: ComplexArray) -> ComplexArray:
-        spread = np.zeros(3 * limit.size, complex)
-        spread[joint.component_index] = amplitudes
-        return spread.reshape(-1, 3)
-
-    if (np.linalg.norm(of_pairs(load)[:, 1:], axis=1) <= limit).any():
+    structure, at, rows = balance.joint.structure, rest.evaluation, balance.joint.contact.pair_rows
+    load, limit = structure.harmonic_force, friction_limit(balance.joint.friction_coefficient, at.force_h[:, 0, 0])
+    pushed = np.where(rows >= 0, load[rows], 0.0)
+    if (np.linalg.norm(pushed[:, 1:], axis=1) <= limit).any():
         return None
-    moved = of_pairs(np.asarray(np.linalg.solve(stiffness, load), np.complex128))
+    moved = np.where(rows >= 0, np.linalg.solve(structure.dynamic_stiffness[0], load)[rows], 0.0)
     friction, size = np.zeros_like(moved), np.maximum(np.linalg.norm(moved[:, 1:], axis=1), 1e-300)
     friction[:, 1:] = (4j / np.pi * limit / size)[:, None] * moved[:, 1:]
     motion_h, force_h = at.displacement_h.copy(), at.force_h.copy()
@@ -124,21 +115,20 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
 
 def relieved_history(joint: Joint, rest: State, fraction: float) -> FloatArray:
     """Tangential history (n_contact, 2), m, that reduces the friction forces of a state at rest by a fraction."""
-    return rest.history + fraction * rest.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
+    return joint.law.relieved(rest.history, fraction * rest.evaluation.force_h[:, 1:, 0])
 
 
 def solve_static_state(joint: Joint, run: Run) -> State | Failure:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
-    Without gaps and given normal forces all states of a rising load are proportional, and one step is enough.
-
     joint: its excitation is left out.
     Returns the state; STATIC_SLIDING or STATIC_OPEN where there is no static state, STATIC_FAILED where none is found.
     """
     run, contact = run.fresh(), joint.contact
+    # without gaps and given normal forces all states of a rising load are proportional
     n_steps = LOAD_STEPS if contact.gap.any() or not contact.has_normal.all() else 1
     unmoved = np.zeros((contact.n_contact, 3, 1))
-    rest = Balance(static_joint(joint, 0.0), unmoved[:, 1:, 0])
+    rest = Balance(static_joint(joint, 0.0), np.zeros((contact.n_contact, joint.law.n_history)))
     state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history)
     for step in range(1, n_steps + 1):
         balance = Balance(static_joint(joint, step / n_steps), state.history)

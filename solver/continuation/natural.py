@@ -1,19 +1,19 @@
 """Steps along a parameter, natural steps, shakedown of sliding masses by them, and constants that all searches share.
 
 The length of a step along frequency, load, amplitude, cycles or missions follows from the change of the state over the
-step, or its local error, over the one allowed (`take_step`). Natural steps of Newton's method alone are halved where it
-fails (`follow_naturally`). Changes of the vibration are those of `vibration_change`.
+step, or its local error, over the one allowed (`take_step`). Natural steps, by Newton's method alone, are halved where
+it fails (`follow_naturally`).
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import BalanceAt, Failure, State
-from solver.model import FloatArray
+from solver.harmonic_balance.state import Failure, State
 from solver.newton.run import MOST_ITERATIONS, SHORTEST_STEP, Run
 from solver.structure.joint import Joint
 
@@ -57,10 +57,10 @@ class SteppedProblem(Protocol[HereT, EndT]):
 
 @dataclass(frozen=True)
 class Lengths:
-    """The rule for the length of a step.
+    """The rule for the length of a step, at least the shortest. safety: as `STEP_SAFETY`.
 
-    order: power of the length with which the ratio of `SteppedProblem` grows. safety: as `STEP_SAFETY`.
-    shortest: shortest step. rescue: length at and below which a step that is not found is left to the rescue.
+    order: power of the length with which the ratio of `SteppedProblem` grows.
+    rescue: length at and below which a step that is not found is left to the rescue.
     """
 
     order: int
@@ -93,22 +93,23 @@ def take_step(
 
 
 def follow_naturally(
-    balance_at: BalanceAt, start: State, target: float, run: Run, fine: float = np.inf
+    balance_from: Callable[[float, State], Balance], start: State, target: float, run: Run, fine: float = np.inf
 ) -> tuple[State, bool]:
     """Step the parameter to the target; returns the last state, and whether it is at the target.
 
-    The first Newton iteration from the last state is a tangent predictor (for wear: Eq. (19)). fine: longest step.
+    The first Newton iteration from the last state is a tangent predictor (for wear: Eq. (19)).
+    balance_from: balance at a parameter from the last state. fine: longest step.
     """
     state, whole = start, target - start.parameter
     # fractions of two: sums of them are exact, so that the last step ends at the target
-    fraction = longest = 2.0 ** min(math.floor(math.log2(fine / max(abs(whole), 1e-300))), 0) if fine < np.inf else 1.0
+    fraction = longest = 2.0 ** math.floor(math.log2(min(fine / max(abs(whole), 1e-300), 1.0)))
     shortest, done, failures = min(SHORTEST_STEP, 0.25 * longest), 0.0, 0
     while state.parameter != target:
         ahead = min(done + fraction, 1.0)
         reach = target if ahead == 1.0 else start.parameter + ahead * whole
-        balance = balance_at(reach, state.history, state.evaluation.predicted_t)
         most = MOST_ITERATIONS if fraction <= 2.0 * shortest else NEAR_ITERATIONS
-        if (found := run.state(balance, state.evaluation.predicted_h, reach, most)) is not None:
+        found = run.state(balance_from(reach, state), state.evaluation.predicted_h, reach, most)
+        if found is not None:
             state, done, fraction = found, ahead, min(2.0 * fraction, longest)
             continue
         fraction, failures = 0.5 * (ahead - done), failures + 1
@@ -132,24 +133,22 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
     """State after shakedown of the masses at an unchanged wear depth: the mean position becomes the new history until
     the work of ratcheting is at most a fraction of the slip work. The last state found where this does not end.
     """
-    run, worn = run.fresh(), state.evaluation.wear_depth
+    run = run.fresh()
     for _ in range(ATTEMPTS):
         if not ratchets(joint, state.evaluation, fraction):
             break
-        before = state.evaluation.history
-        shift = joint.law.origin(state.evaluation.displacement_h[:, 1:, 0] - before)
-
-        def balance_at(
-            part: float,
-            _: FloatArray,
-            __: FloatArray | None = None,
-            before: FloatArray = before,
-            shift: FloatArray = shift,
-        ) -> Balance:
-            return Balance(joint, before + part * shift, worn)
-
-        moved, arrived = follow_naturally(balance_at, State(state.evaluation, before, 0.0), 1.0, run)
+        moved, arrived = _shifted(joint, state.evaluation, run)
         if not arrived:
             break
         state = State(moved.evaluation, moved.history, state.parameter)
     return state
+
+
+def _shifted(joint: Joint, at: Evaluation, run: Run) -> tuple[State, bool]:
+    """As `follow_naturally`, along the history of the masses from that of a state to that which the state leaves."""
+    shift = np.where(joint.law.moves_on[:, None], joint.law.final_history(at, at.displacement_h) - at.history, 0.0)
+
+    def balance_from(part: float, _: State) -> Balance:
+        return Balance(joint, at.history + part * shift, at.wear_depth)
+
+    return follow_naturally(balance_from, State(at, at.history, 0.0), 1.0, run)

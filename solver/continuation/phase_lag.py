@@ -52,10 +52,7 @@ def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
 
 @dataclass(frozen=True)
 class _AtLag:
-    """As BorderedProblem: a balance, with fixed or growing wear depths, whose frequency, rad/s, follows from its lag.
-
-    balance: at some frequency. lag: rad, between 0 and pi.
-    """
+    """As BorderedProblem: a balance, given at some frequency, whose frequency, rad/s, follows from its lag, rad."""
 
     case: Case
     balance: Balance
@@ -89,8 +86,8 @@ def solve_at_lag(
 ) -> Bordered | None:
     """The state of a balance, with fixed or with growing wear depths, at a phase lag, rad; None where it is not found.
 
-    start (n_rel, 2H+1): first predicted force, N, at the frequency of the balance. most: iterations. `Bordered.reduced`
-    of the state: change of the lag with the frequency along the states, s/rad.
+    start (n_rel, 2H+1): first predicted force, N. `Bordered.reduced` of the state: change of the lag with the frequency
+    along the states, s/rad.
     """
     return run.solve_bordered(_AtLag(case, balance, lag), start, np.array([balance.joint.omega]), most)
 

@@ -75,7 +75,7 @@ class Transient:
             condense(cast("Matrix", of.stiffness + rate * of.damping + rate**2 * of.mass), self.relative, load)
             for of, rate, load in zip(self.linear, rates, loads, strict=True)
         ]
-        stiffness, force = (np.array([getattr(each, name) for each in found]) for name in ("stiffness", "force"))
+        stiffness, force = np.array([each.stiffness for each in found]), np.array([each.force for each in found])
         structure = replace(
             self.joint.structure,
             static_stiffness=np.real(stiffness[0]),

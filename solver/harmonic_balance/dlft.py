@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from solver.contact.law import Marched
+from solver.contact.element import Marched
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.packing import packable
@@ -31,7 +31,7 @@ from solver.structure.joint import Joint
 class Balance:
     """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
-    - history (n_contact, 2): tangential history, m (`ContactLaw`). first (n_contact, 3, N): predicted force, N, with
+    - history (n_contact, 2): tangential history, m (`Element`). first (n_contact, 3, N): predicted force, N, with
       this history, from which that of the state has slowly come; None where it was always the same.
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6). Default: 0.
     - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given. wearing: this work.
@@ -58,20 +58,17 @@ class Balance:
         given = ~joint.contact.has_normal
         pairs[given, 0, 0] = joint.contact.normal_load[given]
         marched = joint.law.march(pairs, self.history, self.first)
-        wear_depth = self.wear_depth + self.wearing.growth(
-            self.wear_gain, marched.slip_work, marched.force_h[:, 0, 0], self.wear_depth
-        )
+        worn = marched.slip_work, marched.force_h[:, 0, 0], self.wear_depth
+        wear_depth = self.wear_depth + self.wearing.growth(self.wear_gain, *worn)
         displacement_h = joint.law.motion(pairs - marched.force_h)
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
         displacement_h[:, 1:, 0] += joint.law.origin(self.history)
         motion, force = joint.to_relative(displacement_h), joint.to_relative(marched.force_h)
-        reduced_force = joint.structure.force_h
-        residual = joint.structure.apply(motion) + force - reduced_force
         return Evaluation(
             **vars(marched),
             predicted_h=predicted_h,
-            residual=residual,
-            scale=_residual_scale(reduced_force, force),
+            residual=joint.structure.apply(motion) + force - joint.structure.force_h,
+            scale=_residual_scale(joint.structure.force_h, force),
             history=joint.law.started_from(marched, self.history),
             displacement_h=displacement_h,
             wear_depth=wear_depth,
@@ -82,9 +79,8 @@ class Balance:
         if self.first is None and at.slid.any():
             at = replace(at, slid=np.zeros_like(at.slid))
         force_tangent, slip_work_tangent = self.joint.law.tangent(at, self.history, self.first)
-        growth_tangent = self.wearing.growth_tangent(
-            self.wear_gain, worn_by(at), slip_work_tangent, force_tangent[:, 0, :]
-        )
+        tangents = slip_work_tangent, force_tangent[:, 0, :]
+        growth_tangent = self.wearing.growth_tangent(self.wear_gain, worn_by(at), *tangents)
         return Linearisation(self.joint, at, force_tangent, growth_tangent)
 
 
@@ -108,9 +104,8 @@ class Evaluation(Marched):
     def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
         """Euclidean norm of the residual, with the static harmonic and the other harmonics divided by their scales."""
         static, moving = scale or self.scale
-        return float(
-            np.hypot(np.linalg.norm(self.residual[:, 0]) / static, np.linalg.norm(self.residual[:, 1:]) / moving)
-        )
+        errors = np.linalg.norm(self.residual[:, 0]) / static, np.linalg.norm(self.residual[:, 1:]) / moving
+        return float(np.hypot(*errors))
 
 
 def worn_by(at: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray]:

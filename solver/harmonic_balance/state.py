@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -16,13 +15,6 @@ from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC, Resolution
 from solver.structure.condensation import SingularStructureError, build_structure
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
 from solver.structure.joint import Case, Joint
-
-
-class BalanceAt(Protocol):
-    """Balances over a parameter."""
-
-    def __call__(self, parameter: float, history: FloatArray, first: FloatArray | None = None, /) -> Balance:
-        """The balance at a value for a tangential history (n_contact, 2), m; first: as in `Balance`."""
 
 
 @packable
@@ -47,6 +39,11 @@ class Failure(Ended):
     message: str
 
 
+def balance_after(joint: Joint, state: State) -> Balance:
+    """Balance of a joint whose forces have slowly come from those of a state."""
+    return Balance(joint, state.history, first=state.evaluation.predicted_t)
+
+
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
     """Tangential history (n_contact, 2), m, that a state of a balance leaves."""
     return balance.joint.law.final_history(evaluation, evaluation.displacement_h)
@@ -62,11 +59,9 @@ def vibration_size(evaluation: Evaluation) -> float:
     return max(float(np.linalg.norm(evaluation.predicted_h[:, 1:])), 1e-300)
 
 
-# --- other harmonics: another penalty, with which a pair may be inertial instead of elastic ---
-
-
 def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
-    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old`.
+    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old` with other
+    harmonics: they have another penalty, with which a pair may be inertial instead of elastic.
 
     with_tail: new harmonics of the force are those of its samples, as many as those of `joint`, instead of zeros; they
         contain impacts. New harmonics of the motion are those that this force causes.
@@ -75,8 +70,11 @@ def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool
         old = old.at(Resolution(old.resolution.orders, joint.basis.n_samples))
         sampled, start = transfer(old, old.joint(joint.omega, joint.excitation_amplitude), evaluation)
         evaluation = sampled.evaluate(start)
-    balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
     orders, known = joint.basis.orders, old.resolution.orders
+    tangential, end = evaluation.displacement_h[:, 1:], np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
+    begun = joint.law.begun_at(tangential[:, :, 0], (tangential @ synthesis(known, end))[:, :, 0])
+    same = old.penalty.inertial == joint.penalty.inertial
+    balance = Balance(joint, np.where(same[:, None], evaluation.history, begun), evaluation.wear_depth)
     motion_h, force_h = (
         change_orders(joint.to_relative(part), known, orders)
         for part in (evaluation.displacement_h, evaluation.force_h)
@@ -90,17 +88,6 @@ def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool
         for part, found in ((force_h, amplitudes), (motion_h, moved)):
             part[:, 2 * new + 1], part[:, 2 * new + 2] = found.real, -found.imag
     return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
-
-
-def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArray:
-    """Tangential history (n_contact, 2), m, of a state of the case `old`, converted for the law of `joint`."""
-    tangential = evaluation.displacement_h[:, 1:]
-    end = np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
-    last = (tangential @ synthesis(old.resolution.orders, end))[:, :, 0]
-    return joint.law.history_from(old.penalty, evaluation.history, tangential[:, :, 0], last)
-
-
-# --- responses ---
 
 
 def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
@@ -135,7 +122,7 @@ def tail_orders(joint: Joint) -> tuple[int, ...]:
 
 def _tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> FloatArray:
     """Responses (n_response, 2k+1), m, to the friction on masses in k harmonics: `u_n = -lambda_n / Z_n`."""
-    still = np.zeros(joint.structure.static_response.shape[0])
+    still = np.zeros(len(joint.structure.static_response))
     try:
         # the load acts in the first harmonic alone
         structure = build_structure(joint.model, joint.omega, 0.0, orders)

@@ -2,9 +2,8 @@
 sweep along the frequency begins.
 
 It begins well away from the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85
-times. All points of a cell, a quarter octave, have one first frequency: the one at which the vibration loads the stuck
-joint least, so that no sweep begins at a resonance. It depends on the scene and on the cell, not on the other points of
-a study.
+times. All points of a cell, a quarter octave, have one first frequency, whatever the other points of a study are: the
+one at which the vibration loads the stuck joint least, so that no sweep begins at a resonance.
 """
 
 import math
@@ -16,11 +15,11 @@ import numpy as np
 
 from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine, with_level_above
 from solver.accuracy.resolved_state import Estimate, ResolvedState, left_out, nothing_happens
-from solver.contact.coulomb import SEPARATED, STICK, friction_limit
+from solver.contact.coulomb import SEPARATED, SLIP, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State, transfer, vibration_change, vibration_size
+from solver.harmonic_balance.state import Failure, State, balance_after, transfer, vibration_change, vibration_size
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -45,8 +44,7 @@ CHANGE_LIMITS = (0.05, 0.2)
 with 0.05."""
 
 LINEAR_CHANGE = 1.0
-"""Largest change over a step between two states in which no pair slips or opens. The reversal of phase at a linear
-resonance is a change of 2."""
+"""Largest change over a step between states in which no pair slips or opens; over a linear resonance it would be 2."""
 
 SMALL_VIBRATION = 0.3
 """Fraction of the friction limits to which changes of a smaller vibration are relative. With 1 the error of the motion
@@ -70,7 +68,7 @@ S = TypeVar("S", bound=State)
 
 @dataclass(frozen=True)
 class Step(Generic[S]):
-    """End of a step: its state, and values of the parameter at the folds that the step has jumped over."""
+    """End of a step: its state, and the parameter at each of the folds that the step has jumped over."""
 
     state: S
     folds: tuple[float, ...] = ()
@@ -78,10 +76,7 @@ class Step(Generic[S]):
 
 @dataclass(frozen=True)
 class Path(ABC, Generic[S]):
-    """The joint along a parameter, with the harmonics and samples of its case.
-
-    shortest, longest: limits of the length of a step.
-    """
+    """The joint along a parameter, with the harmonics and samples of its case. shortest, longest: limits of a step."""
 
     case: Case
     shortest: ClassVar[float]
@@ -112,9 +107,7 @@ class Path(ABC, Generic[S]):
         """Relative change of the vibration between two states."""
 
     def largest_change(self, *, sticks: bool) -> float:
-        """Largest relative change of the vibration in a step. sticks: whether no pair slips or opens at both ends; a
-        longer step might go over a whole resonance.
-        """
+        """Largest relative change of the vibration in a step. sticks: whether no pair slips or opens at both ends."""
         return LINEAR_CHANGE if sticks else float(np.clip(CHANGE_PER_RTOL * self.case.settings.rtol, *CHANGE_LIMITS))
 
     def rests(self, _: S) -> bool:
@@ -135,9 +128,7 @@ class Path(ABC, Generic[S]):
 
     @abstractmethod
     def near(self, state: S, predicted_h: FloatArray, history: FloatArray, run: Run) -> S | None:
-        """Stable state at the parameter of a state, from a first predicted force (n_rel, m), N, and with a tangential
-        history (n_contact, 2), m; None where not found.
-        """
+        """As `solve`, at the parameter of a state, from a first predicted force (n_rel, m), N, with a history, m."""
 
     def move(self, state: S, other: Self, run: Run) -> S | None:
         """The state with the harmonics and samples of another path; None where not found."""
@@ -173,14 +164,14 @@ class LoadingPath(Path[State]):
     def joint_of(self, state: State) -> Joint:  # noqa: D102
         return self.joint_at(state.parameter)
 
-    def balance_at(self, parameter: float, history: FloatArray, first: FloatArray | None = None) -> Balance:
-        """Unworn balance at a value of the parameter. history (n_contact, 2): m. first: as in `Balance`."""
-        return Balance(self.joint_at(parameter), history, first=first)
+    def balance_from(self, parameter: float, state: State) -> Balance:
+        """Unworn balance at a value of the parameter, after a state."""
+        return balance_after(self.joint_at(parameter), state)
 
-    def ahead(self, parameter: float, length: float) -> float:
-        """As in Path; a ramp ends at its whole load."""
+    def ahead(self, parameter: float, length: float) -> float:  # noqa: D102
         if self.omega is None:
             return parameter + length * parameter
+        # a ramp ends at its whole load
         return min(parameter + length, 1.0) if length > 0.0 else max(parameter + length, 1.0)
 
     def solve(self, states: tuple[State, ...], target: float, run: Run) -> State | None:
@@ -190,11 +181,10 @@ class LoadingPath(Path[State]):
         for place, state in enumerate(states):
             others = np.delete(at, place)
             begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
-        balance = self.balance_at(target, start.history, start.evaluation.predicted_t)
-        return self._stable(balance, begin, target, run)
+        return self._stable(self.balance_from(target, start), begin, target, run)
 
     def near(self, state: State, predicted_h: FloatArray, history: FloatArray, run: Run) -> State | None:  # noqa: D102
-        return self._stable(self.balance_at(state.parameter, history), predicted_h, state.parameter, run)
+        return self._stable(Balance(self.joint_of(state), history), predicted_h, state.parameter, run)
 
     def _stable(self, balance: Balance, predicted_h: FloatArray, parameter: float, run: Run) -> State | None:
         """Stable state of a balance near a predicted force (n_rel, m), N; None where not found."""
@@ -202,12 +192,10 @@ class LoadingPath(Path[State]):
         return found if found is not None and run.is_stable(balance.joint, found.evaluation) else None
 
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Failure:
-        """As in Path: natural steps to the end of the branch, and beyond it settling in time, as in a slow sweep of the
-        machine; both in turns until the target.
-        """
+        """As in Path: natural steps to the end of the branch, then settling in time beyond it, in turns."""
         state, fine, folds = start, FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
-            end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
+            end, arrived = follow_naturally(self.balance_from, state, target, run, fine=fine)
             if arrived and run.is_stable(self.joint_of(end), end.evaluation):
                 return Step(end, tuple(folds))
             # natural steps may have passed the start of an unstable part: then the search begins before them
@@ -228,23 +216,20 @@ class LoadingPath(Path[State]):
     def change(self, before: State, after: State) -> float:  # noqa: D102
         one, other = before.evaluation, after.evaluation
         if self.rests(before) and self.rests(after):
-            # over a whole resonance, where the phase reverses, the change is larger than 1
             return vibration_change(one, other) / self.largest_change(sticks=True)
         limit = np.linalg.norm(friction_limit(self.case.friction_coefficient, one.force_h[:, 0, 0]))
         size = max(vibration_size(one), SMALL_VIBRATION * float(limit))
         moved = float(np.linalg.norm((other.predicted_h - one.predicted_h)[:, 1:]))
         return moved / (size * self.largest_change(sticks=False))
 
-    def differs(self, before: State, after: State) -> float:
-        """As in Path: the larger one of both directions."""
+    def differs(self, before: State, after: State) -> float:  # noqa: D102
         one, other = before.evaluation, after.evaluation
         return max(vibration_change(one, other), vibration_change(other, one))
 
     def rests(self, state: State) -> bool:  # noqa: D102
         return nothing_happens(state.evaluation)
 
-    def forgets(self, state: State) -> bool:
-        """As in Path; slip over a small fraction of the motion of its pair does not count."""
+    def forgets(self, state: State) -> bool:  # noqa: D102
         at = state.evaluation
         opens = (at.status_t == SEPARATED).any(axis=1)
         slip = np.ptp(at.state_t, axis=2).max(axis=1) / self.joint_of(state).law.state_stiffness
@@ -252,14 +237,12 @@ class LoadingPath(Path[State]):
         return bool((opens | (slip > LEAST_SLIP * moved)).all())
 
     def suits(self, checked: State, error: float, state: State) -> bool:
-        """As in Path: the error grows and falls with the part of the contact force in harmonics that are left out.
-
-        Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice.
-        """
+        """As in Path: the error grows and falls with the part of the contact force in harmonics that are left out."""
         settings, resolution = self.case.settings, self.case.resolution
         fewest = resolution == first_resolution(settings)
         if super().suits(checked, error, state) or (fewest and self.rests(state)):
             return True
+        # where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice
         if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
             return True
         before, now = (left_out(resolution.orders, at.evaluation) for at in (checked, state))
@@ -275,10 +258,10 @@ class LoadingPath(Path[State]):
         found = with_level_above(found, run, node=True)
         return replace(self, case=found.case), found.point, found.estimate
 
-    def describe(self, state: State) -> str:
-        """As in Path, with the number of pairs that slip or open."""
+    def describe(self, state: State) -> str:  # noqa: D102
         at = f"{state.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {state.parameter:.3g}"
-        moving = int(np.count_nonzero((state.evaluation.status_t != STICK).any(axis=1)))
+        status_t = state.evaluation.status_t
+        moving = int(np.count_nonzero(((status_t == SLIP) | (status_t == SEPARATED)).any(axis=1)))
         return f"at {at}, {moving} of {len(state.evaluation.status_t)} pairs slip or open"
 
 
@@ -297,10 +280,9 @@ def edge_of(cell: int) -> float:
 
 def first_frequency(model: ReducedModel, cell: int, sweep: Direction) -> float:
     """Frequency, Hz, with which a sweep "up" or "down" to the points of a cell begins."""
-    width = 2.0 ** (1.0 / CELLS_PER_OCTAVE)
-    near, away = (1.0 - BEGIN_AWAY) * edge_of(cell), 1.0 / width
+    near, away = (1.0 - BEGIN_AWAY) * edge_of(cell), 1.0 / edge_of(1)
     if sweep == "down":
-        near, away = (1.0 + BEGIN_AWAY) * edge_of(cell + 1), width
+        near, away = (1.0 + BEGIN_AWAY) * edge_of(cell + 1), edge_of(1)
     frequencies = [float(at) for at in np.geomspace(near * away, near, START_CANDIDATES + 1)]
     structures = (build_structure(model, 2.0 * np.pi * at, 1.0, (1,)) for at in frequencies)
     loads = [float(np.linalg.norm(each.harmonic_force)) for each in structures]

@@ -22,8 +22,7 @@ from solver.accuracy.resolved_state import UNKNOWN, ResolvedState
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State
+from solver.harmonic_balance.state import Failure, State, balance_after
 from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, cell_of, edge_of, first_frequency
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep
 from solver.model import FloatArray, ReducedModel
@@ -43,38 +42,16 @@ OTHER_START = Resolution((1,), 64)
 """Harmonics and samples of a further attempt to find a first state: four of 54 random scenes need it."""
 
 
-def follow_branch(
-    model: ReducedModel,
-    friction_coefficient: float | FloatArray | None,
-    excitation_amplitude: float,
-    frequencies: FloatArray | FollowedFrequency,
-    sweep: Direction,
-    settings: SolverSettings,
-    keep: Callable[[Packed | str], None] = lambda _: None,
-    resume: Packed | None = None,
-) -> Iterator[tuple[int, StartState]]:
-    """Unworn periodic states, one by one, in the order of the sweep, as `FrequencySweep.states`.
-
-    friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
-    keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
-        position and the activity of the sweep, in words.
-    resume: progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there
-        to frequencies not yet passed. The states are equal to the last bit, except `run_time`.
-    """
-    sweeps = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings, keep=keep)
-    if resume is not None:
-        sweeps.load(resume)
-    return sweeps.states(frequencies)
-
-
 @dataclass(eq=False)
 class FrequencySweep:
     """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
+    friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
+    keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
+        position and the activity of the sweep, in words.
     with_switching: for which states stability is tested, as in `find_instability`.
     known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
         is not estimated, and there is no reference sweep.
-    keep: called with the saved state, and with the position in words.
     present, cell, omega: the present sweep, its cell, and the frequency of a ramp, rad/s, else None.
     run: of the state at the current frequency, without the sweep to this frequency.
     """
@@ -84,9 +61,9 @@ class FrequencySweep:
     excitation_amplitude: float
     direction: Direction
     settings: SolverSettings
+    keep: Callable[[Packed | str], None] = lambda _: None
     with_switching: bool = True
     known: tuple[tuple[float, Resolution], ...] = ()
-    keep: Callable[[Packed | str], None] = lambda _: None
     present: Sweep[State] | None = None
     cell: int = 0
     omega: float | None = None
@@ -96,15 +73,15 @@ class FrequencySweep:
         self.run = Run(self.settings.tolerance, Budget(report=self.keep))
 
     def states(self, frequencies: FloatArray | FollowedFrequency) -> Iterator[tuple[int, StartState]]:
-        """Index and state, one by one, in the order of the sweep. A state depends on its own frequency only.
+        """Index and unworn state, one by one, in the order of the sweep. A state depends on its own frequency only.
 
         frequencies: Hz, ascending. Or the resonance that is sought: the first one that the sweep meets in a range.
         """
-        n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
+        wanted = [frequencies] if isinstance(frequencies, FollowedFrequency) else frequencies.tolist()
         started = computing_time()
-        for index in np.arange(n_states)[:: -1 if self.direction == "down" else 1].tolist():
+        for index in range(len(wanted))[:: -1 if self.direction == "down" else 1]:
             self.set_deadline(started + self.settings.time_limit)
-            found = guarded(partial(self._next, frequencies, index))
+            found = guarded(partial(self._next, wanted[index]))
             iterations = self.run.budget.iterations + (0 if self.present is None else self.present.budget.iterations)
             start, now = self._without_state(found) if isinstance(found, Failure) else found, computing_time()
             yield index, replace(start, newton_iterations=iterations, run_time=now - started)
@@ -113,8 +90,9 @@ class FrequencySweep:
 
     def set_deadline(self, deadline: float) -> None:
         """Set the CPU time of the thread, s, after which the search for the present state ends."""
-        for budget in (self.run.budget, *([] if self.present is None else [self.present.budget])):
-            budget.deadline = deadline
+        self.run.budget.deadline = deadline
+        if self.present is not None:
+            self.present.budget.deadline = deadline
 
     def save(self) -> None:
         """Give `keep` what another sweep needs to go on."""
@@ -122,7 +100,9 @@ class FrequencySweep:
             self.keep(pack((self.cell, self.omega, self.present.saved)))
 
     def load(self, saved: Packed) -> None:
-        """Go on from what another sweep has given to `keep`."""
+        """Go on from what another sweep, which may differ in its frequencies, has given to `keep`, to frequencies not
+        yet passed. The states are equal to the last bit, except `run_time`.
+        """
         cell, omega, present = unpack(saved)
         self._new_sweep(cell, omega).load(present)
 
@@ -159,14 +139,11 @@ class FrequencySweep:
             present.begin(*first)
         return present
 
-    def _next(self, frequencies: FloatArray | FollowedFrequency, index: int) -> StartState | Failure:
+    def _next(self, wanted: float | FollowedFrequency) -> StartState | Failure:
         """State at the next frequency, with the harmonics it needs, or why there is none. Raises as `guarded`."""
-        if isinstance(frequencies, FollowedFrequency):
-            frequency = find_resonance(self, frequencies)
-            if isinstance(frequency, Failure):
-                return frequency
-        else:
-            frequency = float(frequencies[index])
+        frequency = find_resonance(self, wanted) if isinstance(wanted, FollowedFrequency) else wanted
+        if isinstance(frequency, Failure):
+            return frequency
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
         run.budget.iterations, run.budget.most_iterations = 0, NODE_ITERATIONS
@@ -186,16 +163,10 @@ class FrequencySweep:
 
     def _without_state(self, failure: Failure) -> StartState:
         """No state at the current frequency, and why."""
-        case = None if self.present is None else self.present.path.case
-        return StartState(
-            outcome=failure.outcome,
-            state=None,
-            penalty_omega=math.nan if case is None else case.penalty_omega,
-            resolution=Resolution((1,), 4) if case is None else case.resolution,
-            response_error=math.inf,
-            wear_rate_error=math.inf,
-            message=failure.message,
-        )
+        omega, resolution = math.nan, Resolution((1,), 4)
+        if self.present is not None:
+            omega, resolution = self.present.path.case.penalty_omega, self.present.path.case.resolution
+        return StartState(failure.outcome, None, omega, resolution, math.inf, math.inf, message=failure.message)
 
     def _new_sweep(self, cell: int, omega: float | None) -> Sweep[State]:
         """A sweep before its first node. omega: of a ramp, rad/s, else None."""
@@ -241,7 +212,7 @@ class FrequencySweep:
         reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
-        elif present.here is not None and present.reference is not None:
+        elif present.here is not None and present.reference:
             estimate, found = UNKNOWN, replace(found, accurate=False)
         known = estimate.response, estimate.wear_rate
         # folds of a ramp are load factors
@@ -304,11 +275,10 @@ def _resonance_between(
         return None
     part = 0.0 if step.folds else one / (one - other)
     joint = path.case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
-    before, first = here.evaluation.predicted_h, here.evaluation.predicted_t
-    balance = Balance(joint, here.history, first=first)
+    before = here.evaluation.predicted_h
     run = Run(sweeps.settings.tolerance, Budget(deadline=sweeps.run.budget.deadline))
     start = before + part * (ahead.evaluation.predicted_h - before)
-    found = solve_at_lag(path.case, balance, start, 0.5 * math.pi, run)
+    found = solve_at_lag(path.case, balance_after(joint, here), start, 0.5 * math.pi, run)
     omega = math.nan if found is None else float(found.values[0])
     if not abs(omega - joint.omega) <= 2.0 * abs(ahead.parameter - here.parameter):
         # none, or another resonance

@@ -12,7 +12,7 @@ fold and where each pair slips or opens within the period: such a state follows 
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Generic
 
 import numpy as np
@@ -23,8 +23,7 @@ from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import FREE_STEP, Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
-from solver.packing import in_rows, packable
-from solver.settings import Resolution
+from solver.packing import in_rows
 
 LAST_NODES = 3
 """Last nodes of a sweep: the next one is predicted on the parabola through them. With a straight line the nodes of the
@@ -50,19 +49,12 @@ PARTS_TO_POINT = (1, 4, 16)
 """Parts of the way from the last node of a reference sweep to a point: more where the point is not found at once."""
 
 
-@packable
-@dataclass(frozen=True)
-class ReferenceNodes:
-    """The last nodes of a reference sweep, with equal harmonics; the current one is the last."""
-
-    resolution: Resolution
-    states: tuple[Any, ...]
-
-
-_SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
+_OF_REFERENCE = ("reference", "reference_resolution", "skipped")
+_SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", *_OF_REFERENCE)
 """Attributes of a `Sweep` with which it goes on from a node, beside its harmonics and the iterations so far."""
 
 
+@dataclass(eq=False)
 class Sweep(Generic[S]):
     """A sweep, node by node, up (sign 1) or down (-1) along the parameter of its path; stepped by `take_step`.
 
@@ -72,32 +64,31 @@ class Sweep(Generic[S]):
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
     checked, error: the node at which the harmonics were chosen, and its largest estimated error.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
-    reference: last nodes of the reference sweep, None for none; skipped: parameters of the nodes since then.
+    reference: last nodes of the reference sweep, with their harmonics and samples; skipped: parameters of the nodes
+        since then.
     """
 
-    def __init__(
-        self,
-        path: Path[S],
-        sign: float,
-        budget: Budget,
-        *,
-        with_reference: bool = True,
-        save: Callable[[], None] = lambda: None,
-    ) -> None:
-        self.path, self.sign, self.budget, self.save = path, sign, budget, save
-        self.with_reference = with_reference
-        self.run = self._reference_run = Run(path.case.settings.tolerance, budget)
-        self.nodes: tuple[S, ...] = ()
-        self.ahead: Step[S] | None = None
-        self.passed: list[float] = []
+    path: Path[S]
+    sign: float
+    budget: Budget
+    with_reference: bool = True
+    save: Callable[[], None] = lambda: None
+    nodes: tuple[S, ...] = ()
+    ahead: Step[S] | None = None
+    passed: list[float] = field(default_factory=list)
+    rate: float = 0.0
+    checked: S | None = None
+    error: float = 0.0
+    branch: int = 0
+    fold: float = math.nan
+    reference: tuple[S, ...] = ()
+    skipped: tuple[float, ...] = ()
+    saved: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
         self.failure: Failure | None = Failure(Outcome.START_FAILED, "no first state is known")
-        self.length, self.rate = path.longest, 0.0
-        self.checked: S | None = None
-        self.error = 0.0
-        self.branch, self.fold = 0, math.nan
-        self.reference: ReferenceNodes | None = None
-        self.skipped: tuple[float, ...] = ()
-        self.saved: dict[str, Any] = {}
+        self.length, self.reference_resolution = self.path.longest, self.path.case.resolution
+        self.run = self._reference_run = Run(self.path.case.settings.tolerance, self.budget)
 
     def load(self, saved: dict[str, Any]) -> None:
         """Go on from what another sweep has saved."""
@@ -119,15 +110,14 @@ class Sweep(Generic[S]):
 
     def reference_of(self, path: Path[S], state: S, run: Run) -> S | None:
         """State of a path, with its harmonics, to which the last reference node leads; None where it is not found."""
-        if self.here is None or self.reference is None:
+        if self.here is None or not self.reference:
             return None
-        last: S = self.reference.states[-1]
-        own = self.path.at(self.reference.resolution)
+        last, own = self.reference[-1], self.path.at(self.reference_resolution)
         node = own.move(last, path, run)
         if node is None:
             # there may be no state with these harmonics at the node, as there is one at the point
-            there = _through(own, (last,), (state.parameter,), run.fresh())
-            return own.move(there[-1], path, run) if there else None
+            there = own.solve((last,), state.parameter, run.fresh())
+            return None if there is None else own.move(there, path, run)
         # over states in between where the last part is too long
         for n_parts in PARTS_TO_POINT:
             way = np.linspace(node.parameter, state.parameter, n_parts + 1)[1:].tolist()
@@ -162,10 +152,7 @@ class Sweep(Generic[S]):
                 self._advance(here, self.ahead)
 
     def state_at(self, parameter: float, run: Run) -> Step[S] | Failure:
-        """State at a parameter between the current and the next node, or why there is none.
-
-        run: of its own; the sweep must not depend on it.
-        """
+        """State at a parameter up to the next node, or why there is none. run: the sweep must not depend on it."""
         if self.here is None or self.ahead is None:
             assert self.failure is not None
             return self.failure
@@ -174,8 +161,7 @@ class Sweep(Generic[S]):
         found = path.solve((*near, self.here), parameter, run)
         return path.rescue(self.here, parameter, run) if found is None else Step(found)
 
-    def attempt(self, here: S, length: float) -> Step[S] | None:
-        """As in SteppedProblem."""
+    def attempt(self, here: S, length: float) -> Step[S] | None:  # noqa: D102
         run = self.run.with_tolerance(self.path.case.settings.rough_tolerance)
         found = self.path.solve(self.nodes, self.path.ahead(here.parameter, self.sign * length), run)
         return None if found is None else Step(found)
@@ -186,8 +172,7 @@ class Sweep(Generic[S]):
         self.rate = ratio / length
         return min(ratio, 1.0) if length <= self.path.shortest else ratio
 
-    def rescue(self, here: S, length: float) -> Step[S] | Failure:
-        """As in SteppedProblem."""
+    def rescue(self, here: S, length: float) -> Step[S] | Failure:  # noqa: D102
         return self.path.rescue(here, self.path.ahead(here.parameter, self.sign * length), self.run)
 
     def _look_ahead(self, here: S) -> None:
@@ -222,28 +207,27 @@ class Sweep(Generic[S]):
     def _lead_reference(self, before: S, step: Step[S]) -> None:
         """Lead the reference sweep over a step from the node `before`: to its middle, if it is a third step."""
         if step.folds or self.path.forgets(step.state):
-            self.reference, self.skipped = None, ()
-        elif self.reference is not None or not self.path.rests(step.state):
-            reference = self.reference or ReferenceNodes(self.path.case.resolution, (before,))
-            self.skipped = (*self.skipped, step.state.parameter)
-            if len(self.skipped) == STEPS_OF_REFERENCE:
-                middle = 0.5 * (before.parameter + step.state.parameter)
-                led = self._led(reference, middle) or self._led(reference, *self.skipped[:-1], middle)
-                self.reference, self.skipped = led, ()
-            else:
-                self.reference = reference
+            self.reference, self.skipped = (), ()
+            return
+        if not self.reference:
+            if self.path.rests(step.state):
+                return
+            self.reference, self.reference_resolution = (before,), self.path.case.resolution
+        self.skipped = (*self.skipped, step.state.parameter)
+        if len(self.skipped) == STEPS_OF_REFERENCE:
+            path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
+            middle = 0.5 * (before.parameter + step.state.parameter)
+            self.reference = self._led(path, middle) or self._led(path, *self.skipped[:-1], middle)
+            self.reference_resolution, self.skipped = path.case.resolution, ()
 
-    def _led(self, nodes: ReferenceNodes, *targets: float) -> ReferenceNodes | None:
-        """Nodes of the reference sweep, with fewer harmonics, at the last of some targets; None where none is found."""
-        path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
-        states: tuple[S, ...] = nodes.states
-        if nodes.resolution != path.case.resolution:
+    def _led(self, path: Path[S], *targets: float) -> tuple[S, ...]:
+        """The reference sweep along a path with fewer harmonics, at the last of some targets; none if none is found."""
+        states = self.reference
+        if self.reference_resolution != path.case.resolution:
             self._reference_run = self.run.fresh()
-            moved = self.path.at(nodes.resolution).move(states[-1], path, self.run)
+            moved = self.path.at(self.reference_resolution).move(states[-1], path, self.run)
             states = () if moved is None else (moved,)
-        run = self._reference_run.with_tolerance(path.case.settings.rough_tolerance)
-        states = _through(path, states, targets, run)
-        return ReferenceNodes(path.case.resolution, states) if states else None
+        return _through(path, states, targets, self._reference_run.with_tolerance(path.case.settings.rough_tolerance))
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""

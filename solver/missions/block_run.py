@@ -29,7 +29,7 @@ from solver.wear.errors import HISTORY_SAFETY
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
-from solver.wear.wearing_joint import Adaptive, WearingJoint, WearRequest, WearState
+from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
@@ -40,7 +40,7 @@ LARGEST_CHANGE = 2.0
 class EarlierSweep:
     """The sweep with which a block began in an earlier mission.
 
-    nodes: frequencies, rad/s, or load factors of its nodes; of a passage the frequencies that count, Hz.
+    nodes: frequencies, rad/s, or load factors of its nodes, none if lost; of a passage the frequencies that count, Hz.
     start, resolution: state at its end, and harmonics and samples of the last node; None for a passage.
     """
 
@@ -135,8 +135,7 @@ class BlockInput:
     def request(self) -> WearRequest:
         """The wear history of the block, with the wear law from the depth before on."""
         mission, law = self.mission, self.mission.law.begun_at(self.depth)
-        steps = Adaptive(mission.settings.rtol)
-        return WearRequest(mission.wear_coefficient, steps, self.counts, law=law, ends_at_last=True)
+        return WearRequest(mission.wear_coefficient, None, self.counts, law=law, ends_at_last=True)
 
     def sweeps(self, direction: Direction, amplitude: float) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N."""
@@ -201,11 +200,11 @@ def _last(state: WearState, start: StartState, rtol: float) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
     at, known = state.at, state.estimate
     assert start.state is not None
-    here = replace(start.state, displacement_h=at.displacement_h, contact_force_h=at.force_h)
+    motion, force, history = at.displacement_h, at.force_h, state.point.history
     return replace(
         start,
         outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
-        state=replace(here, start_history=state.point.history),
+        state=replace(start.state, displacement_h=motion, contact_force_h=force, start_history=history),
         resolution=state.resolution,
         response_error=known.response,
         wear_rate_error=known.wear_rate,
@@ -227,7 +226,7 @@ def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
     present = sweeps.present
     if start.state is None or present is None or block.way == "continue":
         return start, None
-    passed = tuple(present.passed) if present.here is not None and start.branch == 0 else ()
+    passed = () if present.here is None else tuple(present.passed)
     return start, EarlierSweep(passed, start, present.path.case.resolution)
 
 

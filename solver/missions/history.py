@@ -49,10 +49,6 @@ class MissionState:
     cut_off_from: float = math.inf
 
 
-Here = tuple[MissionState, Course]
-"""Where a step begins."""
-
-
 class MissionProblem:
     """A mission history, or its reference solution, as `SlowProblem`; stepped by `take_step` over its missions.
 
@@ -70,8 +66,7 @@ class MissionProblem:
         self._sweeps: list[EarlierSweep | None] = []
         self._failure = Failure(Outcome.MARCH_FAILED, "the error of a step over one mission is too large")
 
-    def advance(self, state: MissionState | None, course: Course) -> Here | Failure | None:
-        """As in SlowProblem."""
+    def advance(self, state: MissionState | None, course: Course) -> tuple[MissionState, Course] | Failure | None:  # noqa: D102
         state = state or MissionState()
         done = int(course.ends[-1])
         if done >= self.last or (self.history is None and not math.isnan(course.reached)):
@@ -101,7 +96,7 @@ class MissionProblem:
             course = replace(course, nodes=(replace(step.node, count=0.0, depth=course.nodes[0].depth),))
         return after, course.after(step.node)
 
-    def attempt(self, here: Here, length: float) -> MissionStep | None:
+    def attempt(self, here: tuple[MissionState, Course], length: float) -> MissionStep | None:
         """As in SteppedProblem. The last mission of the step is computed."""
         nodes, rtol = here[1].nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
         run_mission = partial(self._mission, here[0], int(nodes[-1].count + length))
@@ -111,11 +106,10 @@ class MissionProblem:
         self._failure = step
         return None
 
-    def ratio(self, _: Here, end: MissionStep, __: float) -> float:
-        """As in SteppedProblem."""
+    def ratio(self, _: object, end: MissionStep, __: float) -> float:  # noqa: D102
         return end.ratio
 
-    def rescue(self, _: Here, __: float) -> Failure:
+    def rescue(self, _: object, __: float) -> Failure:
         """As in SteppedProblem: a mission that fails by itself ends the history."""
         return self._failure
 
@@ -183,7 +177,7 @@ def _assembled(mission: MissionRequest, solution: Solution) -> MissionHistory:
     blocks = [_compare(solution, slice(n, n + 1), counts)[1] for n in range(len(mission.blocks))]
     values, depth, target, target_error = course.read(counts), both.values["wear_depth"], course.reached, math.nan
     if mission.until is not None and not math.isnan(target):
-        target_error = error_of_target(solution, mission.until, compare_at)
+        target_error = error_of_target(solution, mission.until, *compare_at(np.array([0.0, target])))
     return MissionHistory(
         **solution.totals,
         response_begin=values["response"][:, :, 0],
@@ -248,7 +242,7 @@ def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[
 
 def _judged(mission: MissionRequest, state: MissionState, history: MissionHistory) -> tuple[Outcome, str]:
     """The outcome of a complete history, and its sentence."""
-    rtol, inaccurate, about_state, about_hold = mission.settings.rtol, np.asarray(state.inaccurate), "", ""
+    rtol, inaccurate, about_state, held = mission.settings.rtol, np.asarray(state.inaccurate), "", ""
     last = np.flatnonzero(np.isfinite(history.worn_volume))[-1]
     volumes = history.worn_volume[last], history.reference_volume[last]
     uncertain = describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps", history.reference_end)
@@ -259,12 +253,10 @@ def _judged(mission: MissionRequest, state: MissionState, history: MissionHistor
         # an unknown stability is an infinite error, too
         about_state += ", or whether it is stable" * bool(np.isinf(inaccurate.max()))
     if state.held_from < math.inf:
-        about_hold = (
-            f"from mission {state.held_from:.0f} on only friction holds the joint in one direction: it is held there"
-        )
+        held = f"from mission {state.held_from:.0f} on only friction holds the joint in one direction: it is held there"
     passages = []
     for place in np.flatnonzero(history.sweep_rate > LARGEST_SWEEP_RATE):
         name, rate = mission.called(int(place)), history.sweep_rate[place]
         passes = f"passes at {rate:.2g} (zeta f)^2" if np.isfinite(rate) else "has no damping where the joint sticks"
         passages.append(f"{name} {passes}: it may wear otherwise than its steady states (see the error)")
-    return verdict(history.error_estimate, rtol, uncertain, about_state, cut_off, about_hold, *passages)
+    return verdict(history.error_estimate, rtol, uncertain, about_state, cut_off, held, *passages)

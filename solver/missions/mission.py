@@ -89,14 +89,13 @@ class MissionHistory(Ended, Presented):
       block, in the mission that ends at the number, at 0 in the first one. response_peak_begin, response_peak_end:
       largest magnitude over a period there, m. response_error (n_output, n_block): relative, of these responses.
     - excitation_frequency (n_block, 2): Hz, at start and end of each block.
-    - reference_volume (n_output,): m3, worn volume of the reference solution. reference_end: why it ends early, or "".
+    - reference_volume (n_output,), m3, reference_end, outcome, message: as of `WearHistory`.
     - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, of the damping ratio of the joint at rest; 0 where
       nothing wears and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
     - error_estimate: `worn_volume_error` at the last number that was reached; NaN at 0 where the joint wears.
     - last_mission: number of missions that were computed. steps (n_step,): missions in each step.
     - missions_to_target, missions_to_target_error: number at which the target was reached, and its error; NaN if never.
     - newton_iterations, run_time, CPU seconds: of history and reference solution.
-    - outcome, message: how the computation ended, and additions. An unknown error is inf, and `message` says why.
     """
 
     OVER = ("missions", "mission")

@@ -27,9 +27,9 @@ from solver.modes.modal_model import LinearMode, linear_mode, modal_model
 from solver.newton.run import MOST_ITERATIONS, Bordered, Run
 from solver.outcome import Outcome
 from solver.packing import packable
+from solver.results.state_report import first_motion
 from solver.settings import DIFFERENCE, Resolution, SolverSettings
-from solver.structure.condensation import whole_motion
-from solver.structure.fourier import from_complex, to_complex
+from solver.structure.fourier import from_complex
 from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
 
 FIRST_AMPLITUDE = 1e-6
@@ -205,7 +205,7 @@ class _AtAmplitude:
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
         balance = Balance(self.mode.joint_with(values), self.history, first=self.first)
         at = balance.evaluate(predicted_h)
-        shape = _shape(balance.joint, at.displacement_h, float(values[2]))
+        shape = first_motion(balance.joint, at.displacement_h, float(values[2]))
         real, imaginary, square = self._products(shape, shape)
         errors = np.array([real - values[2] / self.amplitude, imaginary, 0.5 * (square - 1.0)])
         return Bordered(balance, at, values, errors, extra=shape)
@@ -226,17 +226,10 @@ class _AtAmplitude:
         return slopes, np.stack(errors, axis=1)
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
-        return self._products(here.extra, _shape(here.balance.joint, tangent.motion(step), 0.0))
+        return self._products(here.extra, first_motion(here.balance.joint, tangent.motion(step), 0.0))
 
     def fraction(self, _: Bordered, __: FloatArray) -> float:
         return 1.0
-
-
-def _shape(joint: Joint, displacement_h: FloatArray, drive: float) -> ComplexArray:
-    """x_1 (n,), m, of relative displacements and a drive, m sqrt(kg)."""
-    linear, relative = joint.model.harmonic_structure(1), joint.contact.relative
-    moved = to_complex(joint.to_relative(displacement_h))[:, 0]
-    return whole_motion(linear, 1j * joint.omega, relative, drive * linear.load_harmonic, moved)
 
 
 # --- where a mode begins ---

@@ -55,9 +55,8 @@ of a joint that slips as a whole is arbitrary: round-off in a zero eigenvalue wo
 
 @dataclass(frozen=True)
 class DenseFactor:
-    """LU factors and pivots of a Jacobian in some rows (n,) and their first coefficients; the identity elsewhere.
-
-    exact: whether these are all rows of active pairs and all harmonics.
+    """LU factors and pivots of a Jacobian in the rows (n,) of active pairs and their first coefficients; the identity
+    elsewhere. exact: whether these are all coefficients.
     """
 
     rows: IntArray
@@ -66,7 +65,7 @@ class DenseFactor:
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant, 0 where it is singular."""
+        """Sign of the determinant; 0 where it is singular."""
         triangle, pivots = self.factor
         swaps = np.count_nonzero(pivots != np.arange(pivots.size))
         return float(np.prod(np.sign(np.diag(triangle))) * (-1.0) ** swaps)
@@ -111,6 +110,15 @@ class JacobianSolver:
     _corrections: tuple[tuple[FloatArray, FloatArray], ...] = ()
     _orders: tuple[int, ...] = ()
 
+    def _known(self, tangent: Linearisation) -> Factor | None:
+        """The earlier factorisation; None where it is of other harmonics: of no use, and maybe of another size."""
+        return self._factor if self._orders == tangent.joint.basis.orders else None
+
+    def _renewed(self, tangent: Linearisation) -> Factor:
+        """A factorisation of this Jacobian, kept from now on."""
+        self._factor, self._corrections, self._orders = build_factor(tangent), (), tangent.joint.basis.orders
+        return self._factor
+
     def solve(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, residual: float = FORCING
     ) -> FloatArray:
@@ -132,14 +140,13 @@ class JacobianSolver:
 
     def _solve_large(self, tangent: Linearisation, right: FloatArray, residual: float) -> FloatArray:
         """Solution in the rows of the active pairs, with an earlier factorisation while products are few."""
-        # one of other harmonics is of no use, and may have another size
-        if self._factor is not None and self._orders == tangent.joint.basis.orders:
-            solution, found = self._iterate(self._factor, tangent, right, residual, REUSE_PRODUCTS)
+        known = self._known(tangent)
+        if known is not None:
+            solution, found = self._iterate(known, tangent, right, residual, REUSE_PRODUCTS)
             if found:
                 return solution
-        self._factor, self._corrections, self._orders = build_factor(tangent), (), tangent.joint.basis.orders
         # convergence is not required: Newton's method judges by the true residual
-        return self._iterate(self._factor, tangent, right, residual, MOST_PRODUCTS)[0]
+        return self._iterate(self._renewed(tangent), tangent, right, residual, MOST_PRODUCTS)[0]
 
     def _iterate(
         self, factor: Factor, tangent: Linearisation, right: FloatArray, residual: float, most: int
@@ -176,15 +183,13 @@ class JacobianSolver:
         For a large joint, that of an earlier factorisation P times (-1)^k, with k real negative eigenvalues of J P^-1.
         Where these outliers do not converge, this Jacobian is factorised instead.
         """
-        known = self._factor is not None and self._orders == tangent.joint.basis.orders
-        if known and self._factor is not None and not self._factor.exact:
-            sign, settled = _sign_by_eigenvalues(self._factor, tangent)
+        known = self._known(tangent)
+        if known is not None and not known.exact:
+            sign, settled = _sign_by_eigenvalues(known, tangent)
             if settled:
                 return sign
-        self._factor, self._corrections, self._orders = build_factor(tangent), (), tangent.joint.basis.orders
-        if self._factor.exact:
-            return self._factor.sign
-        return _sign_by_eigenvalues(self._factor, tangent)[0]
+        factor = self._renewed(tangent)
+        return factor.sign if factor.exact else _sign_by_eigenvalues(factor, tangent)[0]
 
 
 def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:

@@ -26,7 +26,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.contact.law import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.structure.condensation import CACHED_STRUCTURES, CondensedStructure
@@ -34,7 +33,6 @@ from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.joint import Joint
 
 MARCH_PERIODS = 2  # slip removes the influence of the start
-
 SingleArray = NDArray[np.float32]
 
 
@@ -77,7 +75,7 @@ class PeriodFactor:
             return right.copy()
         spread = self.joint.to_pairs(right)
         right_t = (spread[self.pairs].reshape(-1, right.shape[1]) @ self.basis.synthesis).T
-        state_t = march_samples(np.ascontiguousarray(right_t), self.matrices, MARCH_PERIODS)
+        state_t = march_samples(np.ascontiguousarray(right_t), self.matrices)
         return right - self.coupling @ (state_t.T @ self.basis.analysis)
 
 
@@ -91,7 +89,7 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
         n_samples //= 2
     stride = joint.basis.n_samples // n_samples
-    own, carried = sample_tangents(joint.law, at, stride)
+    own, carried = joint.law.sample_tangents(at, stride)
     pairs = np.flatnonzero(own.any(axis=(0, 2, 3)))
     own, carried = np.ascontiguousarray(own[:, pairs]), np.ascontiguousarray(carried[:, pairs])
     components = (3 * pairs[:, None] + np.arange(3)).ravel()
@@ -127,14 +125,14 @@ def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
 
 
 @njit(cache=True)
-def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> FloatArray:
-    """Changes of the state (N, 3n) in the last of some periods, for right-hand sides (N, 3n) at the pairs."""
+def march_samples(right_t: FloatArray, of: PeriodMatrices) -> FloatArray:
+    """Changes of the state (N, 3n) in the last period, for right-hand sides (N, 3n) at the pairs."""
     own, carried, row, swept, inverse = of
     (n_samples, n_rows), n_pairs = row.shape, own.shape[1]
     state_t, after = np.zeros(right_t.shape), np.zeros((n_pairs, 2))
     before, pushed = np.zeros(2 * n_pairs, inverse.dtype), np.zeros(n_rows, inverse.dtype)
     by_history, change = np.empty(n_rows, inverse.dtype), np.empty(n_rows, inverse.dtype)
-    for _ in range(periods):
+    for _ in range(MARCH_PERIODS):
         for n in range(n_samples):
             for pair in range(n_pairs):
                 state_t[n, 3 * pair] = 0.0

@@ -34,17 +34,16 @@ state. Also the shortest natural step over the range to the target, the shortest
 wanted one, and the shortest relaxation step in periods."""
 
 SAMPLES_OF_SIGN = 16
-"""Samples over those of a state that is unstable with fewer. Underplatform damper of nodal diameter 2, 30 stable states
-from 273.7 Hz on: 128 samples find four unstable, 512 samples none. A stable state of the dovetail, nodal diameter 3,
-1.5 N, is unstable with 64 to 320 samples, and stable with 384 to 4096."""
+"""Samples over those of a state that is unstable with fewer: the sign of the determinant may turn where many pairs slip
+and open. Underplatform damper of nodal diameter 2, 30 stable states from 273.7 Hz on: 128 samples find four unstable,
+512 none. Dovetail, nodal diameter 3, 1.5 N: unstable with 64 to 320 samples, stable with 384 to 4096."""
 
 
 @dataclass(frozen=True)
 class Bordered:
     """Balance and evaluation at values of the further unknowns (k,), with the errors (k,) of the further equations, 1.
 
-    reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
-    extra: what the problem needs again for its derivatives.
+    reduced: that of the last `bordered_step`; None without one. extra: what the problem needs again.
     """
 
     balance: Balance
@@ -75,9 +74,8 @@ def solve_newton(
     tolerance: float,
     most: int = MOST_ITERATIONS,
 ) -> tuple[EvaluationT | None, int]:
-    """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
-
-    Returns the evaluation of the solution, None where none is found, and the number of iterations.
+    """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance. Returns the
+    evaluation of the solution, None where none is found, and the number of iterations.
 
     The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution. So full
     steps come first, as long as the lowest norm is improved once in `FULL_STEPS` iterations. Then the iteration returns
@@ -131,7 +129,7 @@ class BorderedProblem(Protocol):
 def bordered_step(
     problem: BorderedProblem, here: Bordered, solver: JacobianSolver, residual: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Newton step of all unknowns (n_rel m + k,), and the derivative `reduced` (k, k) as in `Bordered`.
+    """Newton step of all unknowns (n_rel m + k,), and the derivative (k, k) of the errors by the values, p eliminated.
 
     With the Jacobian J = dR/dp, J a = -R and J B = -dR/dq (Govaerts, Numerical Methods for Bifurcations of Dynamical
     Equilibria, 2000, section 3.6):
@@ -165,8 +163,7 @@ class OutOfTimeError(Exception):
 class Budget:
     """Limits of a computation: Newton iterations so far, and those after which no new step of a search begins.
 
-    deadline: CPU time of the thread, s, after which the whole computation ends.
-    report: called with a description of the progress, in words, at every change.
+    deadline: CPU time of the thread, s, after which all ends. report: called with the progress in words.
     """
 
     iterations: int = 0
@@ -182,9 +179,9 @@ class Budget:
 
 @dataclass
 class Run:
-    """The solves of a computation. Each raises OutOfTimeError after the deadline of the budget.
+    """The solves of a computation. Each raises OutOfTimeError after the deadline of the budget, which all parts share.
 
-    tolerance: of the scaled residual. budget: shared by all parts of the computation. solver: keeps a factorisation.
+    tolerance: of the scaled residual. solver: keeps a factorisation.
     """
 
     tolerance: float
@@ -207,8 +204,7 @@ class Run:
         """
 
         def direction(at: Evaluation, residual: float) -> FloatArray:
-            (step,) = self.steps(balance, at, [-at.residual], residual)
-            return np.asarray(step)
+            return np.asarray(self.steps(balance, at, [-at.residual], residual)[0])
 
         at = self._iterate(balance.evaluate, direction, start, most)
         return None if at is None else State(at, final_history(balance, at), parameter)
@@ -259,8 +255,7 @@ class Run:
 
     def is_stable(self, joint: Joint, at: Evaluation) -> bool:
         """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`) at
-        its wear depth, as the vibration is fast and the wear is slow. With more samples, too: with too few the sign of
-        the determinant may turn where many pairs slip and open.
+        its wear depth, as the vibration is fast and the wear is slow; with more samples, too (`SAMPLES_OF_SIGN`).
         """
         if self.solver.determinant_sign(Balance(joint, at.history).linearise(at)) >= 0.0:
             return True

@@ -1,9 +1,7 @@
 """The result classes of the solver, immutable; and the outcome of a wear history with its sentence."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -135,6 +133,9 @@ class WearHistory(Ended, Presented):
     samples_used: IntArray
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
+    excitation_frequency: FloatArray
+    excitation_frequency_error: FloatArray
+    reference_volume: FloatArray
     last_cycle: float = math.nan
     jump_cycle: float = math.nan
     cycles_to_target: float = math.nan
@@ -144,9 +145,6 @@ class WearHistory(Ended, Presented):
     step_limit: float = math.inf
     cut_off_cycle: float = math.nan
     message: str = ""
-    excitation_frequency: FloatArray = field(default_factory=lambda: np.array([math.nan]))
-    excitation_frequency_error: FloatArray = field(default_factory=lambda: np.array([math.nan]))
-    reference_volume: FloatArray = field(default_factory=lambda: np.array([math.nan]))
     reference_end: str = ""
     inaccurate_from: float = math.inf
     inaccurate_in: str = ""

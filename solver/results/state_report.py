@@ -79,10 +79,8 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
     """
     linear = joint.model.harmonic_structure(1)
-    relative = joint.contact.relative
     force = joint.excitation_amplitude * linear.load_harmonic
-    first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
-    moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
+    moved = first_motion(joint, evaluation.displacement_h, joint.excitation_amplitude)
     inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
     square = joint.omega**2 + work.real / inertia if inertia > 0.0 else -1.0
     return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
@@ -90,7 +88,9 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
 
 @njit(cache=True)
 def largest_distance(state_t: FloatArray) -> FloatArray:
-    """Largest distance (n_contact,) between any two tangential states (n_contact, 2, N+1) of a period."""
+    """Largest distance (n_contact,) between any two tangential states (n_contact, 2, N+1) of a period; `pdist` of scipy
+    takes four to seven times as long.
+    """
     n_contact, _, n_points = state_t.shape
     largest = np.zeros(n_contact)
     for pair in range(n_contact):
@@ -101,6 +101,13 @@ def largest_distance(state_t: FloatArray) -> FloatArray:
                 largest[pair] = max(largest[pair], first * first + second * second)
         largest[pair] = np.sqrt(largest[pair])
     return largest
+
+
+def first_motion(joint: Joint, displacement_h: FloatArray, excitation_amplitude: float) -> ComplexArray:
+    """First harmonic (n,), m, of all displacements, from the relative ones of the pairs."""
+    linear, first = joint.model.harmonic_structure(1), to_complex(joint.to_relative(displacement_h))[:, 0]
+    force = excitation_amplitude * linear.load_harmonic
+    return whole_motion(linear, 1j * joint.omega, joint.contact.relative, force, first)
 
 
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
@@ -123,8 +130,9 @@ def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) 
         return np.array(rows).reshape(*values_t.shape[:-1], LOOP_PHASES)
 
     displacement = motion_h @ synthesis(orders, 2.0 * np.pi * phases)
-    series = motion_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * ends)
-    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, chosen, series), ends)
+    series = evaluation.displacement_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * ends)
+    beyond = joint.law.beyond_series(evaluation, series)
+    displacement[:, 1:] += at_phases(beyond[chosen], ends)
     displacement *= (joint.contact.dofs[chosen] >= 0)[:, :, None]
     force = at_phases(evaluation.force_t[chosen], np.arange(n_samples) / n_samples)
     return displacement.transpose(0, 2, 1), force.transpose(0, 2, 1)
@@ -145,7 +153,7 @@ class PeriodicMotion:
     - time (N,): s, from 0 on: the samples at which the contact law is applied.
     - displacement_t, velocity_t (n, N), response_t (n_response, N): m and m/s, sums of the Fourier series.
     - contact_force_t (n_contact, 3, N): N, by the contact law; means over a time step for masses on rigid ground.
-    - status_t (n_contact, N): 0 open, 1 sticking, 2 slipping.
+    - status_t (n_contact, N): 0 open, 1 sticking, 2 slipping, 3 another law.
     - residual: scaled residual of the balance, dimensionless: above the tolerance the motion is no solution.
     """
 

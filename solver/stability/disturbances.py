@@ -25,7 +25,7 @@ from numba import njit
 from scipy.linalg import eigvals
 
 from solver.contact.coulomb import SEPARATED, STICK
-from solver.contact.law import SampledLaw, sampled_law
+from solver.contact.element import SampledLaw
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, ReducedModel
 from solver.structure.fourier import build_basis, derivative
@@ -43,7 +43,7 @@ no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
 # Real part over omega from which an exponent is infinite, that of a displacement without mass made finite by round-off:
 # in random scenes from 8e10 on, those of the joint -88 to 0.
 _INFINITE = 100.0
-_EPS = float(np.finfo(np.float64).eps)
+ROUNDING = float(np.finfo(np.float64).eps)
 _HALF = 0.499  # imaginary part over omega from which a multiplier counts as real and negative
 
 
@@ -106,8 +106,7 @@ def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
 
 
 def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int = 1) -> Monodromy:
-    """Monodromy of a state at a fixed wear depth, with samples of the contact law, a multiple of the m = `n_sectors`
-    sectors of a travelling wave; otherwise of the real structure.
+    """Monodromy of a state at a fixed wear depth, with at least so many samples of the contact law, a multiple of m.
 
     Raises numpy.linalg.LinAlgError where the structure is singular.
     """
@@ -128,7 +127,7 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     law = SampledLaw(
         *(
             part.reshape(n_sectors, steps, -1, 3, 3).swapaxes(0, 1).reshape(steps, -1, 3, 3)
-            for part in vars(sampled_law(fine.law, state, np.flatnonzero(switching))).values()
+            for part in vars(fine.law.sampled(state, np.flatnonzero(switching))).values()
         )
     )
     parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)
@@ -235,8 +234,8 @@ def linear_exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
     n = len(sizes)
     mass, damping, stiffness = (motions.conj().T @ part @ motions for part in parts)
     # motions without mass come first, as the mass has no negative eigenvalues but round-off
-    light = int(np.count_nonzero(sizes <= n * _EPS * sizes.max(initial=0.0)))
-    damping[:light][np.abs(damping[:light]) <= n * _EPS * np.abs(damping).max(initial=0.0)] = 0.0
+    light = int(np.count_nonzero(sizes <= n * ROUNDING * sizes.max(initial=0.0)))
+    damping[:light][np.abs(damping[:light]) <= n * ROUNDING * np.abs(damping).max(initial=0.0)] = 0.0
     # y: all motions, v: velocities of those with mass; -K y - C v = sigma (C_light y_light + M v), sigma y_heavy = v.
     # A motion without mass and damping has an infinite exponent.
     heavy = n - light

@@ -8,11 +8,9 @@ Its determinant is that of the Jacobian, Eq. (16), at sigma = 0, and positive fo
 determinant of the Jacobian means an odd number of real multipliers beyond +1, as between two folds of a branch. The
 sign is tested at each state of a branch (`Run.is_stable`).
 
-The multipliers of reported states come from the first method that serves:
-
-1. the exponents of the linear structure, where no pair slips, opens or closes;
-2. the exponents of Hill's equation, for a small joint that opens and closes;
-3. time integration, with all multipliers of a small joint and the largest ones of a large joint.
+The multipliers of reported states come from the linear structure, where no pair slips, opens or closes; from Hill's
+equation for a small joint that opens and closes; else from integration in time (all of a small joint, the largest ones
+of a large joint).
 
 Disturbances of a travelling wave are those of m sectors (`disturbances`): all of a ring, where they are few or small,
 otherwise those of the nodal diameters 0 and d. Other waves beside the excited one are not tested.
@@ -38,6 +36,7 @@ from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF, Resolution, all_orders, samples_for
 from solver.stability.disturbances import (
+    ROUNDING,
     Monodromy,
     build_monodromy,
     hill_multipliers,
@@ -72,8 +71,6 @@ SCATTER = 0.035
 """Least error of growing multipliers of a large joint. Underplatform damper, nodal diameter 2, 274 Hz, where nearly all
 pairs slip and open: 0.995 to 1.07 with 128 to 4096 samples, and three of them may agree by chance."""
 
-_EPS = float(np.finfo(np.float64).eps)
-
 Stability = Literal["stable", "fold", "period doubling", "Neimark-Sacker", "unknown"]
 """Stable, or the disturbance that grows: one that keeps its sign ("fold", as between two folds), one that changes sign
 in each period, or one with a second frequency."""
@@ -81,7 +78,7 @@ in each period, or one with a second frequency."""
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Multipliers of a state, largest modulus first; of a large joint the largest ones only; none where not computed.
+    """Multipliers of a state, largest modulus first; of a large joint the largest ones only.
 
     error: estimated error of the first value by the time steps. unknown: why its side of 1 may not be known.
     """
@@ -131,11 +128,8 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, with_sw
 
 
 def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, *, growing_only: bool = False) -> Multipliers:
-    """Multipliers of a state at a fixed wear depth; none where they are not known:
-
-    - for a joint with more than `MOST_ROWS` displacements of switching pairs;
-    - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch;
-    - where Arnoldi's method does not converge.
+    """Multipliers of a state at a fixed wear depth; none where there are too many switching pairs, where a small joint
+    that opens and closes has no state with `OPENING_HARMONICS` on this branch, or Arnoldi's method does not converge.
 
     growing_only: without the error of multipliers that do not grow. Raises OutOfTimeError.
     """
@@ -212,7 +206,7 @@ def _sorted(values: ComplexArray) -> ComplexArray:
 
 def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -> Multipliers:
     """Multipliers by integration in time; samples are doubled until the first one is known, or its side of 1."""
-    n_sectors, error, sizes = _sectors(joint, at), np.inf, list[float]()
+    n_sectors, sizes = _sectors(joint, at), list[float]()
     every = n_sectors * _moving(joint, at) <= SMALL_JOINT
     n_samples = _samples(joint, at) // (1 if growing_only else 2)
     # fewer cannot tell the harmonics of the state apart
@@ -243,7 +237,7 @@ def _samples(joint: Joint, at: Evaluation) -> int:
     for linear, pairs in product(driven, (stuck, stuck | switching)):
         found = linear_exponents(linear, moving(joint, pairs))
         # round-off of a fast vibration is no growth
-        grows = found.real > found.size * _EPS * np.abs(found).max(initial=0.0)
+        grows = found.real > found.size * ROUNDING * np.abs(found).max(initial=0.0)
         fastest = max(fastest, float(np.abs(found.imag[grows]).max(initial=0.0)))
     wanted = 2 ** int(np.ceil(np.log2(max(SAMPLES_A_VIBRATION * fastest / joint.omega, 1.0))))
     fewest = SMALL_SAMPLES if _moving(joint, at) <= SMALL_JOINT else SMALL_SAMPLES // 4

@@ -182,7 +182,7 @@ def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray,
     by_pairs = rows[:, relative] - rows[:, others] @ compliance @ to_pairs
     behind = compliance[0] @ load[others]
     force = load[relative] - _dynamic_stiffness(linear, 1j * float(rates[0]), np.ix_(relative, others)) @ behind
-    return SharedStiffness(linear, relative, others, rates, compliance), force, by_pairs, rows[:, others] @ behind
+    return SharedStiffness(linear, relative, rates, compliance), force, by_pairs, rows[:, others] @ behind
 
 
 class Condensed(NamedTuple):

@@ -35,20 +35,18 @@ class SharedStiffness:
     with the motions times 1, -(n w)^2 and i n w. Its time is that of reading 3 n_rel^2 numbers. With 336 pairs and 13
     harmonics the matrices of all harmonics take 211 MB, these take 24 MB. Methods as in `DenseStiffness`.
 
-    - relative (n_rel,), others (n_i,): displacements of the pairs, and all others. rates (H,): n w, rad/s.
+    - relative (n_rel,): displacements of the pairs. rates (H,): n w, rad/s.
     - inner_compliance (H, n_i, n_i): `A_ii^-1`, m/N; in the precision of all products.
     """
 
     linear: LinearModel
     relative: IntArray
-    others: IntArray
     rates: FloatArray
     inner_compliance: ComplexArray
 
     @cached_property
     def _parts(self) -> tuple[FloatArray, FloatArray]:
-        kind = self.inner_compliance.real.dtype.name
-        return _real_parts(self.linear, tuple(self.relative.tolist()), tuple(self.others.tolist()), kind)
+        return _real_parts(self.linear, tuple(self.relative.tolist()), self.inner_compliance.real.dtype.name)
 
     @cached_property
     def _factors(self) -> ComplexArray:
@@ -89,11 +87,10 @@ class SharedStiffness:
 
 
 @lru_cache(maxsize=4)
-def _real_parts(
-    linear: LinearModel, relative: tuple[int, ...], others: tuple[int, ...], kind: str
-) -> tuple[FloatArray, FloatArray]:
+def _real_parts(linear: LinearModel, relative: tuple[int, ...], kind: str) -> tuple[FloatArray, FloatArray]:
     """Columns r (n, 3 n_rel) of K, M, C, with rows r before rows i, and blocks ri (n_rel, 3 n_i), at any frequency."""
     three = [np.real(part) for part in (linear.stiffness, linear.mass, linear.damping)]
+    others = tuple(np.setdiff1d(np.arange(len(linear.mass)), relative).tolist())
     columns, back = (
         np.hstack([np.asarray(part[np.ix_(rows, places)], kind) for part in three])
         for rows, places in ((relative + others, relative), (relative, others))

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.contact.law import ContactLaw
+from solver.contact.law import ContactLaw, build_law
 from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
@@ -46,15 +46,15 @@ class Joint:
     @cached_property
     def law(self) -> ContactLaw:
         """The contact law of the pairs."""
-        return ContactLaw(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
+        return build_law(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
 
     @property
     def relative_penalty(self) -> FloatArray:
         """Penalty (n_rel,), N/m, of each relative displacement."""
         return self.penalty.stiffness.ravel()[self.component_index]
 
-    def rows_of(self, pairs: IntArray | int) -> IntArray:
-        """Indices of the relative displacements of one pair, or of ascending pairs, ascending."""
+    def rows_of(self, pairs: IntArray) -> IntArray:
+        """Indices of the relative displacements of ascending pairs, ascending."""
         rows = self.contact.pair_rows[pairs].ravel()
         return rows[rows >= 0]
 
@@ -148,7 +148,8 @@ def build_case(
 
 
 def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatArray | None) -> FloatArray:
-    """Friction coefficient (n_contact,) from one number, from (n_contact,), or where None is given from the scene.
+    """Friction coefficient (n_contact,) from one number, from (n_contact,), or where None is given from the scene; 0 of
+    pairs with another law.
 
     Raises ValueError where it is given twice, not at all, or not for each pair.
     """
@@ -160,7 +161,7 @@ def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatAr
     given = np.asarray(friction_coefficient if own is None else own, np.float64)
     if given.shape not in ((), (n_contact,)):
         raise ValueError(f"friction_coefficient has shape {given.shape}: give a number or shape ({n_contact},)")
-    return np.array(np.broadcast_to(given, (n_contact,)))
+    return np.where(model.contact.rubs, given, 0.0)
 
 
 def static_joint(joint: Joint, load_factor: float) -> Joint:

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
+from solver.model import BoolArray, FloatArray, IntArray, LinearModel, ReducedModel
 from solver.structure.condensation import condense, regular
 
 INERTIAL_RATIO = 2.0
@@ -51,6 +51,10 @@ class Penalty:
     drag: FloatArray
     mean: FloatArray
 
+    def at(self, places: IntArray) -> "Penalty":
+        """That of some pairs (k,)."""
+        return Penalty(*(each[places] for each in vars(self).values()))
+
     @property
     def stiffness(self) -> FloatArray:
         """Penalty (n_contact, 3), N/m, of the three displacements of elastic pairs."""
@@ -66,7 +70,7 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     rate, contact = (highest + 1) * omega, model.contact
     size = _stiffness_at(model, rate)
     low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
-    inertial = (contact.dofs[:, 1:] >= 0).any(axis=1) & (high > INERTIAL_RATIO * low)
+    inertial = contact.rubs & (contact.dofs[:, 1:] >= 0).any(axis=1) & (high > INERTIAL_RATIO * low)
     if inertial.any() and highest + 1 > INERTIAL_RATE:
         # a mass behind a spring: where the spring dominates in the harmonics left out, the pair is elastic
         inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > INERTIAL_RATIO * size[:, 1]

@@ -1,11 +1,4 @@
-"""Check of a state of a wearing joint: whether it is a result, and whether it is the last one.
-
-In a final state every pair that slips carries no force. So a history to the end of wear ends where the wear rate of
-every pair is below a fraction of its largest one. A joint that slips everywhere under a load that nothing else carries
-has no final state: its wear rate becomes constant, and its steps double.
-"""
-
-from __future__ import annotations
+"""Check of a state of a wearing joint: whether it is a result, and whether its harmonics and samples suffice."""
 
 from dataclasses import replace
 from typing import Any
@@ -19,31 +12,24 @@ from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome, in_digits
 from solver.results.state_report import report_state
-from solver.settings import NEGLIGIBLE, Resolution
+from solver.settings import NEGLIGIBLE
 from solver.stability.floquet import find_instability
 from solver.wear.jump import creeps, free_slide
-from solver.wear.slow_time import Course
-from solver.wear.wearing_joint import Adaptive, WearingJoint, WearState
+from solver.wear.slow_time import Guide
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
 """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
 which a new choice is possible. Dovetail, 211.5, 211.75, 212.5 Hz: 0.8 to 1.4 over 1e5 cycles."""
 
-DEEPEST, LONGEST_HISTORY, STEPS_TO_THE_END = 1.0, 1e25, 20_000
-"""Depth, m, cycles and steps beyond which wear has no end. A block on two pairs that nothing else carries is worn 1 m
-deep after 22 steps, which double; a joint takes 2 to 10 steps a pair to its final state."""
 
-Checked = tuple[WearState, dict[str, Any]]
-"""A state that passed the check, possibly with other harmonics than before, and its report."""
-
-
-def full_check(wearing: WearingJoint, state: WearState) -> Checked | Failure:
-    """A state of a reported history with its report (`report_state`), or the reason of its rejection."""
+def full_check(wearing: WearingJoint, state: WearState) -> tuple[WearState, dict[str, Any]] | Failure:
+    """A state of a history, possibly with other harmonics, and its report (`report_state`); or why it is rejected."""
     settings, certificate = wearing.case.settings, _certificate(wearing, state)
     # more harmonics or samples may suffice
     more_may_do = certificate.failures(settings.tolerance) and state.accurate and settings.automatic
     if more_may_do or needs_new_choice(wearing, state):
-        chosen = choose_anew(wearing, state)
+        chosen = choose_harmonics(wearing, state, anew=True)
         if isinstance(chosen, Failure):
             return chosen
         state, certificate = chosen, _certificate(wearing, chosen)
@@ -74,9 +60,9 @@ def _certificate(wearing: WearingJoint, state: WearState) -> Certificate:
     return replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
 
 
-def report_only(wearing: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...]) -> Checked:
+def report_only(wearing: WearingJoint, state: WearState, guide: Guide) -> tuple[WearState, dict[str, Any]]:
     """A state of a reference solution with its report, where it is found with the harmonics wanted at its count."""
-    wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
+    wanted = [resolution for count, resolution in guide.resolutions if count <= state.cycle][-1]
     if wanted != state.resolution:
         case, _ = wearing.case_and_joint(state)
         point = wearing.run.move(case, case.at(wanted).joint(state.omega, wearing.excitation_amplitude), state.point)
@@ -105,27 +91,19 @@ def needs_new_choice(wearing: WearingJoint, state: WearState) -> bool:
     return now < RELAXED_FRACTION**2 * state.left_out
 
 
-def choose_anew(wearing: WearingJoint, state: WearState) -> WearState | Failure:
-    """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    return at_level_above(wearing, state, refine(_resolved(wearing, state), wearing.run))
-
-
-def at_level_above(wearing: WearingJoint, state: WearState, here: ResolvedState | None = None) -> WearState | Failure:
+def choose_harmonics(wearing: WearingJoint, state: WearState, *, anew: bool = False) -> WearState | Failure:
     """The state with one level of harmonics more than suffices, so that the reference solution may have those that do;
-    here: with those, where they are not those of the state. A history with given steps has no reference solution of
-    its own, and one without wear none at all.
+    a failure where the frequency then follows nothing. A history with given steps has no reference solution of its own,
+    and one without wear none at all. anew: whether those of the state may not suffice.
     """
-    here = here or _resolved(wearing, state)
-    if isinstance(wearing.request.steps, Adaptive) and state.wears and wearing.request.end > 0.0:
+    here = ResolvedState(*wearing.case_and_joint(state), state.point, state.estimate, state.accurate)
+    here = refine(here, wearing.run) if anew else here
+    if wearing.request.steps is None and state.wears and wearing.request.end > 0.0:
         here = with_level_above(here, wearing.run)
     resolution, point = here.case.resolution, here.point
     state = replace(state, point=point, resolution=resolution, left_out=left_out(resolution.orders, point.evaluation))
     state = replace(state, estimate=here.estimate, accurate=here.accurate)
     return wearing.at_followed(wearing.with_rates(state))
-
-
-def _resolved(wearing: WearingJoint, state: WearState) -> ResolvedState:
-    return ResolvedState(*wearing.case_and_joint(state), state.point, state.estimate, state.accurate)
 
 
 def vibrates_otherwise(state: WearState) -> bool:
@@ -145,24 +123,7 @@ def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
         return unknown
     case, joint = wearing.case_and_joint(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, state.at) is None and not wearing.run.is_stable(wearing.joint_of(state), state.at):
+    if free_slide(joint, state.at) is None and not wearing.run.is_stable(joint, state.at):
         said = f"at cycle {in_digits(state.cycle)} a small disturbance grows and keeps its sign, as between two folds"
         return Failure(Outcome.UNSTABLE, said)
     return find_instability(case, joint, state.at, wearing.run, True) or unknown
-
-
-def is_final(state: WearState, final_share: float) -> bool:
-    """Whether a state is the final one. final_share: as in `ToTheEnd`."""
-    largest = state.largest_rates[:-1]
-    least = final_share * np.maximum(largest, final_share * float(largest.max(initial=0.0)))
-    return bool((state.rates[:-1] <= least).all())
-
-
-def wears_without_end(state: WearState, course: Course) -> Failure | None:
-    """NO_FINAL_STATE where wear has no end; None to go on."""
-    n_steps = len(course.ends) - 1
-    if state.depth.max() <= DEEPEST and state.cycle <= LONGEST_HISTORY and n_steps < STEPS_TO_THE_END:
-        return None
-    at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
-    rate = f"the joint still wears at {float(state.rates[-1]):.6g} m3 a cycle"
-    return Failure(Outcome.NO_FINAL_STATE, f"{at}, {rate}")

@@ -5,8 +5,6 @@ error is inf where it is not known: where the other solution has no value, or an
 NaN where the history has no value.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -98,16 +96,12 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     outputs, steps: both solutions at the counts to report, the first 0, and at the ends of the steps.
     area (n_contact,): m2.
     """
-    values = outputs.values
-
-    def crossing(differences: FloatArray) -> FloatArray:
-        return HISTORY_SAFETY * _largest_before(steps.counts, differences, outputs.counts)
-
-    def largest(change: Callable[[Compared], FloatArray]) -> FloatArray:
-        return np.maximum(HISTORY_SAFETY * change(outputs), crossing(change(steps)))
-
-    depth, volume = values["wear_depth"], values["wear_depth"] @ area
-    error = largest(lambda both: _volume_apart(both, area))
+    values, depth, volume = outputs.values, outputs.values["wear_depth"], outputs.values["wear_depth"] @ area
+    differences = zip(_differences(outputs, area), _differences(steps, area), strict=True)
+    error, of_pairs, response, wear_rate = (
+        HISTORY_SAFETY * np.maximum(here, _largest_before(steps.counts, there, outputs.counts))
+        for here, there in differences
+    )
     # harmonics, sweep and steps have nothing to do with each other: the worst case is their sum, also where both
     # solutions agree by chance; what the sweep leaves wrong in the first rate acts on what this rate has worn
     by_resolution = values["resolution_error"][0]
@@ -121,21 +115,21 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     squares = ((depth * area) ** 2).sum(axis=1)
     n_equal = np.divide(volume**2, squares, out=np.ones_like(squares), where=squares > 0.0)
     of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(n_equal)) * _over(error, volume)
-    of_pairs = np.maximum(largest(lambda both: _apart(both, "wear_depth")), absolute(of_pair[:, None], depth))
-    response = np.maximum(largest(_response_change), _change_within(volume, error, steps, area))
+    of_pairs = np.maximum(of_pairs, absolute(of_pair[:, None], depth))
+    response = np.maximum(response, _change_within(volume, error, steps, area))
     frequency = _frequency_error(outputs, HISTORY_SAFETY, np.zeros_like(volume))
-    return _completed(outputs, HistoryError(error, of_pairs, response, largest(_rate_change), frequency), area)
+    return _completed(outputs, HistoryError(error, of_pairs, response, wear_rate, frequency), area)
 
 
 def error_of_given_steps(outputs: Compared, adaptive: HistoryError, area: FloatArray) -> HistoryError:
     """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter."""
-    apart, other = _apart(outputs, "wear_depth"), outputs.other("wear_depth") @ area
+    volume, of_pairs, response, wear_rate = _differences(outputs, area)
     error = HistoryError(
-        _added(_volume_apart(outputs, area), absolute(adaptive.worn_volume, other)),
-        _added(apart, adaptive.wear_depth),
+        _added(volume, absolute(adaptive.worn_volume, outputs.other("wear_depth") @ area)),
+        _added(of_pairs, adaptive.wear_depth),
         # both relative errors of the adaptive history are nearly those of this one: their values are as large
-        _added(_response_change(outputs), adaptive.response),
-        _added(_rate_change(outputs), adaptive.wear_rate),
+        _added(response, adaptive.response),
+        _added(wear_rate, adaptive.wear_rate),
         _frequency_error(outputs, 1.0, adaptive.excitation_frequency),
     )
     return _completed(outputs, error, area)
@@ -163,17 +157,14 @@ def _completed(outputs: Compared, error: HistoryError, area: FloatArray) -> Hist
     )
 
 
-def error_of_target(
-    solution: Solution, target: WearTarget, compare_at: Callable[[FloatArray], tuple[Compared, HistoryError]]
-) -> float:
+def error_of_target(solution: Solution, target: WearTarget, both: Compared, error: HistoryError) -> float:
     """Estimated error of the count at which a history has reached its target: its difference to that of the other
-    solution, or the time that the error of the wear takes, if that is longer. compare_at: as `compare`, at some counts.
+    solution, or the time that the error of the wear takes, if that is longer. both, error: of the counts 0 and that.
     """
     course, other = solution.course, solution.compared
     if other is None:
         return math.inf
     at, by_interpolation = course.reach(target)
-    both, error = compare_at(np.array([0.0, at]))
     depth, weights = both.values["wear_depth"][1], course.area
     wrong = float(error.worn_volume[1] * (depth @ weights))
     if target.quantity == "wear_depth":
@@ -227,27 +218,18 @@ def _apart(both: Compared, name: str) -> FloatArray:
     return np.where(np.isnan(other) & ~np.isnan(own), np.inf, np.abs(own - other))
 
 
-def _volume_apart(both: Compared, area: FloatArray) -> FloatArray:
-    """Difference (n,) of the worn volumes, m3: of their sums, or, where pairs differ in both directions, so that the
-    sums agree by chance, that of independent pairs.
+def _differences(both: Compared, area: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Differences (n, ...) of worn volume, m3, depths, m, response, the larger one of first harmonic and peak, and wear
+    rate, both relative.
     """
-    apart = _apart(both, "wear_depth") * area
-    signed = np.where(both.values["wear_depth"] >= both.other("wear_depth"), apart, -apart)
-    return in_whole(signed)
-
-
-def _response_change(both: Compared) -> FloatArray:
-    """Relative difference (n,) of the responses: the larger one of first harmonic and peak."""
-    one, other = (
+    apart, more = _apart(both, "wear_depth"), both.values["wear_depth"] >= both.other("wear_depth")
+    # of the sums, or of independent pairs where pairs differ in both directions, so that the sums agree by chance
+    volume = in_whole(np.where(more, apart * area, -apart * area))
+    first, peak = (
         _over(np.linalg.norm(_apart(both, name), axis=1), np.linalg.norm(both.values[name], axis=1))
         for name in ("response", "response_peak")
     )
-    return np.maximum(one, other)
-
-
-def _rate_change(both: Compared) -> FloatArray:
-    """Relative difference (n,) of the wear rates."""
-    return _over(_apart(both, "wear_rate"), both.values["wear_rate"])
+    return volume, apart, np.maximum(first, peak), _over(_apart(both, "wear_rate"), both.values["wear_rate"])
 
 
 def _added(difference: FloatArray, error: FloatArray) -> FloatArray:

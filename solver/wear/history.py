@@ -1,7 +1,5 @@
 """Wear histories from one start state: integration, what each is compared with, result."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
@@ -21,7 +19,7 @@ from solver.structure.joint import Case, build_case
 from solver.wear.errors import compare, error_of_target
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Course, Guide, Integrator, Node, Solution
-from solver.wear.wearing_joint import Adaptive, Given, WearRequest, WearState
+from solver.wear.wearing_joint import WearRequest, WearState
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
 
@@ -48,10 +46,11 @@ def integrate_together(
         case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     for request in requests:
         if case is None:
-            course = _unknown_course(model, len(request.loops))
-            solution = Solution(None, course, Failure(start.outcome, start.message))
+            solution = Solution(None, Course(model.contact.area), Failure(start.outcome, start.message))
         else:
             solution = _solve(integrator, case, start, request)
+        if solution.state is None:
+            solution = replace(solution, course=_unknown_course(model, len(request.loops)))
         history = _assembled(model, start, request, solution)
         if history.outcome.complete:
             history = replace(history, unjudged=history.message)
@@ -79,18 +78,15 @@ def _solve(integrator: Integrator, case: Case, start: StartState, request: WearR
     """A history with what it is compared with; without a step the errors of the start state suffice."""
     solution = integrator.integrate(WearProblem(case, start, request, stable_end=True), spent)
     state, course = solution.state, solution.course
-    if state is None:
-        return replace(solution, course=_unknown_course(case.model, len(request.loops)))
-    if (len(course.ends) == 1 and request.follow is None) or solution.breaks_off:
+    if state is None or (len(course.ends) == 1 and request.follow is None) or solution.breaks_off:
         return solution
     spent += solution.seconds
     end = min(course.ends[-1], request.end)
-    if isinstance(request.steps, Given):
+    if request.steps is not None:
         # one for all given steps to one last count; to another end no longer than needed
         known = not isinstance(request.cycles, ToTheEnd) and request.until is None
         cycles = _counts(request, solution) if known else np.array([0.0, end])
-        adaptive = request.with_steps(Adaptive(case.settings.rtol), cycles)
-        return replace(solution, compared=_solve(integrator, case, start, adaptive, spent))
+        return replace(solution, compared=_solve(integrator, case, start, request.adaptive_to(cycles), spent))
     # NaN where no target was reached
     counts = np.concatenate([[0.0, course.reached], _counts(request, solution), course.counts])
     guide = Guide(state.resolutions, state.first_length)
@@ -109,11 +105,12 @@ def _counts(request: WearRequest, solution: Solution) -> FloatArray:
 def _assembled(model: ReducedModel, start: StartState, request: WearRequest, solution: Solution) -> WearHistory:
     """The result, not judged yet."""
     course, state, area, counts = solution.course, solution.state, model.contact.area, _counts(request, solution)
-    compare_at = partial(compare, solution, given=isinstance(request.steps, Given), follows=request.follow is not None)
+    compare_at = partial(compare, solution, given=request.steps is not None, follows=request.follow is not None)
     both, error = compare_at(counts)
     values, totals, target, target_error = both.values, solution.totals, math.nan, math.nan
     if request.until is not None and course.reached <= request.end:
-        target, target_error = course.reached, error_of_target(solution, request.until, compare_at)
+        target = course.reached
+        target_error = error_of_target(solution, request.until, *compare_at(np.array([0.0, target])))
     last_cycle = math.nan if state is None else min(course.ends[-1], float(counts[-1]))
     return WearHistory(
         **{name: value for name, value in values.items() if name in _REPORTED}
@@ -129,7 +126,7 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
         reference_volume=both.other("wear_depth") @ area,
         error_estimate=last_error(counts, error.worn_volume, values["wear_rate"], last_cycle),
         last_cycle=last_cycle,
-        adaptive=isinstance(request.steps, Adaptive),
+        adaptive=request.steps is None,
         branch=start.branch,
         fold_frequency=start.fold_frequency,
         cycles_to_target=target,

@@ -9,8 +9,6 @@ g along the slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Mo
 where a soft spring holds the mean position. Where g / F is no longer negligible there is no periodic state: ADRIFT.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -9,12 +9,14 @@ again, a resonance passes or a branch ends, errors grow, and this difference wit
 A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
 with the same steps errs as they do: dovetail, 16 pairs, 212.5 Hz, where a pair only just slips: 1.89 mm3 with implicit
 steps, 1.90 with steps of 250 cycles; the truth is 2.03.
+
+In a final state every pair that slips carries no force. So a history to the end of wear ends where the wear rate of
+every pair is below a fraction of its largest one. A joint that slips everywhere under a load that nothing else carries
+has no final state: its wear rate becomes constant, and its steps double.
 """
 
-from __future__ import annotations
-
 import math
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,24 +30,11 @@ from solver.outcome import Outcome, in_digits
 from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, ROUND_OFF, Resolution, Scheme, SolverSettings, ToTheEnd
 from solver.structure.joint import Case
-from solver.wear.check import (
-    at_level_above,
-    full_check,
-    is_final,
-    report_only,
-    unstable_at_end,
-    vibrates_otherwise,
-    wears_without_end,
-)
+from solver.wear.check import choose_harmonics, full_check, report_only, unstable_at_end, vibrates_otherwise
 from solver.wear.jump import jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
-from solver.wear.step import (
-    allowed_error,
-    attempt_step,
-    explicit_step_limit,
-    too_long,
-)
-from solver.wear.wearing_joint import Adaptive, Given, WearingJoint, WearRequest, WearState
+from solver.wear.step import allowed_error, attempt_step, explicit_step_limit, too_long
+from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
 
 HISTORY_ITERATIONS = 3000
 """Most Newton iterations of a history or a reference solution, in addition to `NEAR_ITERATIONS` for each step. A
@@ -67,6 +56,10 @@ largest wear, as a fraction of the largest relative motion."""
 SHORTEST_SLOW_STEP = 1e-4
 """Shortest adaptive step at the start, as a fraction of the first step."""
 
+DEEPEST, LONGEST_HISTORY, STEPS_TO_THE_END = 1.0, 1e25, 20_000
+"""Depth, m, cycles and steps beyond which wear has no end. A block on two pairs that nothing else carries is worn 1 m
+deep after 22 steps, which double; a joint takes 2 to 10 steps a pair to its final state."""
+
 DOUBLINGS_ACROSS = 6
 """Most doublings of the shortest step to go across corners: to 6 % of the cycle count. Dovetail, mesh 2, nodal diameter
 3, 213.5 Hz: steps across of 1.6 %, without which the history is `march_failed` at 847 cycles."""
@@ -76,8 +69,9 @@ class WearProblem(WearingJoint):
     """The joint of a history, or of the reference solution of an adaptive one, as `SlowProblem`; stepped by `take_step`
     over its cycles.
 
-    guide: of a reference solution; None for a history. A reference solution takes a step that is `too_long`: its
-        difference is the warning, and in a last long step nearly all of the force of a joint at rest is moved.
+    guide: of a reference solution, with its own harmonics and first length; None for a history. A reference solution
+        takes a step that is `too_long`: its difference is the warning, and in a last long step nearly all of the force
+        of a joint at rest is moved.
     stable_end: whether the stability of the last state is tested.
     limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`.
     """
@@ -86,42 +80,34 @@ class WearProblem(WearingJoint):
     iterations_per_save = 100
 
     def __init__(
-        self,
-        case: Case,
-        start: StartState,
-        request: WearRequest,
-        guide: Guide | None = None,
-        *,
-        stable_end: bool = False,
+        self, case: Case, start: StartState, request: WearRequest, guide: Guide | None = None, stable_end: bool = False
     ) -> None:
         super().__init__(case, start, request)
         self.steps, self.guide, self.stable_end = request.steps, guide, stable_end
-        if guide is not None:
-            others = tuple((count, of_reference(resolution, case)) for count, resolution in guide.resolutions)
-            self.guide = replace(guide, resolutions=others)
-        until = None if request.until is None else astuple(request.until)
-        self.name = f"{request.steps!r} {request.end!r} {until!r} {guide is None}"
+        self.name = f"{request.steps!r} {request.end!r} {request.until!r} {guide is None}"
         counts = np.zeros(0) if isinstance(request.cycles, ToTheEnd) else request.cycles
         self.course = Course(self.area, counts, request.until)
-        self.limit = math.inf if isinstance(self.steps, Adaptive) and not request.ends_at_last else request.end
+        self.limit = math.inf if self.steps is None and not request.ends_at_last else request.end
 
     def advance(self, state: WearState | None, course: Course) -> tuple[WearState, Course] | Failure | None:
         """As in SlowProblem: the next state is checked and stored."""
-        request, local = self.request, 0.0
+        local = 0.0
         if state is None:
-            end = self._first_state()
+            unworn = self.unworn_state(None if self.guide is None else self.start.reference)
+            # a history has the harmonics of its later states from the start
+            end = choose_harmonics(self, unworn) if self.guide is None else self.at_followed(unworn)
         elif self._is_complete(state, course):
             return unstable_at_end(self, state) if self.stable_end else None
         elif (failure := self._gives_up(state, course)) is not None:
             return failure
         elif not state.wears:
             # the state holds for all later counts
-            return state, course.after(replace(course.nodes[-1], count=request.end))
+            return state, course.after(replace(course.nodes[-1], count=self.request.end))
         else:
             end, local = self.step(state), course.nodes[-1].values["local"]
         if isinstance(end, Failure):
             return end
-        checked = full_check(self, end) if self.guide is None else report_only(self, end, self.guide.resolutions)
+        checked = full_check(self, end) if self.guide is None else report_only(self, end, self.guide)
         if isinstance(checked, Failure):
             return checked
         after, report = checked
@@ -138,32 +124,34 @@ class WearProblem(WearingJoint):
         values = report | {"local": after.error + local}
         return after, course.after(Node(after.cycle, after.depth, after.rate, values))
 
-    def _first_state(self) -> WearState | Failure:
-        """The unworn state, of a history with the harmonics of its later states."""
-        if self.guide is None:
-            return at_level_above(self, self.unworn_state())
-        return self.at_followed(self.unworn_state(self.start.reference))
-
     def _is_complete(self, state: WearState, course: Course) -> bool:
         """Whether a history has come to its last count, its target, or its final state."""
-        cycles, end = self.request.cycles, self.request.end
-        if isinstance(cycles, ToTheEnd) and (not state.wears or is_final(state, cycles.final_share)):
-            return True
-        return not math.isnan(course.reached) or course.ends[-1] >= end * (1.0 - 1e-12)
+        cycles = self.request.cycles
+        if isinstance(cycles, ToTheEnd):
+            largest = state.largest_rates[:-1]
+            least = cycles.final_share * np.maximum(largest, cycles.final_share * float(largest.max(initial=0.0)))
+            if not state.wears or (state.rates[:-1] <= least).all():
+                return True
+        return not math.isnan(course.reached) or course.ends[-1] >= self.request.end * (1.0 - 1e-12)
 
     def _gives_up(self, state: WearState, course: Course) -> Failure | None:
-        """Why a history does not go on although it is not complete."""
-        if isinstance(self.request.cycles, ToTheEnd) and (failure := wears_without_end(state, course)) is not None:
-            return failure
-        most = HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
-        said = f"more than {most} iterations in {len(course.ends)} steps, up to cycle {in_digits(state.cycle)}"
-        return Failure(Outcome.MARCH_FAILED, said) if state.wears and self.run.budget.iterations > most else None
+        """Why a history does not go on although it is not complete: its wear has no end, or takes too long."""
+        n_steps, most = len(course.ends) - 1, HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
+        within = state.depth.max() <= DEEPEST and state.cycle <= LONGEST_HISTORY and n_steps < STEPS_TO_THE_END
+        if isinstance(self.request.cycles, ToTheEnd) and not within:
+            at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
+            rate = f"the joint still wears at {float(state.rates[-1]):.6g} m3 a cycle"
+            return Failure(Outcome.NO_FINAL_STATE, f"{at}, {rate}")
+        if state.wears and self.run.budget.iterations > most:
+            said = f"more than {most} iterations in {n_steps + 1} steps, up to cycle {in_digits(state.cycle)}"
+            return Failure(Outcome.MARCH_FAILED, said)
+        return None
 
     def with_first_length(self, state: WearState) -> WearState:
         """The first state with its step limit, and the length of an adaptive step; at least two lead to the limit."""
-        steps, length = self.steps, state.length
-        if isinstance(steps, Adaptive) and steps.first > 0.0:
-            length = steps.first
+        length = state.length
+        if self.guide is not None:
+            length = self.guide.first_length
         elif state.wears:
             state = replace(state, step_limit=explicit_step_limit(self, state))
             moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), state.rate.max()
@@ -174,7 +162,7 @@ class WearProblem(WearingJoint):
     def step(self, state: WearState) -> WearState | Failure:
         """The state after one step, with the largest length of the next one; or why there is none."""
         length, shortest, steps = state.length, self._shortest(state), self.steps
-        if isinstance(steps, Given):
+        if steps is not None:
             length = steps.length
             if steps.depth is not None:
                 length = steps.depth / float(state.rate.max())
@@ -195,8 +183,8 @@ class WearProblem(WearingJoint):
         end, follow = replace(taken[0], length=taken[1]), self.follow
         if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
             return self.lost(end)
-        given = self.guide is None and isinstance(steps, Given)
-        return (too_long(self, state, end.depth, end.cycle - state.cycle) if given else None) or end
+        refused = too_long(self, state, end.depth, end.cycle - state.cycle) if steps is not None else None
+        return refused or end
 
     def _shortest(self, state: WearState) -> float:
         """Shortest adaptive step, cycles: the accuracy to which the end of a branch is located."""
@@ -207,9 +195,9 @@ class WearProblem(WearingJoint):
         tested after each Euler step, and where the vibration has changed since the last test; a followed resonance may
         be unstable at constant frequency. An adaptive step that is `too_long` becomes shorter.
         """
-        scheme = scheme or self.steps.scheme
+        scheme = scheme or ("adaptive" if self.steps is None else self.steps.scheme)
         end = attempt_step(self, state, length, scheme)
-        adapts = isinstance(self.steps, Adaptive) and self.guide is None
+        adapts = self.steps is None and self.guide is None
         if end is not None and adapts and too_long(self, state, end.depth, length) is not None:
             return None
         if end is None or self.follow is not None or (scheme == "adaptive" and not vibrates_otherwise(end)):
@@ -220,16 +208,17 @@ class WearProblem(WearingJoint):
         """As in SteppedProblem: an Euler step counts whatever its error, the shortest adaptive step where the vibration
         changes little: at a corner of the wear rate.
         """
-        if not isinstance(self.steps, Adaptive):
+        if self.steps is not None:
             return 0.0
         before, after = (float(each.depth @ self.area) for each in (state, end))
-        ratio = end.error / allowed_error(STEP_ERROR_FRACTION * self.steps.rtol, before, after, state.cycle, length)
+        rtol = self.case.settings.rtol if self.guide is None else RTOL_RATIO * self.case.settings.rtol
+        ratio = end.error / allowed_error(STEP_ERROR_FRACTION * rtol, before, after, state.cycle, length)
         smooth = length <= self._shortest(state) and vibration_change(state.at, end.at) < SMOOTH_CHANGE
         return min(ratio, 1.0) if smooth else ratio
 
     def rescue(self, state: WearState, length: float) -> WearState | Failure:
         """As in SteppedProblem. In this order: an Euler step, a longer one across corners (both adaptive), a jump."""
-        if isinstance(self.steps, Adaptive):
+        if self.steps is None:
             end = self.attempt(state, length, "implicit") or self._step_across(state, length)
             if end is not None:
                 return end
@@ -263,10 +252,10 @@ def reference_of(case: Case, start: StartState, request: WearRequest, guide: Gui
     """The reference solution of an adaptive history, whose start state may be another one, to be read at ascending
     counts (n,), the first 0.
     """
+    resolutions = tuple((count, of_reference(resolution, case)) for count, resolution in guide.resolutions)
     # a short history may consist of its first steps, which do not depend on rtol
-    first = guide.first_length * (2.0 if request.ends_at_last else 1.0)
-    steps = Adaptive(RTOL_RATIO * case.settings.rtol, first)
-    return WearProblem(case, start, request.with_steps(steps, counts), guide)
+    first_length = guide.first_length * (2.0 if request.ends_at_last else 1.0)
+    return WearProblem(case, start, request.adaptive_to(counts), Guide(resolutions, first_length))
 
 
 def of_reference(resolution: Resolution, case: Case) -> Resolution:

@@ -33,9 +33,6 @@ dropped. An adaptive history of 1e5 cycles has about 100 steps."""
 CERTIFIED = tuple(each.name for each in fields(Certificate) if each.name != "periodicity_error")
 """Values of a certificate; within a step, the larger value of both ends holds."""
 
-BISECTIONS = 100
-"""Halvings of a range of counts: more than a number has digits."""
-
 
 @packable
 @dataclass(frozen=True)
@@ -164,7 +161,8 @@ class Course:
         end = self.nodes[-1].count if math.isnan(self.reached) else self.reached
         whole = float(self._volumes(self.depth_at(np.array([end])))[0])
         low, high, wanted = np.zeros(n_outputs), np.full(n_outputs, end), np.linspace(0.0, 2.0, n_outputs)
-        for _ in range(BISECTIONS if whole > 0.0 else 0):
+        # halvings: more than a number has digits
+        for _ in range(100 if whole > 0.0 else 0):
             middle = 0.5 * (low + high)
             before = middle / end + self._volumes(self.depth_at(middle)) / whole < wanted
             low, high = np.where(before, middle, low), np.where(before, high, middle)
@@ -247,8 +245,7 @@ class Solution:
     state: the last one; None where there is no first state. failure: why it ends before it is complete, else None; or
         INACCURATE where it is not known whether a complete history is stable.
     ended: False when it is saved on its way.
-    compared: the solution whose difference is the error: of a history with given steps the adaptive one, of an adaptive
-        one its reference solution; None where there is none.
+    compared: the solution whose difference is the error (`solver.wear.errors`); None where there is none.
     """
 
     state: Any
@@ -294,13 +291,13 @@ class Integrator:
 
     def integrate(self, problem: SlowProblem, spent: float = 0.0) -> Solution:
         """Integrate from the first or the saved state to the end. spent: CPU seconds of the time limit so far."""
-        name, course, budget = problem.name, problem.course, problem.run.budget
-        state, began, known = None, computing_time(), self._known.get(name)
-        if known is not None and known.ended:
+        name, budget = problem.name, problem.run.budget
+        known = self._known.get(name) or Solution(None, problem.course, None, ended=False)
+        if known.ended:
             return known
-        if known is not None:
-            state, course, budget.iterations, began = known.state, known.course, known.iterations, began - known.seconds
-        budget.deadline, saved_at = began + self._time_limit - spent, budget.iterations
+        state, course, budget.iterations = known.state, known.course, known.iterations
+        began, saved_at = computing_time() - known.seconds, known.iterations
+        budget.deadline = began + self._time_limit - spent
         while True:
             after = guarded(partial(problem.advance, state, course))
             if after is None or isinstance(after, Failure):

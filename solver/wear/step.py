@@ -25,8 +25,6 @@ The motion follows the depths as dp = -J^-1 Z E dW, where E puts the depths into
 the rates follow the motion as dg = G dp. A table of factors adds its own derivative with respect to the depth.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

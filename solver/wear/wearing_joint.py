@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
@@ -48,22 +47,10 @@ class Given:
     depth: float | None = None
 
 
-@dataclass(frozen=True)
-class Adaptive:
-    """BDF2 steps with a relative error of the worn volume near `rtol`. The last cycle count is interpolated.
-
-    first: length of the first step, cycles; 0: by the explicit step limit.
-    """
-
-    rtol: float
-    first: float = 0.0
-    scheme: ClassVar[Scheme] = "adaptive"
-
-
-def steps_of(scheme: str, length: float, rtol: float, largest_depth: float | None = None) -> Given | Adaptive:
+def steps_of(scheme: str, length: float, largest_depth: float | None = None) -> Given | None:
     """The steps of a scheme by its name, "final" included; largest_depth: in place of the length of explicit steps."""
     if scheme in ("adaptive", "final"):
-        return Adaptive(rtol)
+        return None
     return Given(length, "explicit", largest_depth) if scheme == "explicit" else Given(length)
 
 
@@ -72,6 +59,7 @@ class WearRequest:
     """What a wear history is asked for, Eqs. (20) to (26).
 
     wear_coefficient: k_w, 1/Pa. law: part of the slip work that wears.
+    steps: None for BDF2 steps with a relative error of the worn volume near rtol, the last count interpolated.
     cycles (n_output,): ascending counts to report, the first 0; the last Euler step ends at the last one. Or
         `ToTheEnd`: until nothing wears any more; not with explicit steps, which cannot grow.
     until: target of the wear, with whose step the history ends. loops: pairs with reported fretting loops.
@@ -80,7 +68,7 @@ class WearRequest:
     """
 
     wear_coefficient: float
-    steps: Given | Adaptive
+    steps: Given | None
     cycles: FloatArray | ToTheEnd
     law: WearLaw = ARCHARD
     until: WearTarget | None = None
@@ -93,10 +81,10 @@ class WearRequest:
         """Last cycle count; inf where it is not known."""
         return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
 
-    def with_steps(self, steps: Adaptive, counts: FloatArray) -> WearRequest:
-        """The same with other steps, to the last of some counts (n,), whatever target is reached before."""
+    def adaptive_to(self, counts: FloatArray) -> WearRequest:
+        """The same with adaptive steps, to the last of some counts (n,), whatever target is reached before."""
         never = self.until and replace(self.until, value=math.inf)
-        return replace(self, steps=steps, cycles=counts, until=never)
+        return replace(self, steps=None, cycles=counts, until=never)
 
 
 @packable
@@ -190,7 +178,7 @@ class WearingJoint:
 
     def __init__(self, case: Case, start: StartState, request: WearRequest) -> None:
         assert start.state is not None
-        if isinstance(request.steps, Adaptive):
+        if request.steps is None:
             case = replace(case, settings=case.settings.of_steps)
         self.case, self.start, self.request, self.follow = case, start, request, request.follow
         self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude

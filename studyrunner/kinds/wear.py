@@ -118,21 +118,18 @@ class Sweep(_FromRest):
 
     def _compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[StartResult]:
         # numba is loaded where a task runs, so that --plan and --help do without it
-        from solver.loading_history.start_states import follow_branch
+        from solver.loading_history.start_states import FrequencySweep
 
         model, wanted, excitation = self.joint.model(models), sorted(self.places), self.excitation
         n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
-        for place, start in follow_branch(
-            model,
-            self.joint.friction_coefficient,
-            excitation.amplitude,
-            # no state depends on those that are skipped
-            excitation.follow or np.array([self.frequencies[place] for place in wanted]),
-            cast("Literal['up', 'down', 'ramp']", excitation.direction),
-            self.settings,
-            keep=keep,
-            resume=self.resume,
-        ):
+        direction = cast("Literal['up', 'down', 'ramp']", excitation.direction)
+        friction, amplitude = self.joint.friction_coefficient, excitation.amplitude
+        sweeps = FrequencySweep(model, friction, amplitude, direction, self.settings, keep)
+        if self.resume is not None:
+            sweeps.load(self.resume)
+        # no state depends on those that are skipped
+        frequencies = excitation.follow or np.array([self.frequencies[place] for place in wanted])
+        for place, start in sweeps.states(frequencies):
             if start.outcome is Outcome.EXCEPTION and self.resume is not None:
                 raise RuntimeError(start.message)
             n_unknowns, moves = 0, False
@@ -248,7 +245,7 @@ class History(_FromRest):
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
         return WearRequest(
             integrated.wear_coefficients[0],
-            steps_of(integrated.scheme, integrated.step, self.settings.rtol, integrated.largest_depth),
+            steps_of(integrated.scheme, integrated.step, integrated.largest_depth),
             counts,
             law=self.law,
             until=self.until,

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver import build_model
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState
@@ -76,7 +76,7 @@ class Found:
 def find(scene: Scene, settings: SolverSettings, sweep: str = "up") -> Found:
     """Solve, and compare with the exact motion next to what is found. Raises NoPeriodicMotionError."""
     model, frequency = scene.model, np.array([scene.omega / (2.0 * np.pi)])
-    ((_, start),) = follow_branch(model, scene.friction, scene.excitation, frequency, sweep, settings)
+    ((_, start),) = FrequencySweep(model, scene.friction, scene.excitation, sweep, settings).states(frequency)
     # the wear rate is the slip work
     history = march_wear(model, scene.friction, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
     if history.outcome is not Outcome.CONVERGED or start.state is None:

@@ -12,7 +12,7 @@ from solver.arguments import worn_model
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
 from solver.newton.run import Run
 from solver.results.history import StartState, WearHistory
@@ -144,7 +144,7 @@ def dovetail(n_harmonics: int = 3, nodal_diameter: int = 0) -> ReducedModel:
 def branch_states(model, friction, amplitude, omegas, settings, sweep="up") -> list[StartState]:
     """Start states at angular frequencies, rad/s, ascending."""
     frequencies = np.asarray(omegas, float) / (2.0 * np.pi)
-    found = dict(follow_branch(model, friction, amplitude, frequencies, sweep, settings))
+    found = dict(FrequencySweep(model, friction, amplitude, sweep, settings).states(frequencies))
     return [found[index] for index in range(len(omegas))]
 
 
@@ -166,7 +166,7 @@ def march_wear(
     model, friction, start, wear_coefficient, step, scheme, cycles, settings, *, keep=None, resume=None, **asked
 ) -> WearHistory:
     """The history from a start state; asked: what else `WearRequest` has."""
-    wanted = WearRequest(wear_coefficient, steps_of(scheme, step, settings.rtol, None), cycles, **asked)
+    wanted = WearRequest(wear_coefficient, steps_of(scheme, step), cycles, **asked)
     return next(integrate_together(model, friction, settings, start, (wanted,), keep, resume))
 
 

@@ -13,7 +13,7 @@ from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
 from solver.continuation.phase_lag import phase_lag, rise_of_response, solve_at_lag
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import State, balance_after
 from solver.newton.run import Bordered, Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
@@ -31,11 +31,11 @@ GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)
 
 
 def wall(omega):
-    """Vibro-impact along the excitation amplitude: balances, a state found from nothing, and the motion of the mass."""
+    """Vibro-impact along the excitation amplitude: joints, a state found from nothing, and the motion of the mass."""
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
 
-    def balance_at(amplitude, history, first=None):
-        return Balance(case.joint(omega, amplitude), history, first=first)
+    def joint_at(amplitude):
+        return case.joint(omega, amplitude)
 
     def first(amplitude):
         found = first_point(case, omega, amplitude)
@@ -46,12 +46,16 @@ def wall(omega):
         response = structure.response_h(point.evaluation.displacement_h[0, :1])
         return float(np.hypot(response[0, 1], response[0, 2]))
 
-    return balance_at, first, size
+    return joint_at, first, size
 
 
 def test_natural_steps_end_before_a_fold_and_say_so():
-    balance_at, first, size = wall(WALL_OMEGA)
-    point, arrived = follow_naturally(balance_at, first(0.03), 0.06, Run(TOLERANCE))
+    joint_at, first, size = wall(WALL_OMEGA)
+
+    def balance_from(amplitude, state):
+        return balance_after(joint_at(amplitude), state)
+
+    point, arrived = follow_naturally(balance_from, first(0.03), 0.06, Run(TOLERANCE))
     assert not arrived
     # the branch without impacts ends where the mass reaches the wall; 1/64 of the range is the shortest step
     assert point.parameter == pytest.approx(GRAZING, abs=2 * 0.03 / 64)
@@ -78,13 +82,14 @@ def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
 
 @pytest.mark.parametrize("change", [1e-4, -1e-4])
 def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(change):
-    balance_at, first, size = wall(WALL_OMEGA)
+    joint_at, first, size = wall(WALL_OMEGA)
 
     def grows(point):
-        return not Run(1e-8).is_stable(balance_at(point.parameter, point.history).joint, point.evaluation)
+        return not Run(1e-8).is_stable(joint_at(point.parameter), point.evaluation)
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
-    arc = Arc(balance_at, first(0.03), 0.03, Run(1e-9))
+    start = first(0.03)
+    arc = Arc(lambda amplitude: Balance(joint_at(amplitude), start.history), start, 0.03, Run(1e-9))
     passed = ((a, b) for a, b, _ in arc.steps(1.0) if (a.parameter - 0.03) * (b.parameter - 0.03) < 0.0)
     middle = next(filter(grows, (arc.state_at(a, b, 0.03) for a, b in passed)))
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))

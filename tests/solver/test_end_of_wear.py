@@ -7,11 +7,12 @@ import pytest
 
 from solver import march_wear as march_model
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from solver.wear import problem
+from solver.wear.wearing_joint import Given
 from studies import build_scene
 from tests.solver.models import assert_same, march_wear
 from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
@@ -43,6 +44,19 @@ def test_the_count_is_that_at_which_the_history_has_the_wear(scheme):
 def test_the_error_of_a_life_is_not_known_where_the_reference_solution_has_no_state(monkeypatch):
     monkeypatch.setattr(problem, "report_only", lambda *_, **__: Failure(Outcome.MARCH_FAILED, "lost"))
     found = march(4000.0, "adaptive", until=WearTarget("wear_depth", 2.3e-5))
+    assert found.cycles_to_target > 0.0
+    assert found.cycles_to_target_error == np.inf
+
+
+def test_the_error_of_a_life_is_not_known_where_the_adaptive_history_has_no_state(monkeypatch):
+    own = problem.WearProblem.advance
+
+    def advance(self, state, course):
+        given = isinstance(self.request.steps, Given)
+        return own(self, state, course) if given else Failure(Outcome.MARCH_FAILED, "lost")
+
+    monkeypatch.setattr(problem.WearProblem, "advance", advance)
+    found = march(4000.0, "implicit", until=WearTarget("frequency_shift", 1e-4))
     assert found.cycles_to_target > 0.0
     assert found.cycles_to_target_error == np.inf
 
@@ -102,7 +116,7 @@ COARSE = SolverSettings(harmonics=3, samples=64)
 def unworn():
     """A cylinder in partial slip."""
     model = build_scene("cylinder_on_flat", strips=12)
-    ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", COARSE)
+    ((_, start),) = FrequencySweep(model, 0.6, 1.0, "ramp", COARSE).states(np.array([20.0]))
     return model, start
 
 

@@ -13,7 +13,7 @@ import pytest
 from solver import build_model
 from solver.accuracy.certificate import certify
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.model import ReducedModel
 from solver.outcome import COMPLETE, Outcome
 from solver.results.state_report import evaluated
@@ -86,7 +86,7 @@ def run(case):
     """Both phases of a point, judged."""
     started = time.process_time()
     frequencies = np.array([case.omega / (2.0 * np.pi)])
-    ((_, start),) = follow_branch(case.model, case.friction, case.amplitude, frequencies, "up", case.settings)
+    ((_, start),) = FrequencySweep(case.model, case.friction, case.amplitude, "up", case.settings).states(frequencies)
     cycles = np.linspace(0.0, case.cycles, 6)
     history = march_wear(case.model, case.friction, start, case.wear, case.step, case.scheme, cycles, case.settings)
     assert time.process_time() - started < BOUND

@@ -15,7 +15,7 @@ from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.loading_history import start_states
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -36,7 +36,7 @@ SETTINGS = SolverSettings()
 
 
 def start_of(model, friction, excitation, frequency):
-    ((_, start),) = follow_branch(model, friction, excitation, np.array([frequency]), "up", SETTINGS)
+    ((_, start),) = FrequencySweep(model, friction, excitation, "up", SETTINGS).states(np.array([frequency]))
     return start
 
 

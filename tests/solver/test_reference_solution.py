@@ -23,7 +23,7 @@ from solver.wear.errors import (
 )
 from solver.wear.history import integrate_together
 from solver.wear.problem import WearProblem
-from solver.wear.wearing_joint import Adaptive, Given, WearRequest
+from solver.wear.wearing_joint import Given, WearRequest
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import exact_depths_of_motion
 
@@ -127,7 +127,7 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     whole, own = usual(), WearProblem.step
 
     def go_astray(of, state):
-        lost = isinstance(of.steps, Adaptive) and state.cycle >= 12_000.0
+        lost = of.steps is None and state.cycle >= 12_000.0
         return Failure(Outcome.MARCH_FAILED, "lost") if lost else own(of, state)
 
     monkeypatch.setattr(WearProblem, "step", go_astray)
@@ -240,7 +240,7 @@ def test_histories_that_are_integrated_together_are_those_alone(monkeypatch):
     """To the last bit, interrupted or not; the adaptive history, which all of them need, is integrated once."""
     monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 20)
     model, found = start()
-    asked = [WearRequest(WEAR, rule, CYCLES) for rule in (Given(4000.0), Adaptive(1e-2), Given(2000.0, "explicit"))]
+    asked = [WearRequest(WEAR, rule, CYCLES) for rule in (Given(4000.0), None, Given(2000.0, "explicit"))]
     saved: list[Packed] = []
     together = list(integrate_together(model, 0.5, GIVEN, found, asked, saved.append))
     alone = [next(integrate_together(model, 0.5, GIVEN, found, (each,))) for each in asked]

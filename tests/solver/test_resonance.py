@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from solver import build_model, march_wear
 from solver.harmonic_balance.state import State
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import FrequencySweep
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.state_report import periodic_state, resonance_frequency
@@ -108,7 +108,7 @@ def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequen
 def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
     monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 8)
     model, follow, settings = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN), SolverSettings()
-    ((_, start),) = follow_branch(model, 0.5, 10.0, follow, "up", settings)
+    ((_, start),) = FrequencySweep(model, 0.5, 10.0, "up", settings).states(follow)
     kept: list[Packed] = []
     asked = model, 0.5, start, WEAR, 1e3, "implicit", CYCLES, settings
     whole = march_from(*asked, keep=kept.append, follow=follow)
@@ -121,11 +121,13 @@ def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
 def test_an_interrupted_search_finds_the_same_start_to_the_last_bit():
     model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency("resonance", *BETWEEN)
     given: list[Packed | str] = []
-    ((_, whole),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings(), given.append)
+    ((_, whole),) = FrequencySweep(model, 0.5, 10.0, "up", SolverSettings(), given.append).states(follow)
     kept = [progress for progress in given if not isinstance(progress, str)]
     assert len(kept) > 2
     for progress in (kept[0], kept[len(kept) // 2], kept[-1]):
-        ((_, again),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings(), resume=progress)
+        sweeps = FrequencySweep(model, 0.5, 10.0, "up", SolverSettings())
+        sweeps.load(progress)
+        ((_, again),) = sweeps.states(follow)
         assert again.state.omega == whole.state.omega
         np.testing.assert_array_equal(again.state.displacement_h, whole.state.displacement_h)
 

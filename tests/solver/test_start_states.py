@@ -12,12 +12,11 @@ from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.accuracy.resolved_state import left_out
 from solver.continuation.first_state import state_at_rest
 from solver.continuation.natural import follow_naturally, ratchets
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import State, balance_after
 from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.start_states import FIRST_ITERATIONS, follow_branch
+from solver.loading_history.start_states import FIRST_ITERATIONS, FrequencySweep
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome
 from solver.packing import Packed
@@ -34,7 +33,7 @@ AUTOMATIC = SolverSettings()
 
 
 def starts(frequencies, sweep="up", settings=AUTOMATIC):
-    found = follow_branch(dovetail(13), 0.5, 0.5, np.array(frequencies), sweep, settings)
+    found = FrequencySweep(dovetail(13), 0.5, 0.5, sweep, settings).states(np.array(frequencies))
     return {frequencies[index]: start for index, start in found}
 
 
@@ -67,10 +66,10 @@ def test_pairs_slide_with_a_rising_load_alike_in_one_step_and_in_many():
     rest = state_at_rest(case, omega, run)
     assert isinstance(rest, State)
 
-    def balance_at(factor, history, first=None):
-        return Balance(case.joint(omega, 20.0 * factor), history, first=first)
+    def balance_from(factor, state):
+        return balance_after(case.joint(omega, 20.0 * factor), state)
 
-    one, many = (follow_naturally(balance_at, rest, 1.0, run, fine=fine) for fine in (1.0, 1.0 / 64.0))
+    one, many = (follow_naturally(balance_from, rest, 1.0, run, fine=fine) for fine in (1.0, 1.0 / 64.0))
     assert one[1]
     assert many[1]
     slid = np.linalg.norm(many[0].history - rest.history)
@@ -101,7 +100,7 @@ def test_a_joint_without_grip_ends_within_bounded_effort():
     """Two masses on a structure that friction alone keeps in place: no state stays, and the search for one ends."""
     model = scene("two_masses")
     loose = replace(model.linear[0], stiffness=np.array([[0.5, -1.0], [-1.0, 1.0]]))
-    found = follow_branch(replace(model, linear={0: loose}), 0.5, 5.0, np.array([0.1]), "up", AUTOMATIC)
+    found = FrequencySweep(replace(model, linear={0: loose}), 0.5, 5.0, "up", AUTOMATIC).states(np.array([0.1]))
     ((_, start),) = found
     assert start.state is None
     assert start.outcome in (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
@@ -122,13 +121,15 @@ def test_a_sweep_goes_on_from_each_save_to_the_last_bit(case, monkeypatch):
     """Also to a frequency that was passed before."""
     monkeypatch.setattr(sweep_module, "ITERATIONS_PER_SAVE", 5)
     build, friction, amplitude, frequencies, way = INTERRUPTED[case]
-    asked, kept = (build(), friction, amplitude, np.array(frequencies), way, AUTOMATIC), list[Packed | str]()
-    whole = dict(follow_branch(*asked, keep=kept.append))
+    asked, kept = (build(), friction, amplitude, way, AUTOMATIC), list[Packed | str]()
+    whole = dict(FrequencySweep(*asked, kept.append).states(np.array(frequencies)))
     assert max(start.branch for start in whole.values()) == (1 if "folds" in case else 0)
     saved = [progress for progress in kept if not isinstance(progress, str)]
     assert len(saved) > 2 * len(whole)
     for progress in saved[1 :: len(saved) // 4 + 1]:
-        again = dict(follow_branch(*asked, resume=progress))
+        sweeps = FrequencySweep(*asked)
+        sweeps.load(progress)
+        again = dict(sweeps.states(np.array(frequencies)))
         for index, wanted in whole.items():
             assert_same_state(again[index], wanted)
 
@@ -171,7 +172,7 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
     model = scene("two_masses", stiffness_1=3.0, stiffness_2=1.0, damping_1=0.0, damping_2=0.0)
     frequency = 2.0 / (2 * np.pi)
     assert 2 * np.pi * frequency == 2.0
-    starts = dict(follow_branch(model, 0.5, 20.0, np.array([frequency]), "up", SolverSettings(3, 64)))
+    starts = dict(FrequencySweep(model, 0.5, 20.0, "up", SolverSettings(3, 64)).states(np.array([frequency])))
     assert starts[0].outcome is Outcome.SINGULAR
     assert starts[0].state is None
     assert f"at {frequency:.6g} Hz" in starts[0].message
@@ -240,7 +241,7 @@ def test_a_free_block_needs_no_friction_where_it_is_pressed_on_and_is_pulled_off
 
 
 def test_a_mass_that_slides_all_the_time_needs_no_reference_sweep():
-    ((_, start),) = follow_branch(scene("sdof_slider"), 0.5, 10.0, np.array([160.0]), "up", SolverSettings())
+    ((_, start),) = FrequencySweep(scene("sdof_slider"), 0.5, 10.0, "up", SolverSettings()).states(np.array([160.0]))
     assert start.reference is None
     assert 0.0 < start.response_error < 1e-2
 

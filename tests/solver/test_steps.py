@@ -17,16 +17,16 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear import problem as control
-from solver.wear.check import choose_anew
+from solver.wear.check import choose_harmonics
 from solver.wear.step import moved_fraction, rate_slope
-from solver.wear.wearing_joint import Adaptive, Given, WearingJoint, WearRequest, WearState
+from solver.wear.wearing_joint import Given, WearingJoint, WearRequest, WearState
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import AREA, problem
 
 
-def states_of(steps, n_steps):
+def states_of(steps, n_steps, rtol=1e-2):
     """The unworn state and those behind each of the first steps."""
-    of = problem(steps)
+    of = problem(steps, rtol)
     states = [of.with_first_length(of.unworn_state())]
     for _ in range(n_steps):
         states.append(of.step(states[-1]))
@@ -60,13 +60,13 @@ def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
 
 def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     rtol = 1e-2
-    states = states_of(Adaptive(rtol), 12)
+    states = states_of(None, 12, rtol)
     at, depth, _ = read(states)
     lengths = np.diff(at)
     worn = np.maximum(np.diff(depth), depth[1:] * lengths / at[1:]) * AREA
     assert ([state.error for state in states[1:]] <= control.STEP_ERROR_FRACTION * rtol * worn).all()
     assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
-    assert states_of(Adaptive(1e-4), 12)[-1].cycle < 0.5 * at[-1]
+    assert states_of(None, 12, 1e-4)[-1].cycle < 0.5 * at[-1]
 
 
 def failing(monkeypatch, fails):
@@ -82,21 +82,21 @@ def failing(monkeypatch, fails):
 
 
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
-    first = states_of(Adaptive(1e-2), 0)[0].length
+    first = states_of(None, 0)[0].length
     with monkeypatch.context() as patch:
         tried = failing(patch, lambda tried: len(tried) == 1)
-        states = states_of(Adaptive(1e-2), 1)
+        states = states_of(None, 1)
     assert tried[:2] == [("adaptive", first), ("adaptive", SMALLEST_STEP_RATIO * first)]
     assert states[1].cycle == tried[-1][1]
     failing(monkeypatch, lambda tried: tried[-1][0] == "adaptive")
-    length, depth, rate = read(states_of(Adaptive(1e-2), 1))[:, 1]
+    length, depth, rate = read(states_of(None, 1))[:, 1]
     assert length == pytest.approx(control.SHORTEST_SLOW_STEP * first, rel=2e-3)
     assert depth == pytest.approx(length * rate, rel=1e-6)
 
 
 @pytest.mark.parametrize(("found_from", "end", "doublings"), [(3.0, np.inf, 2), (3.0, 3.5, None), (99.0, np.inf, None)])
 def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeypatch, found_from, end, doublings):
-    of = problem(Adaptive(1e-2))
+    of = problem()
     # so short a step changes less than the tolerance
     of.run = of.run.with_tolerance(1e-10)
     first = of.with_first_length(of.unworn_state())
@@ -128,10 +128,10 @@ def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multi
 
 
 def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
-    work = problem(Adaptive(1e-2))
+    work = problem()
     work.case = replace(work.case, settings=SolverSettings("auto", 512, rtol=1e-4))
     state = work.unworn_state()
-    chosen = choose_anew(work, state)
+    chosen = choose_harmonics(work, state, anew=True)
     assert chosen.resolution != state.resolution
     assert chosen.rate == pytest.approx(work.gain(1.0) * chosen.at.slip_work, rel=1e-12, abs=0.0)
     assert chosen.rates[-1] == pytest.approx(float(chosen.rate @ work.area))

@@ -126,5 +126,9 @@ def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor():
     for wrong in ((("flat", 1.0),), (("flat", 1.0), ("cylinder", 0.5), ("disk", 1.0))):
         with pytest.raises(ValueError, match=r"cylinder|disk"):
             wearing_work(WearLaw(surfaces=wrong), sides, np.zeros(3))
-    with pytest.raises(ValueError, match="reye"):
-        wearing_work(WearLaw("reye"), sides, np.zeros(3))
+
+
+@pytest.mark.parametrize("given", [{"name": "reye"}, {"name": "table"}, {"table": TABLE}], ids=str)
+def test_a_law_without_its_numbers_is_none(given):
+    with pytest.raises(ValueError, match=r"^law: "):
+        WearLaw(**given)

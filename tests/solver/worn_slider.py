@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -15,7 +14,7 @@ from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.problem import WearProblem
-from solver.wear.wearing_joint import Adaptive, Given, WearRequest
+from solver.wear.wearing_joint import Given, WearRequest
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, march_wear, scene
 
@@ -45,11 +44,11 @@ def march(
     return march_wear(model, FRICTION, start, wear, step, scheme, cycles, replace(COARSE, rtol=rtol), **asked)
 
 
-def problem(steps: Given | Adaptive, end: float = END, **asked: Any) -> WearProblem:
-    """The wearing slider up to a cycle count; asked: as of `WearRequest`."""
+def problem(steps: Given | None = None, rtol: float = 1e-2) -> WearProblem:
+    """The wearing slider up to the last cycle count."""
     model, start = slider_start()
-    case = build_case(model, FRICTION, start.penalty_omega, COARSE, start.resolution)
-    return WearProblem(case, start, WearRequest(WEAR, steps, np.array([0.0, end]), **asked))
+    case = build_case(model, FRICTION, start.penalty_omega, replace(COARSE, rtol=rtol), start.resolution)
+    return WearProblem(case, start, WearRequest(WEAR, steps, np.array([0.0, END])))
 
 
 def exact_depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray:

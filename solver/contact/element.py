@@ -1,0 +1,240 @@
+"""What a contact law is to a joint: the law of some pairs through one period, its derivatives, and what it remembers.
+
+A law maps the *predicted* force p of a pair to the contact force lambda and the motion `u = (p - lambda) / eps`, Eqs.
+(9)-(12). `march` does so for the samples of a period, and `sample_tangents` has its derivative at a sample: with the
+state `x = p - lambda = eps u`, A the derivative of x by p and B that by x at the sample before. All else follows; a law
+replaces what it computes faster, or what is different for it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from solver.contact.coulomb import OTHER, STICK, friction_limit
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from solver.structure.fourier import FourierBasis
+    from solver.structure.penalty import Penalty
+
+Tangents = tuple[FloatArray, FloatArray]
+"""Derivatives by the harmonics of the predicted force: of those of the contact force (n, 3m, 3m), dimensionless, and of
+the slip work (n, 3m)."""
+
+
+@dataclass(frozen=True)
+class Marched:
+    """Contact forces and states of n pairs under a predicted force, at N samples of the last period.
+
+    - predicted_t, force_t (n, 3, N): N, compression positive; tangential ones of masses are means over the steps.
+      force_h (n, 3, m): harmonics of the contact force, N.
+    - state_t (n, 2, N+1): tangential state, over `state_stiffness` the slip, m.
+    - start (n, 2): state at the start of the first period, N; of masses the velocity at the start, m/s.
+    - slid (n,): whether the pair slid there on the way from another state (`slow_slide`).
+    - status_t (n, N): SEPARATED, STICK or SLIP; OTHER of a law without these. periods (n,): number of periods marched.
+    - periodicity_error: change of the tangential state over the last period, N.
+    - slip_work (n,): integral of normal force times slip distance over a period, J.
+    """
+
+    predicted_t: FloatArray
+    force_t: FloatArray
+    force_h: FloatArray
+    state_t: FloatArray
+    start: FloatArray
+    slid: BoolArray
+    status_t: IntArray
+    periods: IntArray
+    periodicity_error: float
+    slip_work: FloatArray
+
+    @property
+    def stuck(self) -> BoolArray:
+        """Pairs (n,) that stick during the whole period and transmit the predicted force."""
+        # the start of a period that was marched more than once may depend on the force
+        return np.asarray((self.status_t == STICK).all(axis=1) & (self.periods == 1) & ~self.slid)
+
+    def at(self, places: IntArray) -> Marched:
+        """Those of some pairs (k,)."""
+        of_pairs = (each.name for each in fields(Marched) if each.name != "periodicity_error")
+        own: dict[str, Any] = {name: getattr(self, name)[places] for name in of_pairs}
+        return Marched(**own, periodicity_error=self.periodicity_error)
+
+
+@dataclass(frozen=True)
+class SampledLaw:
+    """Derivative of the law of p pairs at N samples, in blocks (N, p, 3, 3) of the pairs:
+
+        by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv'.
+
+    A prime marks the sample before. Velocities are in m per sample.
+    """
+
+    by_force: FloatArray
+    by_motion: FloatArray
+    by_speed: FloatArray
+    by_last_motion: FloatArray
+    by_last_speed: FloatArray
+
+
+@dataclass(frozen=True)
+class Element(ABC):
+    """The law of k pairs of a joint at one frequency omega, rad/s. All arrays are of these pairs.
+
+    places (k,): the pairs among all of the joint. penalty: eps. friction_coefficient (k,). dofs (k, 3): as in
+    `ContactInterface`. Harmonics are on the axis of length m = 2H+1. history (k, `n_history`): what a pair remembers
+    from one state to the next, m: by default the slip of its state.
+    """
+
+    places: IntArray
+    penalty: Penalty
+    friction_coefficient: FloatArray
+    dofs: IntArray
+    basis: FourierBasis
+    omega: float
+
+    # whether the law depends on velocities, and the length of the history
+    rate_dependent: ClassVar[bool] = False
+    n_history: ClassVar[int] = 2
+
+    @property
+    def has_normal(self) -> BoolArray:
+        """False (k,) for pairs without a closing displacement, whose normal force is constant."""
+        return np.asarray(self.dofs[:, 0] >= 0)
+
+    @property
+    def sample_step(self) -> float:
+        """Time between two samples, s."""
+        return 2.0 * np.pi / (self.omega * self.basis.n_samples)
+
+    @property
+    def compliance(self) -> ComplexArray:
+        """Displacement per force (k, 3, H+1), m/N, in each harmonic: 1 / eps."""
+        return np.repeat((1.0 + 0.0j) / self.penalty.stiffness[:, :, None], len(self.basis.orders) + 1, axis=2)
+
+    @property
+    def state_stiffness(self) -> FloatArray:
+        """Tangential state over slip (k,), N/m."""
+        return self.penalty.tangential
+
+    @abstractmethod
+    def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None, /) -> Marched:
+        """The period under a predicted force p (k, 3, m), N: the contact force lambda at its samples, by the relative
+        displacement `u = (p - lambda) / eps`, which is 0 where a pair without wear just closes. The force in a
+        direction that a pair does not have is p.
+
+        first (k, 3, N): predicted force, N, from which it has slowly come; None where it was always the same.
+        """
+
+    def marched(self, predicted_t: FloatArray, force_t: FloatArray, **others: Any) -> Marched:
+        """What a march has left: predicted and contact force (k, 3, N), N, and others than those of a law without
+        friction, which remembers nothing.
+        """
+        k, _, n = predicted_t.shape
+        nothing: dict[str, Any] = {
+            "force_h": force_t @ self.basis.analysis,
+            "state_t": np.zeros((k, 2, n + 1)),
+            "start": np.zeros((k, 2)),
+            "slid": np.zeros(k, bool),
+            "status_t": np.full((k, n), OTHER),
+            "periods": np.ones(k, np.int64),
+            "periodicity_error": 0.0,
+            "slip_work": np.zeros(k),
+        }
+        return Marched(predicted_t, force_t, **{**nothing, **others})
+
+    def tangent(self, at: Marched, _: FloatArray | None, __: FloatArray | None, out: Tangents, /) -> None:
+        """Exact derivatives by the harmonics of the predicted force, with the periodicity, of pairs that neither stick
+        nor stand open during the whole period, into `out`; with the way from history and `first` force of `march`,
+        where these are given. By default from `sample_tangents`, without slip work.
+        """
+        own, carried = self.sample_tangents(at)
+        synthesis, analysis = self.basis.synthesis, self.basis.analysis
+        (n_samples, k), size = own.shape[:2], 3 * len(synthesis)
+        # the first period from no change of the state, the second from that with which it repeats
+        state, passed = np.zeros((k, 3, size)), np.broadcast_to(np.eye(2), (k, 2, 2))
+        for each in carried:
+            passed = each @ passed
+        for period in range(2):
+            for n in range(n_samples):
+                by_force = np.kron(np.eye(3), synthesis[:, n])
+                before, state = state, own[n] @ by_force
+                state[:, 1:] += carried[n] @ before[:, 1:]
+                if period:
+                    changed = (by_force - state)[:, :, None, :] * analysis[n][:, None]
+                    out[0][:] += changed.reshape(k, size, size)
+            if not period:
+                state[:, 1:] = np.linalg.pinv(np.eye(2) - passed) @ state[:, 1:]
+
+    @abstractmethod
+    def sample_tangents(self, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:
+        """A (n, k, 3, 3) and B (n, k, 2, 2) at every `stride`-th sample; the normal force is that at the sample."""
+
+    def sampled(self, at: Marched, pairs: IntArray) -> SampledLaw:
+        """Derivative at the samples for disturbances in time of some of the k pairs (p,).
+
+        With `p = lambda + x` it is `(1 - A) eps du - A dlambda = B eps du'`.
+        """
+        own, carried = self.sample_tangents(at)
+        eps, there = self.penalty.stiffness[pairs, None, :], self.dofs[pairs] >= 0
+        # a displacement that does not exist has no disturbance of the force
+        passed = np.where(there[:, :, None] & there[:, None, :], own[:, pairs], -np.eye(3) * ~there[:, :, None])
+        last = np.zeros((len(own), pairs.size, 3, 3))
+        last[:, :, 1:, 1:] = carried[:, pairs]
+        none = np.zeros_like(last)
+        return SampledLaw(-passed, (np.eye(3) - passed) * eps, none, last * eps, none.copy())
+
+    def friction_work(self, at: Marched) -> FloatArray:
+        """Work that the law dissipates in a period (k,), J: by default that of friction, at its limit during slip."""
+        return friction_limit(self.friction_coefficient, at.slip_work)
+
+    # --- what a state leaves to the next one ---
+
+    def origin(self, history: FloatArray) -> FloatArray:
+        """Mean tangential position (k, 2), m, without mean force."""
+        return np.zeros((len(history), 2))
+
+    def started_from(self, _: Marched, history: FloatArray, /) -> FloatArray:
+        """The history with which the periods of a state begin after the way from another history."""
+        return history
+
+    def relieved(self, history: FloatArray, _: FloatArray, /) -> FloatArray:
+        """History of a state without some tangential force (k, 2), N."""
+        return history
+
+    def final_history(self, at: Marched, _: FloatArray, /) -> FloatArray:
+        """History that a state leaves; second argument (k, 3, m): its motion, m."""
+        return at.state_t[:, :, -1] / self.state_stiffness[:, None]
+
+    def begun_at(self, _: FloatArray, last: FloatArray, /) -> FloatArray:
+        """History of pairs that had another law, whose state had a mean position and a `last` one at its end, both
+        (k, 2), m.
+        """
+        return last
+
+    # --- only masses move on in a period, and have harmonics above the highest one ---
+
+    def drift(self, at: Marched) -> FloatArray:
+        """Distance (k, 2), m, by which pairs move on in a period."""
+        return np.zeros((len(at.start), 2))
+
+    def change_force(self, at: Marched) -> FloatArray:
+        """Change of the tangential state over the period (k,), N."""
+        return np.asarray(np.hypot(*(at.state_t[:, :, -1] - at.state_t[:, :, 0]).T))
+
+    def driving_force(self, _: Marched) -> float:
+        """Largest force, N, that drives a mass."""
+        return 0.0
+
+    def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:
+        """Contact force in other harmonics (k, 3, 2j+1), N."""
+        return np.zeros((len(at.start), 3, basis.analysis.shape[1]))
+
+    def beyond_series(self, _: Marched, series_t: FloatArray) -> FloatArray:
+        """Tangential motion (k, 2, N), m, in harmonics that the series (k, 2, N), m, lacks, half a step before the
+        samples.
+        """
+        return np.zeros_like(series_t)
