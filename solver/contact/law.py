@@ -61,17 +61,22 @@ class ContactLaw:
         """Length of the history of a pair; shorter ones end with zeros."""
         return max(each.n_history for each in self.elements)
 
-    @staticmethod
-    def _history(element: Element, history: FloatArray) -> FloatArray:
+    def _part(self, element: Element, values: FloatArray) -> FloatArray:
+        """Values of the pairs of one element."""
+        return values if len(self.elements) == 1 else values[element.places]
+
+    def _history(self, element: Element, history: FloatArray) -> FloatArray:
         """The history of one element from that of all pairs."""
-        return history[element.places, : element.n_history]
+        return self._part(element, history)[:, : element.n_history]
 
     def _histories(self, parts: list[FloatArray]) -> FloatArray:
         """The history of all pairs from those of each element."""
+        if len(parts) == 1:
+            return parts[0]
         return self._joined([np.pad(each, ((0, 0), (0, self.n_history - each.shape[1]))) for each in parts])
 
     def _of(self, element: Element, at: Marched) -> Marched:
-        """The part of one element."""
+        """The march of one element."""
         return at if len(self.elements) == 1 else at.at(element.places)
 
     def _each(self, compute: Callable[[Element, Marched], FloatArray], at: Marched) -> FloatArray:
@@ -81,8 +86,8 @@ class ContactLaw:
     def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None = None) -> Marched:  # noqa: D102
         parts = list[Marched]()
         for each in self.elements:
-            begin = None if first is None else first[each.places]
-            parts.append(each.march(predicted_h[each.places], self._history(each, history), begin))
+            begin = None if first is None else self._part(each, first)
+            parts.append(each.march(self._part(each, predicted_h), self._history(each, history), begin))
         if len(parts) == 1:
             return parts[0]
         joined: dict[str, Any] = {"periodicity_error": max(each.periodicity_error for each in parts)}
@@ -97,7 +102,7 @@ class ContactLaw:
             part, own = self._of(each, at), each.places
             out = np.zeros((own.size, size, size)), np.zeros((own.size, size))
             before = None if history is None else self._history(each, history)
-            each.tangent(part, before, None if first is None else first[own], out)
+            each.tangent(part, before, None if first is None else self._part(each, first), out)
             out[0][part.stuck] = np.eye(size)
             found.append(out)
         force, work = (self._joined([each[place] for each in found]) for place in (0, 1))
@@ -140,7 +145,7 @@ class ContactLaw:
         return self._joined([each.state_stiffness for each in self.elements])
 
     def final_history(self, at: Marched, displacement_h: FloatArray) -> FloatArray:  # noqa: D102
-        ends = [each.final_history(self._of(each, at), displacement_h[each.places]) for each in self.elements]
+        ends = [each.final_history(self._of(each, at), self._part(each, displacement_h)) for each in self.elements]
         return self._histories(ends)
 
     def started_from(self, at: Marched, history: FloatArray) -> FloatArray:  # noqa: D102
@@ -148,11 +153,13 @@ class ContactLaw:
         return self._histories(begun)
 
     def relieved(self, history: FloatArray, force: FloatArray) -> FloatArray:  # noqa: D102
-        parts = [each.relieved(self._history(each, history), force[each.places]) for each in self.elements]
+        parts = [each.relieved(self._history(each, history), self._part(each, force)) for each in self.elements]
         return self._histories(parts)
 
     def begun_at(self, mean: FloatArray, last: FloatArray) -> FloatArray:  # noqa: D102
-        return self._histories([each.begun_at(mean[each.places], last[each.places]) for each in self.elements])
+        return self._histories(
+            [each.begun_at(self._part(each, mean), self._part(each, last)) for each in self.elements]
+        )
 
     def drift(self, at: Marched) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.drift(part), at)
@@ -167,7 +174,7 @@ class ContactLaw:
         return self._each(lambda each, part: each.tail(part, basis), at)
 
     def beyond_series(self, at: Marched, series_t: FloatArray) -> FloatArray:  # noqa: D102
-        return self._each(lambda each, part: each.beyond_series(part, series_t[each.places]), at)
+        return self._each(lambda each, part: each.beyond_series(part, self._part(each, series_t)), at)
 
 
 def build_law(
