@@ -69,7 +69,9 @@ class MissionProblem:
     def advance(self, state: MissionState | None, course: Course) -> tuple[MissionState, Course] | Failure | None:  # noqa: D102
         state = state or MissionState()
         done = int(course.ends[-1])
-        if done >= self.last or (self.history is None and not math.isnan(course.reached)):
+        if self.history is None and not math.isnan(course.reached):
+            return self._unstable_behind(state, course)
+        if done >= self.last:
             return None
         longest = min(self.last - done, self.mission.largest_step or self.last)
         # a step over more than one extrapolates from three nodes
@@ -113,17 +115,34 @@ class MissionProblem:
         """As in SteppedProblem: a mission that fails by itself ends the history."""
         return self._failure
 
+    def _unstable_behind(self, state: MissionState, course: Course) -> Failure | None:
+        """Instability behind the mission with which a history has reached its target, None if stable."""
+        done = int(course.ends[-1])
+        if self._tests(done):
+            return None
+        self._sweeps, depth = list(state.sweeps), course.depths[-1].reshape(-1, self.mission.area.size).sum(axis=0)
+        behind = self._mission(state, done + 1, depth, False, tests=True)
+        if not isinstance(behind, Failure) and all(math.isfinite(each.inaccurate) for each in behind):
+            return None
+        unknown = Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
+        return behind if isinstance(behind, Failure) else unknown
+
+    def _tests(self, number: int) -> bool:
+        """Whether stability is tested in a mission: as in a wear history, at the start and the end."""
+        return self.history is None and number in (1, self.mission.missions[-1])
+
     def _mission(
-        self, state: MissionState, number: int, depth: FloatArray, with_slopes: bool
+        self, state: MissionState, number: int, depth: FloatArray, with_slopes: bool, *, tests: bool = False
     ) -> tuple[BlockResult, ...] | Failure:
-        """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
+        """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m. tests: whether
+        stability is tested in any case.
+        """
         mission, before, budget = self.mission, state.end, self.run.budget
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.history is not None:
             course = self.history.course
             guides = course.nodes[int(np.searchsorted(course.counts, number))].guides
-        # as in a wear history: stability is tested at the start and the end
-        with_switching = self.history is None and number in (1, mission.missions[-1])
+        with_switching = tests or self._tests(number)
         results: list[BlockResult] = []
         for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, self._sweeps, strict=True)):
             run = run_passage if isinstance(block.frequency, Passage) else run_block

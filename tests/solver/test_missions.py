@@ -272,6 +272,21 @@ def test_a_target_ends_the_missions(exact_blocks):
     assert np.isnan(whole.missions_to_target)
 
 
+@pytest.mark.parametrize("outcome", [Outcome.UNSTABLE, Outcome.INACCURATE])
+def test_stability_is_tested_where_a_target_ends_the_missions(monkeypatch, outcome):
+    def run(case):
+        found = exact_run(case)
+        if not (case.with_switching and case.place == 0 and case.depth.any()):
+            return found
+        return Failure(outcome, "grows") if outcome is Outcome.UNSTABLE else replace(found, inaccurate=np.inf)
+
+    monkeypatch.setattr(integrating, "run_block", run)
+    history = exactly_known((0, 60), 1.0, until=WearTarget("wear_depth", 1e-7))
+    assert history.outcome is outcome
+    assert 1.0 < history.missions_to_target < 60.0
+    assert np.isfinite(history.missions_to_target_error)
+
+
 def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
     """And one that fails in a single mission ends the history there, with what was computed."""
 
