@@ -241,7 +241,7 @@ class WearProblem(WearingJoint):
             length = 2.0**doubling * shortest
             if state.cycle + length > self.limit:
                 break
-            end = attempt_step(self, state, length, "adaptive")
+            end = self.attempt(state, length)
             if end is not None and vibration_change(state.at, end.at) < SMOOTH_CHANGE:
                 return end
         self.run = before
