@@ -81,8 +81,8 @@ MOST_SAMPLES = 8192
 
 SAMPLES_OF_UNKNOWNS = 1024
 """Most samples of a period at the largest number of unknowns; more with fewer unknowns. Nine pairs of a blade that lift
-off at 2000 N: with 8192 samples the wear rate is no more accurate than with 2048. With 512, 79 harmonics of the dovetail
-with 16 pairs, which an `rtol` of 1e-3 needs, have too few samples."""
+off at 2000 N: with 8192 samples the wear rate is no more accurate than with 2048. With 512, too few for the
+79 harmonics of the dovetail with 16 pairs that an `rtol` of 1e-3 needs."""
 
 COMPARED_UNKNOWNS = 3 * MOST_UNKNOWNS // 2
 """Most unknowns of the balance of 48 pairs towards which steps are made to estimate an error."""

@@ -107,9 +107,9 @@ class Path(ABC, Generic[S]):
     def differs(self, before: S, after: S) -> float:
         """Relative change of the vibration between two states."""
 
-    def largest_change(self, *, sticks: bool) -> float:
-        """Largest relative change of the vibration in a step. sticks: whether no pair slips or opens at both ends."""
-        return LINEAR_CHANGE if sticks else float(np.clip(CHANGE_PER_RTOL * self.case.settings.rtol, *CHANGE_LIMITS))
+    def largest_change(self) -> float:
+        """Largest relative change of the vibration in a step, over which pairs leave their history to the next."""
+        return float(np.clip(CHANGE_PER_RTOL * self.case.settings.rtol, *CHANGE_LIMITS))
 
     def rests(self, _: S) -> bool:
         """Whether no pair slips or opens within the period, so that no history is left behind."""
@@ -217,11 +217,13 @@ class LoadingPath(Path[State]):
     def change(self, before: State, after: State) -> float:  # noqa: D102
         one, other = before.evaluation, after.evaluation
         if self.rests(before) and self.rests(after):
-            return vibration_change(one, other) / self.largest_change(sticks=True)
+            return vibration_change(one, other) / LINEAR_CHANGE
         limit = np.linalg.norm(friction_limit(self.case.friction_coefficient, one.force_h[:, 0, 0]))
         size = max(vibration_size(one), SMALL_VIBRATION * float(limit))
         moved = float(np.linalg.norm((other.predicted_h - one.predicted_h)[:, 1:]))
-        return moved / (size * self.largest_change(sticks=False))
+        # no history is handed on that a short step would make more accurate
+        forget = self.forgets(before) and self.forgets(after)
+        return moved / (size * (CHANGE_LIMITS[1] if forget else self.largest_change()))
 
     def differs(self, before: State, after: State) -> float:  # noqa: D102
         one, other = before.evaluation, after.evaluation

@@ -21,7 +21,7 @@ from solver.continuation.first_state import RELIEF, relieved_history, state_at_r
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import Failure, State, final_history
-from solver.loading_history.path import FREE_STEP, Path
+from solver.loading_history.path import FREE_STEP, LINEAR_CHANGE, Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
 from solver.newton.run import MOST_ITERATIONS, Bordered, Run
@@ -138,7 +138,7 @@ class NonlinearMode(Path[ModeState]):
 
     def change(self, before: ModeState, after: ModeState) -> float:  # noqa: D102
         sticks = all((state.evaluation.status_t == STICK).all() for state in (before, after))
-        return self.differs(before, after) / self.largest_change(sticks=sticks)
+        return self.differs(before, after) / (LINEAR_CHANGE if sticks else self.largest_change())
 
     def differs(self, before: ModeState, after: ModeState) -> float:
         """As in Path: of the vibrating predicted force per amplitude."""
