@@ -134,7 +134,7 @@ def response_curve(
         back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
         span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
         begun, run = State(at, balance.history, float(first)), Run(settings.tolerance)
-        arc = Arc(lambda parameter: Balance(path.joint_at(parameter), balance.history), begun, span, run)
+        arc = Arc(lambda parameter: Balance(path.joint_at(parameter), balance.history), path.slope, begun, span, run)
         branch = _follow_branch(arc, last, back, most, over_frequency)
     return _reported(path, branch, errors)
 

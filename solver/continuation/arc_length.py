@@ -9,11 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
-from solver.harmonic_balance.dlft import Balance, Linearisation
+from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.harmonic_balance.state import State
 from solver.model import FloatArray
 from solver.newton.run import Bordered, Run
-from solver.settings import DIFFERENCE
 
 FIRST_ARC = SMOOTH_CHANGE / 10.0
 """Length of the first step, in unknowns over the norm of the first predicted force; the longest is `SMOOTH_CHANGE`."""
@@ -37,10 +36,12 @@ FOLD_HALVINGS = 10
 class Arc:
     """A branch and its arc-length steps in scaled unknowns (p / size, parameter / span), with the history of its start.
 
-    balance_at: balance at a value of the parameter, with this history. span: natural length of the parameter.
+    balance_at: balance at a value of the parameter, with this history. slope: of the residual (n_rel, m), N, by the
+    parameter, at a fixed predicted force. span: natural length of the parameter.
     """
 
     balance_at: Callable[[float], Balance]
+    slope: Callable[[Balance, Evaluation], FloatArray]
     start: State
     span: float
     run: Run
@@ -81,14 +82,10 @@ class Arc:
         """State of the branch from an evaluation with the scaled parameter."""
         return State(here.at, self.start.history, float(here.values[0] * self.span))
 
-    def slope(self, state: State) -> FloatArray:
-        """Derivative (n_rel, m), N, of the residual by parameter / span, by a difference: enough for a direction."""
-        ahead = self.balance_at(state.parameter + DIFFERENCE * self.span).evaluate(state.evaluation.predicted_h)
-        return (ahead.residual - state.evaluation.residual) / DIFFERENCE
-
     def tangent(self, state: State, along: FloatArray) -> FloatArray | None:
         """Unit tangent of the branch, of the sign of a direction `along`; None where the tangent is not defined."""
-        steps = self.run.steps(self.balance_at(state.parameter), state.evaluation, [-self.slope(state)])
+        balance, at = self.balance_at(state.parameter), state.evaluation
+        steps = self.run.steps(balance, at, [-self.span * self.slope(balance, at)])
         tangent = np.append((steps / self.size).ravel(), 1.0)
         largest = float(np.abs(tangent).max())
         if not np.isfinite(largest):
@@ -163,7 +160,7 @@ class _Plane:
         return Bordered(balance, balance.evaluate(predicted_h), values, np.array([ahead]), extra=moved)
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
-        return [self.arc.slope(self.arc.state_of(here))], self.tangent[-1:, None]
+        return [self.arc.span * self.arc.slope(here.balance, here.at)], self.tangent[-1:, None]
 
     def by_step(self, _: Bordered, __: Linearisation, step: FloatArray) -> FloatArray:
         return np.array([self.tangent[:-1] @ step.ravel() / self.arc.size])

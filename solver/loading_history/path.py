@@ -17,8 +17,9 @@ from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refi
 from solver.accuracy.resolved_state import Estimate, ResolvedState, left_out, nothing_happens
 from solver.contact.coulomb import SEPARATED, SLIP, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
+from solver.continuation.phase_lag import frequency_derivative
 from solver.continuation.transient import relax_to_periodic
-from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, State, balance_after, transfer, vibration_change, vibration_size
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
@@ -168,6 +169,14 @@ class LoadingPath(Path[State]):
     def balance_from(self, parameter: float, state: State) -> Balance:
         """Unworn balance at a value of the parameter, after a state."""
         return balance_after(self.joint_at(parameter), state)
+
+    def slope(self, balance: Balance, at: Evaluation) -> FloatArray:
+        """Derivative (n_rel, m) of the residual by the parameter at a fixed predicted force, N s/rad or N."""
+        if self.omega is None:
+            return frequency_derivative(balance, at).force
+        slope = -self.case.joint(self.omega, self.excitation_amplitude).structure.force_h
+        slope[:, 0] = 0.0
+        return slope
 
     def ahead(self, parameter: float, length: float) -> float:  # noqa: D102
         if self.omega is None:

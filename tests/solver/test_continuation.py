@@ -14,6 +14,7 @@ from solver.continuation.phase_lag import phase_lag, rise_of_response, solve_at_
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, balance_after
+from solver.loading_history.path import LoadingPath
 from solver.newton.run import Bordered, Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
@@ -63,6 +64,23 @@ def test_natural_steps_end_before_a_fold_and_say_so():
     assert size(point) == pytest.approx(0.1, rel=0.02, abs=0.0)
 
 
+@pytest.mark.parametrize("over", ["frequency", "load"])
+@pytest.mark.parametrize("name", ["two_masses", "sdof_slider"])
+def test_the_slope_along_a_path_is_that_of_differences(name, over):
+    case, omega = build_case(scene(name), 0.5, 1.3, SolverSettings(5, 64)), 1.3
+    path, place = (LoadingPath(case, 20.0), omega) if over == "frequency" else (LoadingPath(case, 1.0, omega), 20.0)
+    state = first_point(case, omega, 20.0)
+    balance, length = Balance(path.joint_at(place), state.evaluation.history), 1e-5 * place
+    at = balance.evaluate(state.evaluation.predicted_h)
+    one, other = (
+        replace(balance, joint=path.joint_at(place + step)).evaluate(at.predicted_h).residual
+        for step in (-length, length)
+    )
+    difference = (other - one) / (2.0 * length)
+    # masses on rigid ground: a one-sided difference of the samples
+    assert np.abs(path.slope(balance, at) - difference).max() < 1e-5 * np.abs(difference).max()
+
+
 # --- relaxation in time ---
 
 FORCE = 0.02
@@ -89,10 +107,11 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
     start = first(0.03)
-    arc = Arc(lambda amplitude: Balance(joint_at(amplitude), start.history), start, 0.03, Run(1e-9))
+    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
+    path = LoadingPath(case, 1.0, WALL_OMEGA)
+    arc = Arc(lambda amplitude: Balance(joint_at(amplitude), start.history), path.slope, start, 0.03, Run(1e-9))
     passed = ((a, b) for a, b, _ in arc.steps(1.0) if (a.parameter - 0.03) * (b.parameter - 0.03) < 0.0)
     middle = next(filter(grows, (arc.state_at(a, b, 0.03) for a, b in passed)))
-    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
     found = relax_to_periodic(joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
     assert isinstance(found, State)
