@@ -3,8 +3,10 @@
 The difference of a history to its reference solution, pair by pair, is taken for the error. The reference solution
 starts from another sweep, with half of the nodes (`solver.loading_history`), and is coarser: twice the tolerance of
 the steps, the next lower harmonics and samples. These suffice for its states, as the history has one level more: else
-their error is what the difference shows. Given harmonics have many more beside them (`of_reference`). Where pairs stick
-again, a resonance passes or a branch ends, errors grow, and this difference with them; a sum of local errors does not.
+their error is what the difference shows. With the harmonics of the history, and their error added, volumes of mesh 2
+are known to 1 % at all points, but errors of depths and responses at 211.375 Hz are 0.3 to 0.4 of the true ones. Given
+harmonics have many more beside them (`of_reference`). Where pairs stick again, a resonance passes or a branch ends,
+errors grow, and this difference with them; a sum of local errors does not.
 
 A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
 with the same steps errs as they do: dovetail, 16 pairs, 212.5 Hz, where a pair only just slips: 1.89 mm3 with implicit
