@@ -18,9 +18,8 @@ from solver.newton.run import Bordered, Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
-from solver.structure.joint import build_case
 from tests.references import coulomb_orbit
-from tests.solver.models import first_point, scene
+from tests.solver.models import case_of, first_point, scene
 from tests.solver.reconstruction import full_motion
 
 # --- natural steps ---
@@ -32,7 +31,7 @@ GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)
 
 def wall(omega):
     """Vibro-impact along the excitation amplitude: joints, a state found from nothing, and the motion of the mass."""
-    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
+    case = case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
 
     def joint_at(amplitude):
         return case.joint(omega, amplitude)
@@ -72,7 +71,7 @@ NATURAL = np.sqrt(1.6e6)
 @pytest.mark.parametrize("omega", [0.3, 1.3])
 def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     orbit = coulomb_orbit([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2, omega)
-    case, idle = build_case(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros(1)
+    case, idle = case_of(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros(1)
     rest = first_point(case, omega, 0.0)
     quiet, joint = case.joint(omega, 0.0), case.joint(omega, 20.0)
     found = relax_to_periodic(joint, idle, rest, quiet, Run(1e-8))
@@ -92,7 +91,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     arc = Arc(lambda amplitude: Balance(joint_at(amplitude), start.history), start, 0.03, Run(1e-9))
     passed = ((a, b) for a, b, _ in arc.steps(1.0) if (a.parameter - 0.03) * (b.parameter - 0.03) < 0.0)
     middle = next(filter(grows, (arc.state_at(a, b, 0.03) for a, b in passed)))
-    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
+    case = case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
     found = relax_to_periodic(joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
     assert isinstance(found, State)
@@ -107,7 +106,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
     # the open joint is linear: Re(sum Y_n(t) exp(i n w t)) against the matrix exponential, of first order in the step
     model = scene("vibro_impact", gap=1e3)
     omega, end = 1.3, 2.0
-    case = build_case(model, 0.0, omega, SolverSettings(2, 32))
+    case = case_of(model, 0.0, omega, SolverSettings(2, 32))
     joint = case.joint(omega, FORCE)
     flow = np.array([[0.0, 1.0, 0, 0], [-1.0, -0.05, FORCE, 0], [0, 0, 0, -omega], [0, 0, omega, 0]])
     exact = (expm(flow * end) @ np.array([0.01, 0.0, 1.0, 0.0]))[0]
@@ -132,7 +131,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
 
 def test_a_motion_that_has_not_settled_within_its_effort_is_unsettled(monkeypatch):
     model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(5, 64)
-    case = build_case(model, 0.3, 0.8 * NATURAL, settings)
+    case = case_of(model, 0.3, 0.8 * NATURAL, settings)
     quiet, joint = case.joint(0.8 * NATURAL, 0.0), case.joint(0.8 * NATURAL, 10.0)
     idle = np.zeros(1)
     rest = first_point(case, 0.8 * NATURAL, 0.0)
@@ -156,7 +155,7 @@ LAG_OMEGA = 2.0 * math.pi * 190.0
 def slider_state(gain=0.0, damping=20.0, friction=0.5):
     """The slider at 190 Hz. gain: m/J, growth of the depth."""
     model = scene("sdof_slider", damping=damping)
-    case = build_case(model, friction, LAG_OMEGA, TIGHT)
+    case = case_of(model, friction, LAG_OMEGA, TIGHT)
     joint = case.joint(LAG_OMEGA, 10.0)
     balance = Balance(joint, np.zeros((1, 2)), np.zeros(1), np.full(1, gain))
     start = balance.predict(np.zeros((1, 3, 7)), np.zeros((1, 3, 7)))
