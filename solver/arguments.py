@@ -58,9 +58,8 @@ def check_friction(model: ReducedModel, given: ArrayLike | None) -> ReducedModel
     """The model, which must be one, with the friction of its pairs, as `with_friction`."""
     if not isinstance(model, ReducedModel):
         raise ValueError(f"model: give what build_scene, read_scene or build_model gives, instead of {model!r}")
-    return with_friction(
-        model, None if given is None else np.squeeze(check_numbers("friction_coefficient", given, least=0.0))
-    )
+    friction = None if given is None else np.squeeze(check_numbers("friction_coefficient", given, least=0.0))
+    return with_friction(model, friction)
 
 
 def check_kind(name: str, given: object, kind: type) -> None:

@@ -181,6 +181,7 @@ class ReducedModel:
 def with_friction(model: ReducedModel, coefficient: ArrayLike | None) -> ReducedModel:
     """The model with the friction coefficient of its pairs, from one number or (n_contact,); None for its own.
 
+    Set once, where a user or a study gives both; what computes reads `contact.friction`.
     Raises ValueError where it is given twice, not at all, or not for each pair.
     """
     own, n_contact = model.contact.friction_coefficient, model.contact.n_contact

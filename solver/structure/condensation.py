@@ -121,14 +121,14 @@ def _condensed(
 ) -> CondensedStructure:
     """As `build_structure`, from the structure of each harmonic, the static one included."""
     still, first, at = structures[0], structures[min(1, len(orders))], np.array(relative, np.intp)
-    n, n_rel = len(still.mass), at.size
+    n_rel, parts = at.size, (still.mass, still.damping, still.stiffness, still.response)
+    alike = all(each is still for each in structures) and not any(np.iscomplexobj(part) for part in parts)
     # not where much lies behind the joint: a `SharedStiffness` has to read that, too
-    shares = 16 * len(orders) * n_rel**2 > DENSE_BYTES and n <= 2 * n_rel
-    real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
+    shares = alike and 16 * len(orders) * n_rel**2 > DENSE_BYTES and len(still.mass) <= 2 * n_rel
     rates, load = omega * np.array(orders, np.float64), excitation_amplitude * first.load_harmonic
     with regular(f"at {omega / (2.0 * np.pi):.6g} Hz, at one of its harmonics, or at rest"):
         static_stiffness, static_force, static_response, static_offset = _static(still, relative)
-        if shares and real and all(each is still for each in structures):
+        if shares:
             moving, force, rows, offset = _condense_shared(still, at, rates, load)
         else:
             moving, force, rows, offset = _condense_each(structures, at, rates, orders, load)

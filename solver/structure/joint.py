@@ -129,10 +129,7 @@ class Case:
 
 
 def build_case(
-    model: ReducedModel,
-    omega: float,
-    settings: SolverSettings,
-    resolution: Resolution | None = None,
+    model: ReducedModel, omega: float, settings: SolverSettings, resolution: Resolution | None = None
 ) -> Case:
     """Case of a model with friction.
 

@@ -168,8 +168,7 @@ class WearState:
 class WearingJoint:
     """The joint of one wear history.
 
-    case: model and settings, with the resolution of the start. start: unworn state, which exists; its load is
-        that of the history.
+    case: with the resolution of the start. start: unworn state, which exists; its load is that of the history.
     wearing_work: of the pairs by the wear law. area (n_contact,): m2.
     shifts: whether the target is a shift of the resonance, which each state then reports.
     run: counts the iterations, limits the time, and has a factorisation from one solve to the next. A fresh one lets

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from solver import march_wear, with_contact_stiffness
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS as LARGEST
-from solver.model import needed_nodal_diameters
+from solver.model import needed_nodal_diameters, with_friction
 from solver.modes.modal_model import LinearMode, modal_model
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, condense, frequency_slope
@@ -121,6 +121,8 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     shared = build_structure(model, OMEGA, AMPLITUDE, orders)
     assert isinstance(each.moving, DenseStiffness)
     assert isinstance(shared.moving, SharedStiffness)
+    # one for all coefficients of friction
+    assert build_structure(with_friction(model, 0.5), OMEGA, AMPLITUDE, orders) is shared
     # another first harmonic shares none
     modal = modal_model(model, LinearMode(OMEGA, np.eye(len(model.linear[0].mass))[0], 0.0), 0.0)
     assert isinstance(build_structure(modal, OMEGA, AMPLITUDE, orders).moving, DenseStiffness)
