@@ -7,10 +7,9 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.model import FloatArray, ReducedModel
+from solver.model import FloatArray, ReducedModel, with_friction
 from solver.outcome import check
 from solver.settings import Direction, SolverSettings
-from solver.structure.joint import friction_of_pairs
 
 
 def check_case(
@@ -19,12 +18,12 @@ def check_case(
     friction_coefficient: ArrayLike | None,
     sweep: Direction,
     settings: SolverSettings | None,
-) -> tuple[float, FloatArray | None, SolverSettings]:
-    """Checked excitation amplitude, friction coefficient and settings."""
+) -> tuple[ReducedModel, float, SolverSettings]:
+    """The model with its friction, checked excitation amplitude and settings."""
     load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
-    friction = check_friction(model, friction_coefficient)
+    rough = check_friction(model, friction_coefficient)
     check_word("sweep", sweep, get_args(Direction))
-    return load, friction, check_settings(model, settings)
+    return rough, load, check_settings(model, settings)
 
 
 def check_settings(model: ReducedModel, given: SolverSettings | None) -> SolverSettings:
@@ -55,13 +54,12 @@ def worn_model(model: ReducedModel, wear_depth: ArrayLike | None) -> ReducedMode
     return replace(model, contact=replace(model.contact, gap=model.contact.gap + depth))
 
 
-def check_friction(model: ReducedModel, given: ArrayLike | None) -> FloatArray | None:
-    """One number (), one for each pair (n_contact,), or None for those of the model, which must be one."""
+def check_friction(model: ReducedModel, given: ArrayLike | None) -> ReducedModel:
+    """The model, which must be one, with the friction of its pairs, as `with_friction`."""
     if not isinstance(model, ReducedModel):
         raise ValueError(f"model: give what build_scene, read_scene or build_model gives, instead of {model!r}")
     friction = None if given is None else np.squeeze(check_numbers("friction_coefficient", given, least=0.0))
-    friction_of_pairs(model, friction)
-    return friction
+    return with_friction(model, friction)
 
 
 def check_kind(name: str, given: object, kind: type) -> None:

@@ -120,12 +120,12 @@ def frequency_response(
     and where friction coefficients are given twice, not at all, or not to each pair.
     """
     wanted = check_numbers("frequency", frequency, above=0.0)
-    load, friction, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    model, load, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found = dict(FrequencySweep(model, friction, load, sweep, settings).states(ascending))
+    found = dict(FrequencySweep(model, load, sweep, settings).states(ascending))
     starts = [found[index] for index in place.tolist()]
-    response, peak, outcome, message = zip(*(_read(model, friction, settings, start) for start in starts), strict=True)
+    response, peak, outcome, message = zip(*(_read(model, settings, start) for start in starts), strict=True)
     return FrequencyResponse(
         frequency=wanted,
         response=np.array(response),
@@ -139,14 +139,14 @@ def frequency_response(
 
 
 def _read(
-    model: ReducedModel, friction: FloatArray | None, settings: SolverSettings, start: StartState
+    model: ReducedModel, settings: SolverSettings, start: StartState
 ) -> tuple[ComplexArray, FloatArray, Outcome, str]:
     """Response, peak, outcome and message of a point, as in `FrequencyResponse`."""
     state, outcome, message = start.state, start.outcome, start.message
     if state is None:
         nothing = np.full(len(model.response_names), np.nan)
         return nothing.astype(np.complex128), nothing, outcome, message
-    case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
+    case = build_case(model, start.penalty_omega, settings, start.resolution)
     joint = case.joint(state.omega, state.excitation_amplitude)
     at = evaluated(joint, state)[1]
     pressure = state.contact_force_h[:, 0, 0] / model.contact.area
@@ -175,26 +175,21 @@ def balance_of(
     All other parameters and errors as in `frequency_response`.
     """
     wanted = check_number("frequency", frequency, above=0.0)
-    load, friction, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
-    start, _, balance, at = balance_at_start(worn_model(model, wear_depth), friction, load, wanted, sweep, settings)
+    model, load, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    start, _, balance, at = balance_at_start(worn_model(model, wear_depth), load, wanted, sweep, settings)
     unknown = np.full((balance.joint.component_index.size, len(balance.joint.basis.synthesis)), np.nan)
     return functions_of(balance, unknown if at is None else at.predicted_h, start.outcome, start.message)
 
 
 def balance_at_start(
-    model: ReducedModel,
-    friction: FloatArray | None,
-    load: float,
-    frequency: float,
-    sweep: Direction,
-    settings: SolverSettings,
+    model: ReducedModel, load: float, frequency: float, sweep: Direction, settings: SolverSettings
 ) -> tuple[StartState, Case, Balance, Evaluation | None]:
     """State to which a sweep comes at a frequency, Hz, with its case, its balance and its evaluation. Where there is no
     state, the evaluation is None, and the balance has no history.
     """
-    ((_, start),) = FrequencySweep(model, friction, load, sweep, settings).states(np.array([frequency]))
+    ((_, start),) = FrequencySweep(model, load, sweep, settings).states(np.array([frequency]))
     fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)
-    case = build_case(model, friction, start.penalty_omega, fixed, start.resolution)
+    case = build_case(model, start.penalty_omega, fixed, start.resolution)
     joint = case.joint(2.0 * np.pi * frequency, load)
     if start.state is None:
         return start, case, Balance(joint, np.zeros((model.contact.n_contact, joint.law.n_history))), None

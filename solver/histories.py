@@ -28,7 +28,6 @@ from solver.settings import (
     ToTheEnd,
     WearTarget,
 )
-from solver.structure.joint import friction_of_pairs
 from solver.wear.history import integrate_together
 from solver.wear.wearing_joint import WearRequest, steps_of
 
@@ -79,7 +78,7 @@ def march_wear(
     needs a step that is not given; where the law does not fit, or is a "table", whose factors depend on the depth, and
     `wear_depth` is given.
     """
-    load, friction, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    model, load, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     at, follow = _check_frequency(frequency, between, sweep, scheme)
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
     to_the_end = np.ndim(cycles) == 0 and cycles == math.inf
@@ -102,12 +101,12 @@ def march_wear(
     check("wear_depth", counted, 'give another law: the factors of a "table" depend on depths that count from 0')
     model = worn_model(model, wear_depth)
     # a law that does not fit the pairs is an error of the caller: raise it before the computation
-    wearing_work(law, model.contact, friction_of_pairs(model, friction))
-    _, start = next(FrequencySweep(model, friction, load, sweep, settings).states(follow or np.array([at])))
+    wearing_work(law, model.contact)
+    _, start = next(FrequencySweep(model, load, sweep, settings).states(follow or np.array([at])))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     steps = steps_of(scheme, length)
     request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
-    return next(integrate_together(model, friction, settings, start, (request,)))
+    return next(integrate_together(model, settings, start, (request,)))
 
 
 def _check_frequency(
@@ -168,7 +167,8 @@ def integrate_mission(
     check_kind("law", law, WearLaw)
     checked = tuple(_checked(block, place, settings, law) for place, block in enumerate(blocks))
     for place, block in enumerate(checked):
-        reason = _does_not_follow(checked[place - 1], block)
+        one_model = blocks[place - 1].model is blocks[place].model
+        reason = _does_not_follow(checked[place - 1], block, one_model=one_model)
         check(_called(place, block), not reason, reason)
     counts = check_numbers("missions", missions, least=0.0)
     right = (np.diff(counts) > 0.0).all() and (counts == np.round(counts)).all() and counts[-1] >= 1.0
@@ -190,8 +190,8 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
     try:
         check_word("begin", block.way, get_args(Begin))
         given = block.model, block.excitation_amplitude, block.friction_coefficient
-        load, friction, _ = check_case(*given, "up", settings)
-        wearing_work(law, block.model.contact, friction_of_pairs(block.model, friction))
+        model, load, _ = check_case(*given, "up", settings)
+        wearing_work(law, model.contact)
         if block.way == "continue":
             # the way from another amplitude is a ramp of this one
             check_number("excitation_amplitude", load, above=0.0)
@@ -205,13 +205,17 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
             raise ValueError("cycles: missing: only a passage has cycles of its own")
         else:
             at, cycles = check_number("frequency", at, above=0.0), check_number("cycles", cycles, above=0.0)
-        return replace(block, excitation_amplitude=load, friction_coefficient=friction, frequency=at, cycles=cycles)
+        block = replace(block, model=model, friction_coefficient=None)
+        return replace(block, excitation_amplitude=load, frequency=at, cycles=cycles)
     except ValueError as error:
         raise ValueError(f"{_called(place, block)}: {error}") from error
 
 
-def _does_not_follow(before: Block, block: Block) -> str:
-    """Why a block does not have the pairs of the block before, or cannot continue it; else ""."""
+def _does_not_follow(before: Block, block: Block, *, one_model: bool) -> str:
+    """Why a block does not have the pairs of the block before, or cannot continue it; else "".
+
+    one_model: whether both were given the same model.
+    """
     one, other = before.model.contact, block.model.contact
     same = one.n_contact == other.n_contact and (one.area == other.area).all() and one.surface == other.surface
     if not same or ((one.dofs < 0) != (other.dofs < 0)).any():
@@ -222,8 +226,7 @@ def _does_not_follow(before: Block, block: Block) -> str:
         return ""
     if before.excitation_amplitude == 0.0:
         return "begin: the block before does not vibrate: begin with a ramp"
-    friction = [friction_of_pairs(each.model, each.friction_coefficient) for each in (before, block)]
-    if before.model is block.model and (friction[0] == friction[1]).all():
+    if one_model and (one.friction == other.friction).all():
         return ""
     return 'begin: continue goes with the model and friction of the block before: give "ramp", "up" or "down"'
 

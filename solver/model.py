@@ -1,12 +1,12 @@
 """The model of a joint: a reduced linear structure and the contact pairs on it. All values are in SI units."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -44,7 +44,7 @@ class ContactInterface(_ByRows):
     - area (n_contact,): weight alpha of the pair, m2, Eq. (7). gap (n_contact,): initial gap, m.
     - normal_load (n_contact,): constant normal force, N, compression positive, of pairs without a closing displacement.
     - position (n_contact, 3): m, NaN where unknown. surface: label of each pair, e.g. "intrados".
-    - friction_coefficient (n_contact,): None where the study gives it.
+    - friction_coefficient (n_contact,): None until it is given (`with_friction`).
     - edge (n_contact,): True for pairs at which the modelled contact ends but the bodies continue: load or wear of such
       a pair shows that the contact is cut off. None where the bodies end with their pairs.
     - laws: of pairs that do not rub and open; each pair belongs to one at most.
@@ -78,6 +78,12 @@ class ContactInterface(_ByRows):
     def rubs(self) -> BoolArray:
         """False (n_contact,) for pairs with a law of `laws`."""
         return ~np.isin(np.arange(self.n_contact), [pair for law in self.laws for pair in law.pairs])
+
+    @cached_property
+    def friction(self) -> FloatArray:
+        """Friction coefficient (n_contact,), which the model has; 0 of pairs with a law of `laws`."""
+        assert self.friction_coefficient is not None
+        return np.where(self.rubs, self.friction_coefficient, 0.0)
 
     @cached_property
     def has_normal(self) -> BoolArray:
@@ -170,6 +176,23 @@ class ReducedModel:
         """Whether the scene has the nodal diameters of all harmonics 0..n_harmonics."""
         wanted = needed_nodal_diameters(self.nodal_diameter, self.n_sectors, n_harmonics)
         return all(k in self.linear for k in wanted)
+
+
+def with_friction(model: ReducedModel, coefficient: ArrayLike | None) -> ReducedModel:
+    """The model with the friction coefficient of its pairs, from one number or (n_contact,); None for its own.
+
+    Set once, where a user or a study gives both; what computes reads `contact.friction`.
+    Raises ValueError where it is given twice, not at all, or not for each pair.
+    """
+    own, n_contact = model.contact.friction_coefficient, model.contact.n_contact
+    if own is None and coefficient is None:
+        raise ValueError("friction_coefficient is missing: the scene has none of its own")
+    if own is not None and coefficient is not None:
+        raise ValueError("friction_coefficient is given twice: the scene has one of each pair, give None")
+    given = np.asarray(coefficient if own is None else own, np.float64)
+    if given.shape not in ((), (n_contact,)):
+        raise ValueError(f"friction_coefficient has shape {given.shape}: give a number or shape ({n_contact},)")
+    return replace(model, contact=replace(model.contact, friction_coefficient=np.full(n_contact, given)))
 
 
 def needed_nodal_diameters(nodal_diameter: int, n_sectors: int, n_harmonics: int) -> tuple[int, ...]:

@@ -74,7 +74,7 @@ def backbone(
     All others, and ValueError, as in `frequency_response`. The harmonic load of the model is not used.
     """
     wanted = check_numbers("amplitude", amplitude, above=0.0)
-    friction = check_friction(model, friction_coefficient)
+    model = check_friction(model, friction_coefficient)
     check_word("sweep", sweep, get_args(Direction))
     settings = check_settings(model, settings)
     whole = not isinstance(mode, bool) and int(mode) == mode and mode >= 1
@@ -82,7 +82,7 @@ def backbone(
     check("model", not model.contact.laws, "give one all pairs of which rub and open: modes know no other law")
     worn = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found = dict(follow_mode(worn, friction, ascending, int(mode), sweep, settings))
+    found = dict(follow_mode(worn, ascending, int(mode), sweep, settings))
     columns: dict[str, Any] = {}
     for name in (field.name for field in fields(Backbone) if field.name != "amplitude"):
         values = [getattr(found[index], name) for index in place.tolist()]

@@ -123,9 +123,9 @@ def response_curve(
     check(both, first != last, "give two different numbers as first and last value")
     most = int(check_number("most_points", most_points, least=2.0))
     sweep: Direction = ("up" if first < last else "down") if over_frequency else "ramp"
-    load, friction, settings = check_case(model, loads[0], friction_coefficient, sweep, settings)
+    model, load, settings = check_case(model, loads[0], friction_coefficient, sweep, settings)
     worn, omega = worn_model(model, wear_depth), float(omegas[0])
-    start, case, balance, at = balance_at_start(worn, friction, load, omega / (2.0 * np.pi), sweep, settings)
+    start, case, balance, at = balance_at_start(worn, load, omega / (2.0 * np.pi), sweep, settings)
     path = LoadingPath(case, load) if over_frequency else LoadingPath(case, 1.0, omega)
     if at is None:
         branch: _Branch = [], [], start.outcome, start.message

@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 
 from solver.continuation.first_state import solve_static_state
 from solver.harmonic_balance.state import Failure, State
-from solver.model import FloatArray, ReducedModel
+from solver.model import FloatArray, ReducedModel, with_friction
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
@@ -189,7 +189,7 @@ def law_errors(joint: Joint, point: State) -> dict[str, float]:
     Lengths are relative to the largest displacement or gap, forces to the largest force.
     """
     at = point.evaluation
-    force, moved, friction = at.force_h[:, :, 0], at.displacement_h[:, :, 0], joint.friction_coefficient
+    force, moved, friction = at.force_h[:, :, 0], at.displacement_h[:, :, 0], joint.contact.friction
     gap = joint.contact.gap + at.wear_depth
     condensed = joint.structure
     largest_force = max(np.abs(force).max(), np.abs(condensed.force_h[:, 0]).max(), 1e-300)
@@ -216,7 +216,7 @@ def law_errors(joint: Joint, point: State) -> dict[str, float]:
 def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
     """Whether there is a static state (a key of `EXPECTED`), what the solver says, and the errors of the laws."""
     settings = SolverSettings()
-    joint = build_case(deck.model, deck.friction, OMEGA, settings).joint(OMEGA, 0.0)
+    joint = build_case(with_friction(deck.model, deck.friction), OMEGA, settings).joint(OMEGA, 0.0)
     structure = joint.structure
     possible = equilibrium_possible(structure.static_stiffness, structure.force_h[:, 0], deck.friction)
     exists = {True: "possible", False: "impossible", None: "at the limit"}[possible]
@@ -228,7 +228,7 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float]]:
 
 def static_forces(model: ReducedModel, friction: float | None) -> FloatArray:
     """Contact forces (n_contact, 3), N, of the static state, in which all laws hold: compression positive."""
-    joint = build_case(model, friction, OMEGA, SolverSettings()).joint(OMEGA, 0.0)
+    joint = build_case(with_friction(model, friction), OMEGA, SolverSettings()).joint(OMEGA, 0.0)
     point = solve_static_state(joint, Run(1e-9))
     assert isinstance(point, State), f"no static state at a friction coefficient of {friction}"
     errors = law_errors(joint, point)

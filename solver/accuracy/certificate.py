@@ -83,7 +83,7 @@ NOT_CERTIFIED = Certificate(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
 
 def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     """Certificate of an evaluated state, without truncation errors and stability, which need other states."""
-    force_t, friction, law = evaluation.force_t, joint.friction_coefficient, joint.law
+    force_t, friction, law = evaluation.force_t, joint.contact.friction, joint.law
     rubs = (evaluation.status_t != OTHER).all(axis=1)
     largest = force_t[:, 0].max(axis=1, initial=0.0) * rubs
     normal = float(largest.max(initial=0.0))

@@ -177,10 +177,8 @@ class ContactLaw:
         return self._each(lambda each, part: each.beyond_series(part, self._part(each, series_t)), at)
 
 
-def build_law(
-    penalty: Penalty, friction_coefficient: FloatArray, contact: ContactInterface, basis: FourierBasis, omega: float
-) -> ContactLaw:
-    """The law of a joint at omega, rad/s. friction_coefficient: (n_contact,)."""
+def build_law(penalty: Penalty, contact: ContactInterface, basis: FourierBasis, omega: float) -> ContactLaw:
+    """The law of a joint at omega, rad/s."""
     makers: list[tuple[Callable[..., Element], IntArray]] = [
         (CoulombPairs, np.flatnonzero(contact.rubs & ~penalty.inertial)),
         (SlidingMasses, np.flatnonzero(penalty.inertial)),
@@ -188,7 +186,7 @@ def build_law(
     ]
     return ContactLaw(
         tuple(
-            make(at, penalty.at(at), friction_coefficient[at], contact.dofs[at], basis, omega)
+            make(at, penalty.at(at), contact.friction[at], contact.dofs[at], basis, omega)
             for make, at in makers
             if at.size
         )

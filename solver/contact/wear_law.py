@@ -213,14 +213,14 @@ ARCHARDS_WORK = WearingWork()
 """All slip work wears."""
 
 
-def wearing_work(law: WearLaw, contact: ContactInterface, friction_coefficient: FloatArray) -> WearingWork:
-    """The wearing work of the pairs of a joint. friction_coefficient: (n_contact,).
+def wearing_work(law: WearLaw, contact: ContactInterface) -> WearingWork:
+    """The wearing work of the pairs of a joint.
 
     Raises ValueError where the surfaces of the law are not those of the pairs.
     """
     factor = surface_factors(contact.surface, law.surfaces) if law.surfaces else 1.0
     if law.name == "energy":
-        factor = factor * friction_coefficient
+        factor = factor * contact.friction
     least, table = law.threshold * contact.area if law.name == "threshold" else 0.0, None
     if law.table is not None:
         pressure, depth, values = (np.array(part) for part in (law.table.pressure, law.table.depth, law.table.factor))

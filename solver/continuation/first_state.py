@@ -100,7 +100,7 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
     The motion is that without friction; friction acts against it with its first harmonic, 4 / pi times its limit.
     """
     structure, at, rows = balance.joint.structure, rest.evaluation, balance.joint.contact.pair_rows
-    load, limit = structure.harmonic_force, friction_limit(balance.joint.friction_coefficient, at.force_h[:, 0, 0])
+    load, limit = structure.harmonic_force, friction_limit(balance.joint.contact.friction, at.force_h[:, 0, 0])
     pushed = np.where(rows >= 0, load[rows], 0.0)
     if (np.linalg.norm(pushed[:, 1:], axis=1) <= limit).any():
         return None

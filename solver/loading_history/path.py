@@ -227,7 +227,7 @@ class LoadingPath(Path[State]):
         one, other = before.evaluation, after.evaluation
         if self.rests(before) and self.rests(after):
             return vibration_change(one, other) / LINEAR_CHANGE
-        limit = np.linalg.norm(friction_limit(self.case.friction_coefficient, one.force_h[:, 0, 0]))
+        limit = np.linalg.norm(friction_limit(self.case.model.contact.friction, one.force_h[:, 0, 0]))
         size = max(vibration_size(one), SMALL_VIBRATION * float(limit))
         moved = float(np.linalg.norm((other.predicted_h - one.predicted_h)[:, 1:]))
         # no history is handed on that a short step would make more accurate

@@ -46,7 +46,7 @@ OTHER_START = Resolution((1,), 64)
 class FrequencySweep:
     """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
-    friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
+    excitation_amplitude: N.
     keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
         position and the activity of the sweep, in words.
     with_switching: for which states stability is tested, as in `find_instability`.
@@ -57,7 +57,6 @@ class FrequencySweep:
     """
 
     model: ReducedModel
-    friction_coefficient: float | FloatArray | None
     excitation_amplitude: float
     direction: Direction
     settings: SolverSettings
@@ -171,7 +170,7 @@ class FrequencySweep:
     def _new_sweep(self, cell: int, omega: float | None) -> Sweep[State]:
         """A sweep before its first node. omega: of a ramp, rad/s, else None."""
         # the penalty belongs to the upper end of the cell
-        case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * edge_of(cell + 1), self.settings)
+        case = build_case(self.model, 2.0 * np.pi * edge_of(cell + 1), self.settings)
         path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
         budget, sign = Budget(deadline=of.deadline, report=of.report), -1.0 if self.direction == "down" else 1.0
         self.cell, self.omega = cell, omega

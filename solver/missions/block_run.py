@@ -140,15 +140,14 @@ class BlockInput:
     def sweeps(self, direction: Direction, amplitude: float) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N."""
         settings = replace(self.mission.settings, time_limit=self.deadline - computing_time())
-        sweeps = FrequencySweep(self.model, self.block.friction_coefficient, amplitude, direction, settings)
+        sweeps = FrequencySweep(self.model, amplitude, direction, settings)
         sweeps.with_switching = self.with_switching
         sweeps.set_deadline(self.deadline)
         return sweeps
 
     def case_of(self, start: StartState) -> Case:
         """The case at the depth before the block, with harmonics, samples and penalty of a state."""
-        friction = self.block.friction_coefficient
-        return build_case(self.model, friction, start.penalty_omega, self.mission.settings, start.resolution)
+        return build_case(self.model, start.penalty_omega, self.mission.settings, start.resolution)
 
     def wearing_joint(self, start: StartState) -> tuple[WearingJoint, WearState]:
         """The joint at the depth before the block, and a state of it."""

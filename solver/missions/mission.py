@@ -54,6 +54,7 @@ class Block:
 class MissionRequest:
     """Blocks in order, at least one, repeated a number of times. Arguments as of `solver.integrate_mission`.
 
+    - blocks: with the friction in their models.
     - missions (n_output,): ascending whole numbers of missions at which the history is reported, the first 0.
     - first: how the first mission begins where its first block continues.
     """

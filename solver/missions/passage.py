@@ -38,7 +38,6 @@ from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, absolute
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
-from solver.structure.joint import friction_of_pairs
 from solver.wear.slow_time import RTOL_RATIO, Guide
 from solver.wear.step import rate_slope
 
@@ -247,10 +246,9 @@ def delay_of(given: BlockInput, states: Sequence[SweptState]) -> tuple[float, fl
     """
     largest = max(states, key=lambda state: float(np.abs(state.response).max())).start.state
     assert largest is not None
-    friction = friction_of_pairs(given.block.model, given.block.friction_coefficient)
-    closed = largest.contact_force_h[:, 0, 0] > 0.0
-    joints = ((closed, friction), (closed, 0.0 * friction), (np.zeros_like(closed), friction))
-    modes = (linear_mode(given.block.model, *joint, near=largest.omega) for joint in joints)
+    model, closed = given.block.model, largest.contact_force_h[:, 0, 0] > 0.0
+    joints = ((closed, True), (closed, False), (np.zeros_like(closed), False))
+    modes = (linear_mode(model, held, sticking=sticking, near=largest.omega) for held, sticking in joints)
     mode = next((found for found in modes if found is not None), None)
     if mode is None:
         return 0.0, 0.0

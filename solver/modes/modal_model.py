@@ -16,7 +16,7 @@ from typing import cast
 import numpy as np
 import scipy.linalg
 
-from solver.model import BoolArray, FloatArray, LinearModel, Matrix, ReducedModel
+from solver.model import BoolArray, LinearModel, Matrix, ReducedModel
 from solver.settings import NEGLIGIBLE
 from solver.structure.condensation import regular
 
@@ -33,15 +33,16 @@ class LinearMode:
 
 
 def linear_mode(
-    model: ReducedModel, closed: BoolArray, friction: FloatArray, *, number: int = 1, near: float | None = None
+    model: ReducedModel, closed: BoolArray, *, sticking: bool = True, number: int = 1, near: float | None = None
 ) -> LinearMode | None:
     """A mode of the joint, rigid motions left out; None where the joint has fewer modes.
 
-    closed, friction (n_contact,): pairs held in the normal direction, and in the tangential ones with friction above 0.
+    closed (n_contact,): pairs held in the normal direction; sticking: those with friction in the tangential ones, too.
     number: from 1 on in ascending frequency. near: rad/s; the mode nearest to a frequency instead.
     """
     linear, dofs = model.harmonic_structure(1), model.contact.dofs
-    held = np.concatenate([dofs[closed, 0], dofs[closed & (friction > 0.0), 1:].ravel()])
+    stuck = closed & (model.contact.friction > 0.0) if sticking else np.zeros_like(closed)
+    held = np.concatenate([dofs[closed, 0], dofs[stuck, 1:].ravel()])
     free = np.setdiff1d(np.arange(len(linear.mass)), held)
     if not free.size:
         return None

@@ -30,7 +30,7 @@ from solver.packing import packable
 from solver.results.state_report import first_motion
 from solver.settings import DIFFERENCE, Resolution, SolverSettings
 from solver.structure.fourier import from_complex
-from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
+from solver.structure.joint import Case, Joint, build_case
 
 FIRST_AMPLITUDE = 1e-6
 """First amplitude of a joint without static normal forces, m sqrt(kg)."""
@@ -250,7 +250,7 @@ class Rest:
     def first_amplitude(self) -> float:
         """Amplitude, m sqrt(kg), of the first node: the vibration is far too small for slip or separation."""
         case, normal_force = self.mode.case, self.state.evaluation.force_h[:, 0, 0]
-        limit = np.linalg.norm(friction_limit(case.friction_coefficient, normal_force))
+        limit = np.linalg.norm(friction_limit(case.model.contact.friction, normal_force))
         force = np.linalg.norm(case.joint(self.mode.linear.omega, 1.0).structure.force_h[:, 1:])
         return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
 
@@ -281,27 +281,20 @@ class Rest:
         return None
 
 
-def find_rest(
-    model: ReducedModel,
-    friction_coefficient: float | FloatArray | None,
-    number: int,
-    settings: SolverSettings,
-    run: Run,
-) -> Rest | Failure:
+def find_rest(model: ReducedModel, number: int, settings: SolverSettings, run: Run) -> Rest | Failure:
     """The joint at rest and its linear mode, or why there is none.
 
     number: among the linear modes with sticking pairs; of a joint with fewer such modes, among those with sliding ones.
     """
-    friction = friction_of_pairs(model, friction_coefficient)
-    closed, omega = np.ones(friction.size, bool), None
+    closed, omega = np.ones(model.contact.n_contact, bool), None
     # first with all pairs closed, then with those that the static load closes
     while True:
-        glued = linear_mode(model, closed, friction, number=number)
-        linear = glued or linear_mode(model, closed, 0.0 * friction, number=number)
+        glued = linear_mode(model, closed, number=number)
+        linear = glued or linear_mode(model, closed, sticking=False, number=number)
         if linear is None:
             return Failure(Outcome.START_FAILED, f"mode = {number}: the loaded joint has fewer linear modes")
         # without the spring on the modal coordinate the held structure is singular at its own frequency
-        case = build_case(modal_model(model, linear, 0.0), friction_coefficient, omega or linear.omega, settings)
+        case = build_case(modal_model(model, linear, 0.0), omega or linear.omega, settings)
         rest = state_at_rest(case, linear.omega, run)
         if isinstance(rest, Failure):
             return rest

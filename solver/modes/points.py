@@ -62,19 +62,14 @@ class ModePoint(Ended):
 
 
 def follow_mode(
-    model: ReducedModel,
-    friction_coefficient: float | FloatArray | None,
-    amplitudes: FloatArray,
-    number: int,
-    direction: Direction,
-    settings: SolverSettings,
+    model: ReducedModel, amplitudes: FloatArray, number: int, direction: Direction, settings: SolverSettings
 ) -> Iterator[tuple[int, ModePoint]]:
     """Points of a nonlinear mode: index and point, one by one, in the order of the way to them.
 
     amplitudes: m sqrt(kg), in any order. number, direction: as in `solver.backbone`.
     settings: the limit of time holds for each point with the way from the point before.
     """
-    way = _Way((model, friction_coefficient, number, settings), direction)
+    way = _Way((model, number, settings), direction)
     for index in sorted(range(len(amplitudes)), key=lambda index: way.place(float(amplitudes[index]))):
         began = computing_time()
         run = Run(settings.tolerance, Budget(deadline=began + settings.time_limit))
@@ -97,11 +92,11 @@ def _top_of(amplitude: float) -> float:
 class _Way:
     """The sweeps to the points: one with rising amplitude, and one with falling amplitude from the present `top`.
 
-    - asked: model, friction coefficient, number of the mode, settings.
+    - asked: model, number of the mode, settings.
     - to_rest, spent: Newton iterations to the rest, and of the way to the last point without those to other points.
     """
 
-    asked: tuple[ReducedModel, float | FloatArray | None, int, SolverSettings]
+    asked: tuple[ReducedModel, int, SolverSettings]
     direction: Direction
     rest: Rest | Failure | None = None
     up: Sweep[ModeState] | None = None

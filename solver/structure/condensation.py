@@ -99,7 +99,6 @@ def regular(where: str) -> Iterator[None]:
         raise SingularStructureError(f"the matrix of the structure is singular {where}") from error
 
 
-@lru_cache(maxsize=CACHED_STRUCTURES)
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
@@ -108,20 +107,31 @@ def build_structure(
     orders: harmonics above the static one, ascending.
     Raises SingularStructureError where the structure with a stuck joint is singular at a harmonic.
     """
-    relative = model.contact.relative
-    still = model.linear[0]
-    first = model.harmonic_structure(1) if orders else still
-    n, n_rel = len(still.mass), relative.size
+    structures = tuple(model.harmonic_structure(harmonic) for harmonic in (0, *orders))
+    return _condensed(structures, tuple(model.contact.relative.tolist()), omega, excitation_amplitude, orders)
+
+
+@lru_cache(maxsize=CACHED_STRUCTURES)
+def _condensed(
+    structures: tuple[LinearModel, ...],
+    relative: tuple[int, ...],
+    omega: float,
+    excitation_amplitude: float,
+    orders: tuple[int, ...],
+) -> CondensedStructure:
+    """As `build_structure`, from the structure of each harmonic, the static one included."""
+    still, first, at = structures[0], structures[min(1, len(orders))], np.array(relative, np.intp)
+    n_rel, parts = at.size, (still.mass, still.damping, still.stiffness, still.response)
+    alike = all(each is still for each in structures) and not any(np.iscomplexobj(part) for part in parts)
     # not where much lies behind the joint: a `SharedStiffness` has to read that, too
-    shares = 16 * len(orders) * n_rel**2 > DENSE_BYTES and n <= 2 * n_rel
-    real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
+    shares = alike and 16 * len(orders) * n_rel**2 > DENSE_BYTES and len(still.mass) <= 2 * n_rel
     rates, load = omega * np.array(orders, np.float64), excitation_amplitude * first.load_harmonic
     with regular(f"at {omega / (2.0 * np.pi):.6g} Hz, at one of its harmonics, or at rest"):
-        static_stiffness, static_force, static_response, static_offset = _static(still, tuple(relative.tolist()))
-        if shares and real and not model.nodal_diameter:
-            moving, force, rows, offset = _condense_shared(still, relative, rates, load)
+        static_stiffness, static_force, static_response, static_offset = _static(still, relative)
+        if shares:
+            moving, force, rows, offset = _condense_shared(still, at, rates, load)
         else:
-            moving, force, rows, offset = _condense_each(model, relative, rates, orders, load)
+            moving, force, rows, offset = _condense_each(structures, at, rates, orders, load)
     amplitudes = np.zeros((n_rel, len(orders)), complex)
     amplitudes[:, :1] = force[:, None]
     return CondensedStructure(
@@ -152,16 +162,19 @@ harmonic 1, (n_response + 1,)."""
 
 
 def _condense_each(
-    model: ReducedModel, relative: IntArray, rates: FloatArray, orders: tuple[int, ...], load: ComplexArray
+    structures: tuple[LinearModel, ...],
+    relative: IntArray,
+    rates: FloatArray,
+    orders: tuple[int, ...],
+    load: ComplexArray,
 ) -> Moving:
     """A matrix for each harmonic, at the rates n w (H,), rad/s. load (n,): of harmonic 1, N."""
-    n_rel, n_rows, exponents = relative.size, len(model.linear[0].response) + 1, 1j * rates[:, None, None]
+    n_rel, n_rows, exponents = relative.size, len(structures[0].response) + 1, 1j * rates[:, None, None]
     stiffness, rows = (np.empty((len(orders), n, n_rel), complex) for n in (n_rel, n_rows))
     force, offset = np.zeros(n_rel, complex), np.zeros(n_rows, complex)
-    structures = [model.harmonic_structure(harmonic) for harmonic in orders]
-    for linear in {id(each): each for each in structures}.values():
+    for linear in dict.fromkeys(structures[1:]):
         # all harmonics of a structure at once: a third of the time for a slider
-        places = np.array([place for place, each in enumerate(structures) if each is linear])
+        places = np.array([place for place, each in enumerate(structures[1:]) if each is linear])
         loads = np.where(np.array(orders)[places, None] == 1, load, 0.0)
         responses = np.broadcast_to(linear.response, (len(places), *linear.response.shape))
         seen = np.concatenate([responses, loads.conj()[:, None]], axis=1)

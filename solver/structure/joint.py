@@ -1,4 +1,4 @@
-"""The joint at one frequency and load: condensed structure, contact pairs, friction and penalty."""
+"""The joint at one frequency and load: condensed structure, contact pairs and penalty."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from solver.structure.penalty import Penalty, build_penalty
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint at one frequency omega, rad/s, and excitation amplitude, N. friction_coefficient: (n_contact,).
+    """A joint at one frequency omega, rad/s, and excitation amplitude, N.
 
     structure: with the spring of the hold, if there is one (`held`).
     """
@@ -27,7 +27,6 @@ class Joint:
     model: ReducedModel
     omega: float
     excitation_amplitude: float
-    friction_coefficient: FloatArray
     structure: CondensedStructure
     basis: FourierBasis
     penalty: Penalty
@@ -46,7 +45,7 @@ class Joint:
     @cached_property
     def law(self) -> ContactLaw:
         """The contact law of the pairs."""
-        return build_law(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
+        return build_law(self.penalty, self.contact, self.basis, self.omega)
 
     @property
     def relative_penalty(self) -> FloatArray:
@@ -98,14 +97,13 @@ def held(structure: CondensedStructure, hold: Hold | None) -> CondensedStructure
 
 @dataclass(frozen=True)
 class Case:
-    """What all states of one computation share. friction_coefficient: (n_contact,).
+    """What all states of one computation share.
 
     penalty_omega: angular frequency for which the penalty is built, rad/s.
     hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.
     """
 
     model: ReducedModel
-    friction_coefficient: FloatArray
     penalty_omega: float
     penalty: Penalty
     settings: SolverSettings
@@ -119,8 +117,8 @@ class Case:
         """
         orders = self.resolution.orders
         structure = held(build_structure(self.model, omega, excitation_amplitude, orders), self.hold)
-        friction, basis = self.friction_coefficient, build_basis(orders, self.resolution.samples)
-        return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, self.penalty, self.hold)
+        basis = build_basis(orders, self.resolution.samples)
+        return Joint(self.model, omega, excitation_amplitude, structure, basis, self.penalty, self.hold)
 
     def at(self, resolution: Resolution) -> Case:
         """The case with another resolution, and the penalty for its harmonics."""
@@ -131,37 +129,16 @@ class Case:
 
 
 def build_case(
-    model: ReducedModel,
-    friction_coefficient: float | FloatArray | None,
-    omega: float,
-    settings: SolverSettings,
-    resolution: Resolution | None = None,
+    model: ReducedModel, omega: float, settings: SolverSettings, resolution: Resolution | None = None
 ) -> Case:
-    """Case of a scene; errors as of `friction_of_pairs`.
+    """Case of a model with friction.
 
     omega: angular frequency for which the penalty is built, rad/s; equal for states that are compared.
     resolution: by default from the settings.
     """
     chosen = resolution or first_resolution(settings)
     penalty = build_penalty(model, omega, chosen.highest)
-    return Case(model, friction_of_pairs(model, friction_coefficient), omega, penalty, settings, chosen)
-
-
-def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatArray | None) -> FloatArray:
-    """Friction coefficient (n_contact,) from one number, from (n_contact,), or where None is given from the scene; 0 of
-    pairs with another law.
-
-    Raises ValueError where it is given twice, not at all, or not for each pair.
-    """
-    own, n_contact = model.contact.friction_coefficient, model.contact.n_contact
-    if own is None and friction_coefficient is None:
-        raise ValueError("friction_coefficient is missing: the scene has none of its own")
-    if own is not None and friction_coefficient is not None:
-        raise ValueError("friction_coefficient is given twice: the scene has one of each pair, give None")
-    given = np.asarray(friction_coefficient if own is None else own, np.float64)
-    if given.shape not in ((), (n_contact,)):
-        raise ValueError(f"friction_coefficient has shape {given.shape}: give a number or shape ({n_contact},)")
-    return np.where(model.contact.rubs, given, 0.0)
+    return Case(model, omega, penalty, settings, chosen)
 
 
 def static_joint(joint: Joint, load_factor: float) -> Joint:

@@ -26,7 +26,6 @@ _REPORTED = frozenset(each.name for each in fields(WearHistory))
 
 def integrate_together(
     model: ReducedModel,
-    friction_coefficient: float | FloatArray | None,
     settings: SolverSettings,
     start: StartState,
     requests: Sequence[WearRequest],
@@ -43,7 +42,7 @@ def integrate_together(
     """
     integrator, case = Integrator(settings.time_limit, keep, resume), None
     if start.state is not None:
-        case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
+        case = build_case(model, start.penalty_omega, settings, start.resolution)
     for request in requests:
         if case is None:
             solution = Solution(None, Course(model.contact.area), Failure(start.outcome, start.message))

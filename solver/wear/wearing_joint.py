@@ -168,8 +168,7 @@ class WearState:
 class WearingJoint:
     """The joint of one wear history.
 
-    case: model, friction and settings, with the resolution of the start. start: unworn state, which exists; its load is
-        that of the history.
+    case: with the resolution of the start. start: unworn state, which exists; its load is that of the history.
     wearing_work: of the pairs by the wear law. area (n_contact,): m2.
     shifts: whether the target is a shift of the resonance, which each state then reports.
     run: counts the iterations, limits the time, and has a factorisation from one solve to the next. A fresh one lets
@@ -184,7 +183,7 @@ class WearingJoint:
         self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude
         self.area = case.model.contact.area
         self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
-        self.wearing_work = wearing_work(request.law, case.model.contact, case.friction_coefficient)
+        self.wearing_work = wearing_work(request.law, case.model.contact)
         self.run = Run(case.settings.tolerance)
         self._stored: tuple[Case, Joint] | None = None
 

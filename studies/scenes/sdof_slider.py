@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
-from solver.model import FloatArray, ReducedModel
+from solver.model import FloatArray, ReducedModel, with_friction
 from solver.model_from_matrices import build_model
 from studies.scene import Scene
 
@@ -214,9 +214,9 @@ class Parameters(Scene):
         known = self.damping == 0.0 and self.contact_stiffness is None and changed <= _KNOWN
         if not (known and slider.holds(mu * max(load, 0.0))):
             return np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan)
-        begun, contact = law.begun_at(np.array([worn_depth])), self.build(1).contact
+        begun, contact = law.begun_at(np.array([worn_depth])), with_friction(self.build(1), mu).contact
         different, places = np.unique(sliding, return_inverse=True)
-        work = wearing_work(begun, contact, np.array([mu]))
+        work = wearing_work(begun, contact)
         depth, force = slider.wear(mu, load, self.normal_stiffness, self.area, work, different)
         response, places = slider.first_harmonic(mu * force), places.reshape(sliding.shape)
         return self.area * depth[places], response[places][..., np.newaxis]

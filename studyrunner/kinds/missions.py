@@ -31,9 +31,9 @@ class PlannedBlock:
     begin: Begin
 
     def as_block(self, model: ReducedModel) -> Block:
-        """The block as the solver takes it. model: of the joint."""
-        cycles, friction = None if isinstance(self.frequency, Passage) else self.cycles, self.joint.friction_coefficient
-        return Block(model, self.frequency, self.excitation_amplitude, friction, cycles, self.begin, self.name)
+        """The block as the solver takes it. model: of the joint, with its friction."""
+        cycles = None if isinstance(self.frequency, Passage) else self.cycles
+        return Block(model, self.frequency, self.excitation_amplitude, None, cycles, self.begin, self.name)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,8 +45,7 @@ class Mode(tasks.Task):
         model, wanted = self.joint.model(models), sorted(self.places)
         amplitudes = np.array([self.amplitudes[place] for place in wanted])
         direction = cast("Literal['up', 'down']", self.direction)
-        friction = self.joint.friction_coefficient
-        for place, found in follow_mode(model, friction, amplitudes, self.mode, direction, self.settings):
+        for place, found in follow_mode(model, amplitudes, self.mode, direction, self.settings):
             own = {
                 **first_harmonic(found.response),
                 "natural_frequency": found.frequency,

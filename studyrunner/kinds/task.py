@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from solver.model import ReducedModel
+from solver.model import ReducedModel, with_friction
 from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
@@ -48,10 +48,10 @@ class TaskJoint:
     contact: ContactChange = ()
 
     def model(self, models: Mapping[int, ReducedModel]) -> ReducedModel:
-        """The model of the scene with what is drawn for the pairs. models: by number of the scene."""
+        """The model of the scene with its friction and what is drawn for the pairs. models: by number of the scene."""
         model = models[self.scene]
         drawn: dict[str, Any] = {name: np.array(values) for name, values in self.contact}
-        return replace(model, contact=replace(model.contact, **drawn)) if drawn else model
+        return with_friction(replace(model, contact=replace(model.contact, **drawn)), self.friction_coefficient)
 
 
 def joint_of(study: Study, scene: int, contact: ContactChange) -> TaskJoint:

@@ -123,8 +123,7 @@ class Sweep(_FromRest):
         model, wanted, excitation = self.joint.model(models), sorted(self.places), self.excitation
         n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
         direction = cast("Literal['up', 'down', 'ramp']", excitation.direction)
-        friction, amplitude = self.joint.friction_coefficient, excitation.amplitude
-        sweeps = FrequencySweep(model, friction, amplitude, direction, self.settings, keep)
+        sweeps = FrequencySweep(model, excitation.amplitude, direction, self.settings, keep)
         if self.resume is not None:
             sweeps.load(self.resume)
         # no state depends on those that are skipped
@@ -226,9 +225,7 @@ class History(_FromRest):
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
         model, asked = self.joint.model(models), [self._asked(each) for each in needed]
-        histories = integrate_together(
-            model, self.joint.friction_coefficient, self.settings, unpack(self.start), asked, keep, self.resume
-        )
+        histories = integrate_together(model, self.settings, unpack(self.start), asked, keep, self.resume)
         for (each, places), history in zip(needed.items(), histories, strict=True):
             for place in places:
                 yield replace(build_result(self, each, history, self.results[place][1]), place=place)

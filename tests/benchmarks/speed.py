@@ -22,10 +22,9 @@ from solver import frequency_response, march_wear
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.linear_solver import JacobianSolver
 from solver.settings import SolverSettings
-from solver.structure.joint import build_case
 from tests.benchmarks.frame import Table, arguments, dense_solve, measure
 from tests.mpi.launching import launcher
-from tests.solver.models import branch_states, scene
+from tests.solver.models import branch_states, case_of, scene
 
 UNKNOWNS = 1584
 FRICTION, WEAR, CYCLES = 0.5, 1.1e-11, 1e5  # 1, 1/Pa
@@ -51,7 +50,7 @@ def iteration() -> None:
     settings, omega = SolverSettings(harmonics=5, samples=128), 2.0 * np.pi * 211.75
     model = scene("dovetail_sector", 5)
     (start,) = branch_states(model, FRICTION, 0.5, [omega], settings)
-    joint, state = build_case(model, FRICTION, start.penalty_omega, settings).joint(omega, 0.5), start.state
+    joint, state = case_of(model, FRICTION, start.penalty_omega, settings).joint(omega, 0.5), start.state
     balance = Balance(joint, state.start_history, np.zeros(model.contact.n_contact))
     predicted, kept = balance.predict(state.displacement_h, state.contact_force_h), JacobianSolver()
 

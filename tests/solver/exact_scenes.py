@@ -9,18 +9,17 @@ from functools import lru_cache
 import numpy as np
 
 from solver import build_model
-from solver.loading_history.start_states import FrequencySweep
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.structure.fourier import synthesis, to_complex
-from solver.structure.joint import Joint, build_case
+from solver.structure.joint import Joint
 from tests.cantilever import FRICTION, Cantilever
 from tests.contact_pair import ContactPair
 from tests.event_driven import Orbit
 from tests.random_scenes import log_uniform as _spread
-from tests.solver.models import branch_states, march_wear
+from tests.solver.models import branch_states, case_of, march_wear, sweep_of
 
 
 @dataclass(frozen=True)
@@ -76,12 +75,12 @@ class Found:
 def find(scene: Scene, settings: SolverSettings, sweep: str = "up") -> Found:
     """Solve, and compare with the exact motion next to what is found. Raises NoPeriodicMotionError."""
     model, frequency = scene.model, np.array([scene.omega / (2.0 * np.pi)])
-    ((_, start),) = FrequencySweep(model, scene.friction, scene.excitation, sweep, settings).states(frequency)
+    ((_, start),) = sweep_of(model, scene.friction, scene.excitation, sweep, settings).states(frequency)
     # the wear rate is the slip work
     history = march_wear(model, scene.friction, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
     if history.outcome is not Outcome.CONVERGED or start.state is None:
         return Found(history.outcome, iterations=history.newton_iterations)
-    case = build_case(model, scene.friction, start.penalty_omega, settings, start.resolution)
+    case = case_of(model, scene.friction, start.penalty_omega, settings, start.resolution)
     orbit = scene.orbit_next_to(case.joint(scene.omega, scene.excitation), start.state.displacement_h)
     exact, slip_work, found = scene.response(orbit), scene.slip_work(orbit), history.response[0]
     return Found(

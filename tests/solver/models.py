@@ -13,7 +13,7 @@ from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.loading_history.start_states import FrequencySweep
-from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters, with_friction
 from solver.newton.run import Run
 from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, SolverSettings, first_resolution
@@ -116,7 +116,7 @@ def random_balance(
     """Balance with a history that is not zero, and a predicted force at which pairs stick, slip and open."""
     random = np.random.default_rng(seed)
     resolution = resolution or first_resolution(settings)
-    joint = build_case(model, 0.4, OMEGA, settings, resolution).joint(OMEGA, 60.0)
+    joint = case_of(model, 0.4, OMEGA, settings, resolution).joint(OMEGA, 60.0)
     n_contact = model.contact.n_contact
     history = 0.12 * PRELOAD / joint.penalty.tangential[:, None] * random.normal(size=(n_contact, 2))
     history[model.contact.dofs[:, 1:] < 0] = 0.0
@@ -141,17 +141,27 @@ def dovetail(n_harmonics: int = 3, nodal_diameter: int = 0) -> ReducedModel:
     return scene("dovetail_sector", n_harmonics, mesh=1, nodal_diameter=nodal_diameter)
 
 
+def case_of(model, friction, *asked) -> Case:
+    """The case of a model with friction; asked: all else of `build_case`."""
+    return build_case(with_friction(model, friction), *asked)
+
+
+def sweep_of(model, friction, *asked) -> FrequencySweep:
+    """The sweep of a model with friction; asked: all else of `FrequencySweep`."""
+    return FrequencySweep(with_friction(model, friction), *asked)
+
+
 def branch_states(model, friction, amplitude, omegas, settings, sweep="up") -> list[StartState]:
     """Start states at angular frequencies, rad/s, ascending."""
     frequencies = np.asarray(omegas, float) / (2.0 * np.pi)
-    found = dict(FrequencySweep(model, friction, amplitude, sweep, settings).states(frequencies))
+    found = dict(sweep_of(model, friction, amplitude, sweep, settings).states(frequencies))
     return [found[index] for index in range(len(omegas))]
 
 
 def worn_state(kinds: Sequence[str], settings: SolverSettings) -> tuple[Joint, State]:
     """A random joint, worn a little, whose pairs stick, slip and open, and its state."""
     worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(kinds))
-    case = build_case(worn_model(random_model(1, kinds), worn), 0.4, OMEGA, settings)
+    case = case_of(worn_model(random_model(1, kinds), worn), 0.4, OMEGA, settings)
     return case.joint(OMEGA, 60.0), first_point(case, OMEGA, 60.0)
 
 
@@ -167,7 +177,7 @@ def march_wear(
 ) -> WearHistory:
     """The history from a start state; asked: what else `WearRequest` has."""
     wanted = WearRequest(wear_coefficient, steps_of(scheme, step), cycles, **asked)
-    return next(integrate_together(model, friction, settings, start, (wanted,), keep, resume))
+    return next(integrate_together(with_friction(model, friction), settings, start, (wanted,), keep, resume))
 
 
 def glued_frequency(model: ReducedModel) -> float:

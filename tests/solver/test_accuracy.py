@@ -9,7 +9,6 @@ from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings
 from solver.structure.fourier import synthesis
-from solver.structure.joint import build_case
 from tests.cantilever import FRICTION, Cantilever
 from tests.references import den_hartog_amplitude
 from tests.solver.exact_scenes import (
@@ -22,7 +21,7 @@ from tests.solver.exact_scenes import (
     tip_errors,
     wall,
 )
-from tests.solver.models import first_point, scene
+from tests.solver.models import case_of, first_point, scene
 
 SCENES = textbook_scenes()
 
@@ -112,7 +111,7 @@ def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(name, 
 def test_the_tail_of_the_friction_force_belongs_to_the_peak():
     omega, settings = 0.62 * float(np.sqrt(1.6e6)), SolverSettings(harmonics=9, samples=512)
     model = scene("sdof_slider", normal_stiffness=0.0)
-    case = build_case(model, 0.5, omega, settings)
+    case = case_of(model, 0.5, omega, settings)
     at = first_point(case, omega, 10.0).evaluation
     joint = case.joint(omega, 10.0)
     exact_peak = den_hartog_amplitude(0.1, 1.6e5, 10.0, 5.0, omega)
@@ -125,7 +124,7 @@ def test_the_tail_of_the_friction_force_belongs_to_the_peak():
 def test_a_state_is_found_again_where_its_mass_is_no_longer_marched():
     beam, omega, force = Cantilever(spring=200.0), 0.85, 6.0
     rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (79, 27))
-    case = build_case(beam.model(), FRICTION, omega, SolverSettings(), rich)
+    case = case_of(beam.model(), FRICTION, omega, SolverSettings(), rich)
     point = first_point(case, omega, force)
     level = ResolvedState(case, case.joint(omega, force), point)
     other = level.solve_at(poor, Run(case.settings.tolerance))

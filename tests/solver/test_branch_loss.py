@@ -14,12 +14,11 @@ from solver.histories import march_wear as march_model
 from solver.outcome import Outcome
 from solver.packing import Packed, unpack
 from solver.settings import Resolution, SolverSettings
-from solver.structure.joint import build_case
 from solver.wear.jump import creeps, free_slide
 from solver.wear.problem import WearProblem
 from studies import build_scene
 from tests.references import vibro_impact_orbit
-from tests.solver.models import assert_same, branch_states, march_wear
+from tests.solver.models import assert_same, branch_states, case_of, march_wear
 
 # --- the branch with impacts ends, the mass falls on the other one ---
 
@@ -98,7 +97,7 @@ def test_on_the_branch_without_impacts_nothing_jumps():
 
 def joint_and_state(retainer, status):
     model = build_scene("dovetail_sector", mesh=1, retention_stiffness=retainer)
-    case = build_case(model, 0.3, 1332.0, SolverSettings(), Resolution((1,), 16))
+    case = case_of(model, 0.3, 1332.0, SolverSettings(), Resolution((1,), 16))
     joint = case.joint(1332.0, 1.0)
     n_contact = model.contact.n_contact
     balance = Balance(joint, np.zeros((n_contact, 2)), np.zeros(n_contact))

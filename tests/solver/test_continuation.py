@@ -19,9 +19,8 @@ from solver.newton.run import Bordered, Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
-from solver.structure.joint import build_case
 from tests.references import coulomb_orbit
-from tests.solver.models import first_point, scene
+from tests.solver.models import case_of, first_point, scene
 from tests.solver.reconstruction import full_motion
 
 # --- natural steps ---
@@ -33,7 +32,7 @@ GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)
 
 def wall(omega):
     """Vibro-impact along the excitation amplitude: joints, a state found from nothing, and the motion of the mass."""
-    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
+    case = case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
 
     def joint_at(amplitude):
         return case.joint(omega, amplitude)
@@ -67,7 +66,7 @@ def test_natural_steps_end_before_a_fold_and_say_so():
 @pytest.mark.parametrize("over", ["frequency", "load"])
 @pytest.mark.parametrize("name", ["two_masses", "sdof_slider"])
 def test_the_slope_along_a_path_is_that_of_differences(name, over):
-    case, omega = build_case(scene(name), 0.5, 1.3, SolverSettings(5, 64)), 1.3
+    case, omega = case_of(scene(name), 0.5, 1.3, SolverSettings(5, 64)), 1.3
     path, place = (LoadingPath(case, 20.0), omega) if over == "frequency" else (LoadingPath(case, 1.0, omega), 20.0)
     state = first_point(case, omega, 20.0)
     balance, length = Balance(path.joint_at(place), state.evaluation.history), 1e-5 * place
@@ -90,7 +89,7 @@ NATURAL = np.sqrt(1.6e6)
 @pytest.mark.parametrize("omega", [0.3, 1.3])
 def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     orbit = coulomb_orbit([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2, omega)
-    case, idle = build_case(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros(1)
+    case, idle = case_of(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros(1)
     rest = first_point(case, omega, 0.0)
     quiet, joint = case.joint(omega, 0.0), case.joint(omega, 20.0)
     found = relax_to_periodic(joint, idle, rest, quiet, Run(1e-8))
@@ -107,7 +106,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
     start = first(0.03)
-    case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
+    case = case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     path = LoadingPath(case, 1.0, WALL_OMEGA)
     arc = Arc(lambda amplitude: Balance(joint_at(amplitude), start.history), path.slope, start, 0.03, Run(1e-9))
     passed = ((a, b) for a, b, _ in arc.steps(1.0) if (a.parameter - 0.03) * (b.parameter - 0.03) < 0.0)
@@ -126,7 +125,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
     # the open joint is linear: Re(sum Y_n(t) exp(i n w t)) against the matrix exponential, of first order in the step
     model = scene("vibro_impact", gap=1e3)
     omega, end = 1.3, 2.0
-    case = build_case(model, 0.0, omega, SolverSettings(2, 32))
+    case = case_of(model, 0.0, omega, SolverSettings(2, 32))
     joint = case.joint(omega, FORCE)
     flow = np.array([[0.0, 1.0, 0, 0], [-1.0, -0.05, FORCE, 0], [0, 0, 0, -omega], [0, 0, omega, 0]])
     exact = (expm(flow * end) @ np.array([0.01, 0.0, 1.0, 0.0]))[0]
@@ -151,7 +150,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
 
 def test_a_motion_that_has_not_settled_within_its_effort_is_unsettled(monkeypatch):
     model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(5, 64)
-    case = build_case(model, 0.3, 0.8 * NATURAL, settings)
+    case = case_of(model, 0.3, 0.8 * NATURAL, settings)
     quiet, joint = case.joint(0.8 * NATURAL, 0.0), case.joint(0.8 * NATURAL, 10.0)
     idle = np.zeros(1)
     rest = first_point(case, 0.8 * NATURAL, 0.0)
@@ -175,7 +174,7 @@ LAG_OMEGA = 2.0 * math.pi * 190.0
 def slider_state(gain=0.0, damping=20.0, friction=0.5):
     """The slider at 190 Hz. gain: m/J, growth of the depth."""
     model = scene("sdof_slider", damping=damping)
-    case = build_case(model, friction, LAG_OMEGA, TIGHT)
+    case = case_of(model, friction, LAG_OMEGA, TIGHT)
     joint = case.joint(LAG_OMEGA, 10.0)
     balance = Balance(joint, np.zeros((1, 2)), np.zeros(1), np.full(1, gain))
     start = balance.predict(np.zeros((1, 3, 7)), np.zeros((1, 3, 7)))

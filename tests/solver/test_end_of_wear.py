@@ -7,14 +7,13 @@ import pytest
 
 from solver import march_wear as march_model
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.start_states import FrequencySweep
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from solver.wear import problem
 from solver.wear.wearing_joint import Given
 from studies import build_scene
-from tests.solver.models import assert_same, march_wear
+from tests.solver.models import assert_same, march_wear, sweep_of
 from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
 from tests.studies.half_space_twin import limit_depth
 
@@ -116,7 +115,7 @@ COARSE = SolverSettings(harmonics=3, samples=64)
 def unworn():
     """A cylinder in partial slip."""
     model = build_scene("cylinder_on_flat", strips=12)
-    ((_, start),) = FrequencySweep(model, 0.6, 1.0, "ramp", COARSE).states(np.array([20.0]))
+    ((_, start),) = sweep_of(model, 0.6, 1.0, "ramp", COARSE).states(np.array([20.0]))
     return model, start
 
 

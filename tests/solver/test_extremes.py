@@ -13,15 +13,13 @@ import pytest
 from solver import build_model
 from solver.accuracy.certificate import certify
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.start_states import FrequencySweep
 from solver.model import ReducedModel
 from solver.outcome import COMPLETE, Outcome
 from solver.results.state_report import evaluated
 from solver.settings import Scheme, SolverSettings
-from solver.structure.joint import build_case
 from tests.benchmarks.random_scenes import run_scene, solved
 from tests.random_scenes import random_scene
-from tests.solver.models import OMEGA, dovetail, glued_frequency, march_wear, random_model, scene
+from tests.solver.models import OMEGA, case_of, dovetail, glued_frequency, march_wear, random_model, scene, sweep_of
 
 SETTINGS = SolverSettings(harmonics=5, samples=64)
 BOUND = 60.0  # s of the processor for a case that takes a few at most: what is found is a hang, not a busy machine
@@ -86,7 +84,7 @@ def run(case):
     """Both phases of a point, judged."""
     started = time.process_time()
     frequencies = np.array([case.omega / (2.0 * np.pi)])
-    ((_, start),) = FrequencySweep(case.model, case.friction, case.amplitude, "up", case.settings).states(frequencies)
+    ((_, start),) = sweep_of(case.model, case.friction, case.amplitude, "up", case.settings).states(frequencies)
     cycles = np.linspace(0.0, case.cycles, 6)
     history = march_wear(case.model, case.friction, start, case.wear, case.step, case.scheme, cycles, case.settings)
     assert time.process_time() - started < BOUND
@@ -99,7 +97,7 @@ def judge_start(case, start):
     assert (start.state is None) == (start.outcome is not Outcome.CONVERGED) == bool(start.message)
     if start.state is None:
         return
-    joint = build_case(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
+    joint = case_of(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
     assert not certify(joint, evaluated(joint, start.state)[1]).failures(case.settings.tolerance)
 
 

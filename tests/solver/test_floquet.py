@@ -15,7 +15,6 @@ from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.loading_history import start_states
-from solver.loading_history.start_states import FrequencySweep
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -25,18 +24,17 @@ from solver.stability import floquet
 from solver.stability.disturbances import build_monodromy, switching_pairs
 from solver.stability.floquet import find_instability, multipliers_of
 from solver.structure.fourier import from_complex, to_complex
-from solver.structure.joint import build_case
 from solver.structure.penalty import Penalty
 from tests.rings import ring_of_sectors
 from tests.solver.exact_scenes import drawn
-from tests.solver.models import cyclic_model, first_point, march_wear, random_balance, random_model
+from tests.solver.models import case_of, cyclic_model, first_point, march_wear, random_balance, random_model, sweep_of
 from tests.solver.models import scene as bundled
 
 SETTINGS = SolverSettings()
 
 
 def start_of(model, friction, excitation, frequency):
-    ((_, start),) = FrequencySweep(model, friction, excitation, "up", SETTINGS).states(np.array([frequency]))
+    ((_, start),) = sweep_of(model, friction, excitation, "up", SETTINGS).states(np.array([frequency]))
     return start
 
 
@@ -64,7 +62,7 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed,
     monkeypatch.setattr(start_states, "find_instability", lambda *_: None)
     scene = drawn(kind, seed)
     start = start_of(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
-    case = build_case(scene.model, scene.friction, start.penalty_omega, SETTINGS, start.resolution)
+    case = case_of(scene.model, scene.friction, start.penalty_omega, SETTINGS, start.resolution)
     joint = case.joint(scene.omega, scene.excitation)
     at = evaluated(joint, start.state)[1]
     exact = largest(scene.orbit_next_to(joint, at.displacement_h).multipliers())
@@ -126,7 +124,7 @@ def test_disturbances_of_a_wave_are_those_of_its_ring(n_sectors, diameter, apart
     joint, at = balance.joint, balance.evaluate(predicted)
     assert switching_pairs(at)[0].any()
     settings = SolverSettings(3, 24)
-    case = build_case(ring_of_sectors(model), 0.4, joint.omega, settings)
+    case = case_of(ring_of_sectors(model), 0.4, joint.omega, settings)
     case = replace(case, penalty=Penalty(*(np.tile(each, apart) for each in vars(joint.penalty).values())))
     turns = np.exp(2j * np.pi * diameter / n_sectors * np.outer(np.arange(apart), joint.basis.orders))
     moved = np.concatenate([from_complex(predicted[:, 0], to_complex(predicted) * turn) for turn in turns])
@@ -176,7 +174,7 @@ def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
 
     monkeypatch.setattr(JacobianSolver, "determinant_sign", sign)
     model, settings = bundled("vibro_impact"), SolverSettings(5, 64)
-    case = build_case(model, 0.0, 1.2, settings)
+    case = case_of(model, 0.0, 1.2, settings)
     first = solve_first_state(case, 1.2, 0.02, Run(settings.tolerance))
     assert isinstance(first, State)
     rest, joint = state_at_rest(case, 1.2, Run(settings.tolerance)), case.joint(1.2, 0.02)
@@ -186,7 +184,7 @@ def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
 def test_multipliers_of_many_harmonics_have_samples_enough(monkeypatch):
     """A cylinder with 81 harmonics ended in an unexpected error: 128 samples."""
     monkeypatch.setattr(floquet, "SMALL_JOINT", 0)
-    case = build_case(bundled("vibro_impact"), 0.0, 1.2, SolverSettings(81, 512))
+    case = case_of(bundled("vibro_impact"), 0.0, 1.2, SolverSettings(81, 512))
     at = first_point(case, 1.2, 0.02).evaluation
     found = floquet._integrated(case.joint(1.2, 0.02), at, 1e-2, True)
     assert abs(found.values[0]) < 1.0

@@ -16,9 +16,8 @@ from solver.contact.sliding_masses import Masses, march_masses
 from solver.model import FloatArray, IntArray
 from solver.settings import Resolution, SolverSettings
 from solver.structure.fourier import FourierBasis, build_basis, to_complex
-from solver.structure.joint import build_case
 from tests.contact_pair import ContactPair
-from tests.solver.models import OMEGA, PRELOAD, random_model, with_free_masses
+from tests.solver.models import OMEGA, PRELOAD, case_of, random_model, with_free_masses
 from tests.solver.reconstruction import mass_period, pair_period, status
 
 FRICTION = 0.4
@@ -200,7 +199,7 @@ def test_no_kernel_assigns_a_slice_to_a_slice():
 def test_a_kernel_is_compiled_once_for_any_resolution():
     model = random_model(1, ("3d", "3d"))
     for resolution in (Resolution((), 1), Resolution((1, 2, 3), 32)):
-        joint = build_case(model, FRICTION, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
+        joint = case_of(model, FRICTION, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
         predicted = PRELOAD * np.ones((2, 3, len(joint.basis.synthesis)))
         history, first = np.zeros((2, 2)), 0.5 * predicted @ joint.basis.synthesis
         joint.law.tangent(joint.law.march(predicted, history, first), history, first)
@@ -217,8 +216,9 @@ FREE, ELASTIC = [1, 3, 4], [0, 2, 5]
 
 def of_pairs(joint, pairs):
     """The law of some of the pairs alone."""
-    contact = replace(joint.contact, dofs=joint.contact.dofs[pairs], area=joint.contact.area[pairs])
-    return build_law(joint.penalty.at(pairs), joint.friction_coefficient[pairs], contact, joint.basis, joint.omega)
+    of_them = {name: getattr(joint.contact, name)[pairs] for name in ("dofs", "area", "friction_coefficient")}
+    contact = replace(joint.contact, **of_them)
+    return build_law(joint.penalty.at(pairs), contact, joint.basis, joint.omega)
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def of_pairs(joint, pairs):
 )
 def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
     model = with_free_masses(random_model(1, MIXED), FREE)
-    joint = build_case(model, friction, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
+    joint = case_of(model, friction, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
     assert np.flatnonzero(joint.penalty.inertial).tolist() == FREE
     # pairs stick, slip and open
     random = np.random.default_rng(2)

@@ -18,6 +18,7 @@ from solver.missions.block_run import BlockInput, BlockResult, find_start, run_b
 from solver.missions.history import integrate_missions, unworn_course
 from solver.missions.mission import MissionRequest
 from solver.missions.step import MissionStep, attempt_step
+from solver.model import with_friction
 from solver.packing import Packed
 from solver.settings import Resolution, WearTarget
 from solver.wear.slow_time import Guide
@@ -31,6 +32,11 @@ WEAR, FRICTION = 1.1e-11, 0.5
 def slider():
     """A mass on a support, pressed by a spring that wear relaxes."""
     return scene("sdof_slider")
+
+
+def as_computed(*blocks):
+    """The blocks whose models have their friction."""
+    return tuple(replace(each, model=with_friction(each.model, each.friction_coefficient)) for each in blocks)
 
 
 def two_blocks(begin="continue"):
@@ -103,7 +109,7 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, ex
 
 def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
-    mission, pairs = MissionRequest((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
+    mission, pairs = MissionRequest(as_computed(block), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
     first, own = (run_block(BlockInput(mission, 0, at * pairs)) for at in (0.0, depth))
     return own, run_block(BlockInput(mission, 0, depth * pairs, earlier=first.sweep))
 
@@ -128,7 +134,8 @@ def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
 )
 def test_an_earlier_sweep_serves_as_long_as_its_choices_do(where, cycles, kept):
     """Also with other harmonics of its nodes; a vibration that differs by 0.35 needs errors of its own."""
-    unworn = BlockInput(MissionRequest((Block(dovetail(5), *where, cycles),), WEAR, (0, 2), SETTINGS), 0, np.zeros(16))
+    blocks = as_computed(Block(dovetail(5), *where, cycles))
+    unworn = BlockInput(MissionRequest(blocks, WEAR, (0, 2), SETTINGS), 0, np.zeros(16))
     start, sweep = find_start(unworn)
     worn = replace(unworn, depth=cycles * unworn.wearing_joint(start)[1].rate)
     earlier = replace(sweep, resolution=Resolution((1, 2, 3, 4, 5), 64))
@@ -154,7 +161,7 @@ def test_the_error_of_a_mission_whose_states_have_no_other_to_compare_with_is_no
 @pytest.mark.slow
 @pytest.mark.parametrize("begin", ["up", "continue"])
 def test_an_interrupted_mission_with_such_states_goes_on_to_the_last_bit(begin):
-    mission, kept = MissionRequest(two_blocks(begin), WEAR, (0, 6), SETTINGS), list[Packed]()
+    mission, kept = MissionRequest(as_computed(*two_blocks(begin)), WEAR, (0, 6), SETTINGS), list[Packed]()
     whole = integrate_missions(mission, keep=kept.append)
     for place in (0, len(kept) // 2, len(kept) - 2):
         assert_same(integrate_missions(mission, resume=kept[place]), whole)

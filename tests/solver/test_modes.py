@@ -8,6 +8,7 @@ import pytest
 import scipy.linalg
 
 from solver import Outcome, SolverSettings, backbone, build_model, frequency_response, modal_response
+from solver.model import with_friction
 from solver.modes.points import follow_mode
 from solver.structure.condensation import whole_motion
 from solver.structure.fourier import to_complex
@@ -140,7 +141,7 @@ def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint):
         "slider": (slider(0.3), SIZE * np.sqrt(MASS) * np.array([1.3, 4.0]), "down", SolverSettings()),
         "wave": (cyclic_model(3, ("3d", "3d"), 7, 2), np.array([1e-4, 1e-3]), "up", SolverSettings(harmonics=3)),
     }[joint]
-    for _, point in follow_mode(model, 0.5, amplitudes, 1, way, settings):
+    for _, point in follow_mode(with_friction(model, 0.5), amplitudes, 1, way, settings):
         assert point.found is not None
         fed, taken = energies(*point.found)
         assert fed == pytest.approx(taken, rel=1e-6)

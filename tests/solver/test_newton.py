@@ -19,8 +19,7 @@ from solver.newton.period_preconditioner import build_period_factor, stiffness_o
 from solver.newton.run import Bordered, Run, bordered_step, solve_newton
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
-from solver.structure.joint import build_case
-from tests.solver.models import PRELOAD, random_balance, random_model
+from tests.solver.models import PRELOAD, case_of, random_balance, random_model
 
 
 @dataclass
@@ -254,7 +253,7 @@ def test_a_bordered_step_is_that_of_the_whole_jacobian(kinds):
 def test_a_direction_without_any_stiffness_is_left_alone():
     """A free mass on a slider without friction: the Jacobian is singular, and the mean position arbitrary."""
     model = build_model([[1.0]], None, [[0.0]], [[-1, 0, -1]], 1e-4, load_harmonic=[1.0], normal_load=10.0)
-    joint = build_case(model, 0.0, 1.0, SMALL).joint(1.0, 3.0)
+    joint = case_of(model, 0.0, 1.0, SMALL).joint(1.0, 3.0)
     end = Run(1e-10).state(Balance(joint, np.zeros((1, 2))), np.zeros((1, 7)))
     assert end.evaluation.displacement_h[0, 1, :3] == pytest.approx([0.0, -3.0, 0.0], abs=0.1)
 

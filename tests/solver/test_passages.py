@@ -10,11 +10,12 @@ from solver import Block, Outcome, Passage, SolverSettings
 from solver.missions import passage as passages
 from solver.missions.block_run import BlockInput, EarlierSweep
 from solver.missions.mission import MissionRequest
+from solver.model import with_friction
 from solver.results.history import StartState
 from solver.settings import Resolution
 from tests.solver.models import scene
 
-WEAR, FRICTION, SETTINGS = 1.1e-11, 0.5, SolverSettings(harmonics=3, samples=64)
+WEAR, SETTINGS = 1.1e-11, SolverSettings(harmonics=3, samples=64)
 
 
 def state(frequency, density, branch=0, response=0.0):
@@ -63,7 +64,8 @@ def test_a_vibration_is_late_by_its_decay_time():
 
     def case(rate, damping=6.0):
         # too little wear to change the pressures on the way
-        block = Block(scene("sdof_slider", damping=damping), Passage(180.0, 220.0, rate), 10.0, FRICTION)
+        model = with_friction(scene("sdof_slider", damping=damping), 0.5)
+        block = Block(model, Passage(180.0, 220.0, rate), 10.0, None)
         return BlockInput(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), 0, np.zeros(1))
 
     fast, slow = passages.run_passage(case(7.0)), passages.run_passage(case(0.07))
@@ -86,7 +88,7 @@ def swept_with(monkeypatch, density, depth, near=()):
 
     monkeypatch.setattr(passages, "states_at", states)
     passage = Passage(1.0, 2.0, 1e-4)
-    block = Block(scene("sdof_slider"), passage, 10.0, FRICTION, begin="up")
+    block = Block(scene("sdof_slider"), passage, 10.0, None, begin="up")
     mission, earlier = MissionRequest((block,), WEAR, (0, 1), SETTINGS), EarlierSweep(near) if near else None
     swept = passages.find_states(BlockInput(mission, 0, np.array([depth]), earlier=earlier))
     assert isinstance(swept, passages.Swept)

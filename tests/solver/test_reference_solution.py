@@ -9,6 +9,7 @@ import pytest
 
 from solver.accuracy.resolved_state import UNKNOWN
 from solver.harmonic_balance.state import Failure
+from solver.model import with_friction
 from solver.outcome import Outcome, in_whole
 from solver.packing import Packed
 from solver.settings import SolverSettings
@@ -239,14 +240,14 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing():
 def test_histories_that_are_integrated_together_are_those_alone(monkeypatch):
     """To the last bit, interrupted or not; the adaptive history, which all of them need, is integrated once."""
     monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 20)
-    model, found = start()
+    (model, found), saved = start(), list[Packed]()
+    model = with_friction(model, 0.5)
     asked = [WearRequest(WEAR, rule, CYCLES) for rule in (Given(4000.0), None, Given(2000.0, "explicit"))]
-    saved: list[Packed] = []
-    together = list(integrate_together(model, 0.5, GIVEN, found, asked, saved.append))
-    alone = [next(integrate_together(model, 0.5, GIVEN, found, (each,))) for each in asked]
+    together = list(integrate_together(model, GIVEN, found, asked, saved.append))
+    alone = [next(integrate_together(model, GIVEN, found, (each,))) for each in asked]
     assert len(saved) > 5
     places = saved[1], saved[len(saved) // 2], saved[-1]
-    resumed = [list(integrate_together(model, 0.5, GIVEN, found, asked, resume=each)) for each in places]
+    resumed = [list(integrate_together(model, GIVEN, found, asked, resume=each)) for each in places]
     for other in (alone, *resumed):
         for one, same in zip(together, other, strict=True):
             assert_same(one, same)

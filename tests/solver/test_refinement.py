@@ -15,8 +15,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.newton.run import Run
 from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, all_orders
-from solver.structure.joint import build_case
-from tests.solver.models import ALL_KINDS, OMEGA, branch_states, first_point, random_model, scene, worn_state
+from tests.solver.models import ALL_KINDS, OMEGA, branch_states, case_of, first_point, random_model, scene, worn_state
 
 # --- certificates ---
 
@@ -29,7 +28,7 @@ def on_branch(name, friction, amplitude, omega, n_harmonics):
     """The state of a sweep up, evaluated from what is stored of it: joint and evaluation."""
     model, settings = scene(name, n_harmonics), SolverSettings(n_harmonics, 256)
     (start,) = branch_states(model, friction, amplitude, [omega], settings)
-    joint = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
+    joint = case_of(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
     return joint, evaluated(joint, start.state)[1]
 
 
@@ -91,7 +90,7 @@ def test_a_slip_that_does_not_repeat_is_caught():
     joint, evaluation = random_state()
     slipping = int(np.argmax(evaluation.slip_work))
     state_t = evaluation.state_t.copy()
-    limit = float(joint.friction_coefficient[0]) * evaluation.force_t[:, 0].max()
+    limit = float(joint.contact.friction[0]) * evaluation.force_t[:, 0].max()
     state_t[slipping, 0] += 0.02 * limit * np.linspace(0.0, 1.0, state_t.shape[2])
     assert failing(joint, replace(evaluation, state_t=state_t)) == {"periodicity_error"}
     assert failing(joint, replace(evaluation, periodicity_error=0.02 * limit)) == {"periodicity_error"}
@@ -122,7 +121,7 @@ SLIPPING = 400.0  # N: excitation at which the pairs of the random models slip
 
 def started(model, friction, omega, amplitude, settings, resolution=None):
     """A state found from nothing."""
-    case = build_case(model, friction, omega, settings, resolution)
+    case = case_of(model, friction, omega, settings, resolution)
     point = first_point(case, omega, amplitude)
     return ResolvedState(case, case.joint(omega, amplitude), point)
 

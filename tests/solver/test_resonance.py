@@ -9,13 +9,12 @@ from scipy.optimize import brentq
 
 from solver import build_model, march_wear
 from solver.harmonic_balance.state import State
-from solver.loading_history.start_states import FrequencySweep
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.state_report import periodic_state, resonance_frequency
 from solver.settings import FollowedFrequency, Resolution, Scheme, SolverSettings, all_orders
 from tests.references import slider_orbit
-from tests.solver.models import assert_same, dovetail, random_balance, random_model, scene
+from tests.solver.models import assert_same, dovetail, random_balance, random_model, scene, sweep_of
 from tests.solver.models import march_wear as march_from
 from tests.solver.reconstruction import full_motion, harmonic_structure
 
@@ -108,7 +107,7 @@ def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequen
 def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
     monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 8)
     model, follow, settings = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN), SolverSettings()
-    ((_, start),) = FrequencySweep(model, 0.5, 10.0, "up", settings).states(follow)
+    ((_, start),) = sweep_of(model, 0.5, 10.0, "up", settings).states(follow)
     kept: list[Packed] = []
     asked = model, 0.5, start, WEAR, 1e3, "implicit", CYCLES, settings
     whole = march_from(*asked, keep=kept.append, follow=follow)
@@ -121,11 +120,11 @@ def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
 def test_an_interrupted_search_finds_the_same_start_to_the_last_bit():
     model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency("resonance", *BETWEEN)
     given: list[Packed | str] = []
-    ((_, whole),) = FrequencySweep(model, 0.5, 10.0, "up", SolverSettings(), given.append).states(follow)
+    ((_, whole),) = sweep_of(model, 0.5, 10.0, "up", SolverSettings(), given.append).states(follow)
     kept = [progress for progress in given if not isinstance(progress, str)]
     assert len(kept) > 2
     for progress in (kept[0], kept[len(kept) // 2], kept[-1]):
-        sweeps = FrequencySweep(model, 0.5, 10.0, "up", SolverSettings())
+        sweeps = sweep_of(model, 0.5, 10.0, "up", SolverSettings())
         sweeps.load(progress)
         ((_, again),) = sweeps.states(follow)
         assert again.state.omega == whole.state.omega

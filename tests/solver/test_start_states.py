@@ -16,24 +16,23 @@ from solver.harmonic_balance.state import State, balance_after
 from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.start_states import FIRST_ITERATIONS, FrequencySweep
+from solver.loading_history.start_states import FIRST_ITERATIONS
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.condensation import condense
-from solver.structure.joint import build_case
 from tests.benchmarks.frame import measure
 from tests.random_decks import random_deck, run_deck, static_forces
 from tests.random_scenes import random_scene
-from tests.solver.models import OMEGA, branch_states, dovetail, first_point, random_model, scene
+from tests.solver.models import OMEGA, branch_states, case_of, dovetail, first_point, random_model, scene, sweep_of
 
 AUTOMATIC = SolverSettings()
 
 
 def starts(frequencies, sweep="up", settings=AUTOMATIC):
-    found = FrequencySweep(dovetail(13), 0.5, 0.5, sweep, settings).states(np.array(frequencies))
+    found = sweep_of(dovetail(13), 0.5, 0.5, sweep, settings).states(np.array(frequencies))
     return {frequencies[index]: start for index, start in found}
 
 
@@ -62,7 +61,7 @@ def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep):
 @pytest.mark.slow
 def test_pairs_slide_with_a_rising_load_alike_in_one_step_and_in_many():
     """Within 1.5 % of the slide, with one slide for each step 27 %."""
-    case, omega, run = build_case(dovetail(13), 0.5, OMEGA, SolverSettings(3, 64)), 1256.0, Run(1e-8)
+    case, omega, run = case_of(dovetail(13), 0.5, OMEGA, SolverSettings(3, 64)), 1256.0, Run(1e-8)
     rest = state_at_rest(case, omega, run)
     assert isinstance(rest, State)
 
@@ -100,7 +99,7 @@ def test_a_joint_without_grip_ends_within_bounded_effort():
     """Two masses on a structure that friction alone keeps in place: no state stays, and the search for one ends."""
     model = scene("two_masses")
     loose = replace(model.linear[0], stiffness=np.array([[0.5, -1.0], [-1.0, 1.0]]))
-    found = FrequencySweep(replace(model, linear={0: loose}), 0.5, 5.0, "up", AUTOMATIC).states(np.array([0.1]))
+    found = sweep_of(replace(model, linear={0: loose}), 0.5, 5.0, "up", AUTOMATIC).states(np.array([0.1]))
     ((_, start),) = found
     assert start.state is None
     assert start.outcome in (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
@@ -122,12 +121,12 @@ def test_a_sweep_goes_on_from_each_save_to_the_last_bit(case, monkeypatch):
     monkeypatch.setattr(sweep_module, "ITERATIONS_PER_SAVE", 5)
     build, friction, amplitude, frequencies, way = INTERRUPTED[case]
     asked, kept = (build(), friction, amplitude, way, AUTOMATIC), list[Packed | str]()
-    whole = dict(FrequencySweep(*asked, kept.append).states(np.array(frequencies)))
+    whole = dict(sweep_of(*asked, kept.append).states(np.array(frequencies)))
     assert max(start.branch for start in whole.values()) == (1 if "folds" in case else 0)
     saved = [progress for progress in kept if not isinstance(progress, str)]
     assert len(saved) > 2 * len(whole)
     for progress in saved[1 :: len(saved) // 4 + 1]:
-        sweeps = FrequencySweep(*asked)
+        sweeps = sweep_of(*asked)
         sweeps.load(progress)
         again = dict(sweeps.states(np.array(frequencies)))
         for index, wanted in whole.items():
@@ -156,7 +155,7 @@ def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep, omegas, fold):
 )
 def test_the_harmonics_of_a_node_are_checked_by_the_force_that_they_leave_out(highest, foreseen, suits):
     """The error where they were chosen grows with this force: an error above rtol, or far below, asks for others."""
-    case = build_case(random_model(2, ("3d",) * 5), 0.4, OMEGA, AUTOMATIC, Resolution(all_orders(highest), 64))
+    case = case_of(random_model(2, ("3d",) * 5), 0.4, OMEGA, AUTOMATIC, Resolution(all_orders(highest), 64))
     path, found = LoadingPath(case, 30.0, OMEGA), [first_point(case, OMEGA, load) for load in (15.0, 30.0)]
     checked, state = (replace(each, parameter=part) for each, part in zip(found, (0.5, 1.0), strict=True))
     before, now = (left_out(case.resolution.orders, each.evaluation) for each in (checked, state))
@@ -172,7 +171,7 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
     model = scene("two_masses", stiffness_1=3.0, stiffness_2=1.0, damping_1=0.0, damping_2=0.0)
     frequency = 2.0 / (2 * np.pi)
     assert 2 * np.pi * frequency == 2.0
-    starts = dict(FrequencySweep(model, 0.5, 20.0, "up", SolverSettings(3, 64)).states(np.array([frequency])))
+    starts = dict(sweep_of(model, 0.5, 20.0, "up", SolverSettings(3, 64)).states(np.array([frequency])))
     assert starts[0].outcome is Outcome.SINGULAR
     assert starts[0].state is None
     assert f"at {frequency:.6g} Hz" in starts[0].message
@@ -241,7 +240,7 @@ def test_a_free_block_needs_no_friction_where_it_is_pressed_on_and_is_pulled_off
 
 
 def test_a_mass_that_slides_all_the_time_needs_no_reference_sweep():
-    ((_, start),) = FrequencySweep(scene("sdof_slider"), 0.5, 10.0, "up", SolverSettings()).states(np.array([160.0]))
+    ((_, start),) = sweep_of(scene("sdof_slider"), 0.5, 10.0, "up", SolverSettings()).states(np.array([160.0]))
     assert start.reference is None
     assert 0.0 < start.response_error < 1e-2
 
@@ -256,7 +255,7 @@ def test_states_whose_slip_was_ratcheting_are_found_and_slip_by_their_vibration_
     omega = 2.0 * np.pi * scene.frequency_hz
     (start,) = branch_states(scene.model, scene.friction, scene.amplitude, [omega], settings)
     assert start.outcome is Outcome.CONVERGED
-    case = build_case(scene.model, scene.friction, start.penalty_omega, settings, start.resolution)
+    case = case_of(scene.model, scene.friction, start.penalty_omega, settings, start.resolution)
     joint = case.joint(start.state.omega, scene.amplitude)
     at = evaluated(joint, start.state)[1]
     assert not ratchets(joint, at, 1e-3)

@@ -15,12 +15,11 @@ from solver.harmonic_balance.state import Failure
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
-from solver.structure.joint import build_case
 from solver.wear import problem as control
 from solver.wear.check import choose_harmonics
 from solver.wear.step import moved_fraction, rate_slope
 from solver.wear.wearing_joint import Given, WearingJoint, WearRequest, WearState
-from tests.solver.models import branch_states, dovetail, march_wear, scene
+from tests.solver.models import branch_states, case_of, dovetail, march_wear, scene
 from tests.solver.worn_slider import AREA, problem
 
 
@@ -150,7 +149,7 @@ def test_the_share_is_that_by_which_the_normal_forces_change():
     # without friction the pairs stay closed and slide freely: the static state is linear in the depth
     depth = 2e-7 * np.random.default_rng(1).uniform(size=16)
     joint, worn = (
-        build_case(worn_model(dovetail(), each), 0.0, 1335.0, COARSE_BLADE).joint(1335.0, 0.0) for each in (None, depth)
+        case_of(worn_model(dovetail(), each), 0.0, 1335.0, COARSE_BLADE).joint(1335.0, 0.0) for each in (None, depth)
     )
     states = [solve_static_state(each, Run(1e-10)).evaluation for each in (joint, worn)]
     before, after = (state.force_h[:, 0, 0] for state in states)
@@ -178,7 +177,7 @@ def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long_and_the_step_th
 def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
     model = scene("cylinder_on_flat", 3, strips=24)
     (start,) = branch_states(model, 0.6, 1.0, [2.0 * np.pi * 20.0], COARSE_BLADE, "ramp")
-    case = build_case(model, 0.6, start.penalty_omega, COARSE_BLADE, start.resolution)
+    case = case_of(model, 0.6, start.penalty_omega, COARSE_BLADE, start.resolution)
     work = WearingJoint(case, start, WearRequest(1e-4, Given(1.0), np.array([0.0, 1.0])))
     state = work.unworn_state()
     work.run = Run(1e-13)

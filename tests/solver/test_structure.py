@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from solver import march_wear, with_contact_stiffness
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS as LARGEST
-from solver.model import needed_nodal_diameters
+from solver.model import needed_nodal_diameters, with_friction
+from solver.modes.modal_model import LinearMode, modal_model
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, condense, frequency_slope
 from solver.structure.fourier import build_basis, from_complex, to_complex
@@ -116,10 +117,15 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     orders = (1, 2, 3, 5)
     each = build_structure(model, OMEGA, AMPLITUDE, orders)
     monkeypatch.setattr(condensation, "DENSE_BYTES", 0.0)
-    build_structure.cache_clear()
+    condensation._condensed.cache_clear()
     shared = build_structure(model, OMEGA, AMPLITUDE, orders)
     assert isinstance(each.moving, DenseStiffness)
     assert isinstance(shared.moving, SharedStiffness)
+    # one for all coefficients of friction
+    assert build_structure(with_friction(model, 0.5), OMEGA, AMPLITUDE, orders) is shared
+    # another first harmonic shares none
+    modal = modal_model(model, LinearMode(OMEGA, np.eye(len(model.linear[0].mass))[0], 0.0), 0.0)
+    assert isinstance(build_structure(modal, OMEGA, AMPLITUDE, orders).moving, DenseStiffness)
     names = [field.name for field in fields(each) if field.name != "moving"]
     for name in (*names, "dynamic_stiffness"):
         ours, theirs = (np.asarray(getattr(structure, name)) for structure in (shared, each))

@@ -73,7 +73,7 @@ def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name):
     density = balance.evaluate(predicted).slip_work / joint.contact.area
     # one pair above it, one below
     chosen = replace(LAWS[name], threshold=float(density[[0, 2]].mean()))
-    law = wearing_work(chosen, joint.contact, joint.friction_coefficient)
+    law = wearing_work(chosen, joint.contact)
     balance = replace(balance, wearing=law, wear_gain=gain)
     at = balance.evaluate(predicted)
     by_work, by_force, by_depth = law.slopes(at.slip_work, at.force_h[:, 0, 0], at.wear_depth)
@@ -121,11 +121,11 @@ def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor():
     model = random_model(1)
     sides = replace(model.contact, surface=("flat/cylinder", "flat/cylinder", "flat"))
     law = WearLaw(surfaces=(("flat", 1.0), ("cylinder", 0.5)))
-    found = wearing_work(law, sides, np.zeros(3)).work(np.ones(3), np.ones(3), np.ones(3))
+    found = wearing_work(law, sides).work(np.ones(3), np.ones(3), np.ones(3))
     assert found.tolist() == [1.5, 1.5, 1.0]
     for wrong in ((("flat", 1.0),), (("flat", 1.0), ("cylinder", 0.5), ("disk", 1.0))):
         with pytest.raises(ValueError, match=r"cylinder|disk"):
-            wearing_work(WearLaw(surfaces=wrong), sides, np.zeros(3))
+            wearing_work(WearLaw(surfaces=wrong), sides)
 
 
 @pytest.mark.parametrize("given", [{"name": "reye"}, {"name": "table"}, {"table": TABLE}], ids=str)

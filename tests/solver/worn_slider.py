@@ -12,11 +12,10 @@ from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
-from solver.structure.joint import build_case
 from solver.wear.problem import WearProblem
 from solver.wear.wearing_joint import Given, WearRequest
 from tests.references import slider_amplitude, slider_wear_depth
-from tests.solver.models import branch_states, march_wear, scene
+from tests.solver.models import branch_states, case_of, march_wear, scene
 
 OMEGA = 2 * np.pi * 160.0
 FRICTION = 0.5
@@ -47,7 +46,7 @@ def march(
 def problem(steps: Given | None = None, rtol: float = 1e-2) -> WearProblem:
     """The wearing slider up to the last cycle count."""
     model, start = slider_start()
-    case = build_case(model, FRICTION, start.penalty_omega, replace(COARSE, rtol=rtol), start.resolution)
+    case = case_of(model, FRICTION, start.penalty_omega, replace(COARSE, rtol=rtol), start.resolution)
     return WearProblem(case, start, WearRequest(WEAR, steps, np.array([0.0, END])))
 
 

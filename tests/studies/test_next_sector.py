@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 
 from solver import SolverSettings
 from solver.loading_history.start_states import FrequencySweep
+from solver.model import with_friction
 from studies.finite_element import surfaces
 from studies.finite_element.reduced_joint import prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
@@ -91,8 +92,8 @@ def wedge_force(parameters):
 def test_a_wedge_is_pressed_by_its_centrifugal_force(friction):
     """Between what the platforms carry while the wedge slides in and out; both alike."""
     parameters = underplatform_damper.Parameters()
-    model, settings = parameters.build(1), SolverSettings(harmonics=1, samples=16)
-    ((_, start),) = FrequencySweep(model, friction, 1e-6, "ramp", settings).states(np.array([100.0]))
+    model, settings = with_friction(parameters.build(1), friction), SolverSettings(harmonics=1, samples=16)
+    ((_, start),) = FrequencySweep(model, 1e-6, "ramp", settings).states(np.array([100.0]))
     normal = start.state.contact_force_h[:, 0, 0]
     sides = normal.reshape(2, -1).sum(axis=1)
     assert sides[0] == pytest.approx(sides[1], rel=1e-4)

@@ -177,7 +177,7 @@ def test_samples_draw_what_all_blocks_have(blocks):
     assert result.worn_volume.dims[-2:] == ("sample", "mission")
     for sample in range(3):
         load, friction = (result[f"sample_{name}"].values[sample] for name in ("normal_load", "friction_coefficient"))
-        of_sample = [case for case in blocks.computed if case.mission.blocks[0].friction_coefficient == friction]
+        of_sample = [case for case in blocks.computed if case.mission.blocks[0].model.contact.friction == friction]
         loads = {case.block.name: load_of(case.block) for case in of_sample}
         # around the value of the scene, and around that of the block
         assert loads["cruise"] == load
