@@ -106,16 +106,21 @@ class FrequencySweep:
         cell, omega, present = unpack(saved)
         self._new_sweep(cell, omega).load(present)
 
-    def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
-        """Begin at a known state; False where the state is rejected.
+    def go_on(self, start: StartState, case: Case, frequency: float) -> StartState:
+        """The state at a frequency, Hz, to which a sweep leads from a known state, or why there is none.
 
-        case: harmonics, samples and penalty of the state. state: its parameter is the frequency, rad/s, or for a ramp
-        its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
+        start: at the same frequency for a ramp, else under the same load. case: with its harmonics and penalty.
         """
+        assert start.state is not None
         omega = 2.0 * np.pi * frequency
         present = self._new_sweep(cell_of(frequency), omega if self.direction == "ramp" else None)
+        path = LoadingPath(case, self.excitation_amplitude, self.omega)
+        state = path.state_of(start.state)
         present.sign = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
-        return present.begin(replace(present.path, case=case), state)
+        if not present.begin(path, state) and present.failure is not None:
+            return self._without_state(present.failure)
+        _, after = next(self.states(np.array([frequency])))
+        return replace(after, branch=start.branch + after.branch)
 
     def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
         """The sweep that leads to a frequency, Hz, at its first node or farther on; without a state if none is found.

@@ -11,7 +11,7 @@ fold and where each pair slips or opens within the period: such a state follows 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Generic
 
@@ -21,13 +21,10 @@ from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import FREE_STEP, Path, S, Step
+from solver.loading_history.replay import LAST_NODES, follow
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows
-
-LAST_NODES = 3
-"""Last nodes of a sweep: the next one is predicted on the parabola through them. With a straight line the nodes of the
-slider take 7 % more iterations."""
 
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
@@ -121,7 +118,7 @@ class Sweep(Generic[S]):
         # over states in between where the last part is too long
         for n_parts in PARTS_TO_POINT:
             way = np.linspace(node.parameter, state.parameter, n_parts + 1)[1:].tolist()
-            if found := _through(path, (node,), way, run.fresh()):
+            if found := follow(path, (node,), way, run.fresh()):
                 return found[-1]
         return None
 
@@ -227,7 +224,7 @@ class Sweep(Generic[S]):
             self._reference_run = self.run.fresh()
             moved = self.path.at(self.reference_resolution).move(states[-1], path, self.run)
             states = () if moved is None else (moved,)
-        return _through(path, states, targets, self._reference_run.with_tolerance(path.case.settings.rough_tolerance))
+        return follow(path, states, targets, self._reference_run.with_tolerance(path.case.settings.rough_tolerance))
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
@@ -246,11 +243,3 @@ class Sweep(Generic[S]):
         others = {"resolution": self.path.case.resolution, "iterations": self.budget.iterations}
         self.load(in_rows({name: vars(self)[name] for name in _SAVED} | others))
         self.save()
-
-
-def _through(path: Path[S], states: tuple[S, ...], targets: Sequence[float], run: Run) -> tuple[S, ...]:
-    """The last states of a path that goes on from some over some targets; none where one of these is not found."""
-    for target in targets:
-        found = path.solve(states, target, run) if states else None
-        states = () if found is None else (*states, found)[-LAST_NODES:]
-    return states

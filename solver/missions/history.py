@@ -10,7 +10,8 @@ import numpy as np
 
 from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep, run_block
+from solver.loading_history.replay import EarlierSweep
+from solver.missions.block_run import BlockInput, BlockResult, run_block
 from solver.missions.mission import MissionHistory, MissionRequest
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
@@ -20,7 +21,7 @@ from solver.outcome import Outcome, absolute, known_to
 from solver.packing import Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import Passage
-from solver.wear.errors import Compared, HistoryError, compare, error_of_target
+from solver.wear.errors import Compared, HistoryError, compare, reach_target
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Solution
 
 STEP_ERROR_FRACTION = 0.5
@@ -146,15 +147,16 @@ class MissionProblem:
         results: list[BlockResult] = []
         for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, self._sweeps, strict=True)):
             run = run_passage if isinstance(block.frequency, Passage) else run_block
+            last = before if block.way == "continue" else None
             given = BlockInput(
-                mission, place, depth, budget.deadline, before, earlier, guide, with_slopes, with_switching
+                mission, place, depth, budget.deadline, last, earlier, guide, with_slopes, with_switching
             )
             result = guarded(partial(run, given))
             if isinstance(result, Failure):
                 where = f"in mission {number}, {mission.called(place)}"
                 return Failure(result.outcome, ": ".join(filter(None, (where, result.message))))
             results.append(result)
-            self._sweeps[place] = result.sweep or earlier
+            self._sweeps[place] = result.sweep
             budget.iterations += result.iterations
             depth, before = depth + result.growth, result.last
         return tuple(results)
@@ -194,9 +196,8 @@ def _assembled(mission: MissionRequest, solution: Solution) -> MissionHistory:
     compare_at = partial(_compare, solution, slice(None))
     both, whole = compare_at(counts)
     blocks = [_compare(solution, slice(n, n + 1), counts)[1] for n in range(len(mission.blocks))]
-    values, depth, target, target_error = course.read(counts), both.values["wear_depth"], course.reached, math.nan
-    if mission.until is not None and not math.isnan(target):
-        target_error = error_of_target(solution, mission.until, *compare_at(np.array([0.0, target])))
+    values, depth = course.read(counts), both.values["wear_depth"]
+    target, target_error = reach_target(solution, math.inf, compare_at)
     return MissionHistory(
         **solution.totals,
         response_begin=values["response"][:, :, 0],

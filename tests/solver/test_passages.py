@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from solver import Block, Outcome, Passage, SolverSettings
+from solver.loading_history.replay import EarlierSweep
 from solver.missions import passage as passages
-from solver.missions.block_run import BlockInput, EarlierSweep
+from solver.missions.block_run import BlockInput
 from solver.missions.mission import MissionRequest
 from solver.results.history import StartState
 from solver.settings import Resolution
