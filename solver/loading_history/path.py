@@ -19,20 +19,12 @@ from solver.contact.coulomb import SEPARATED, SLIP, friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import (
-    Failure,
-    State,
-    balance_after,
-    final_history,
-    transfer,
-    vibration_change,
-    vibration_size,
-)
+from solver.harmonic_balance.state import Failure, State, balance_after, transfer, vibration_change, vibration_size
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.results.history import PeriodicState
-from solver.results.state_report import evaluated
+from solver.results.state_report import known_state
 from solver.settings import Direction, Resolution, first_resolution
 from solver.structure.condensation import build_structure
 from solver.structure.joint import Case, Joint
@@ -166,24 +158,19 @@ class LoadingPath(Path[State]):
     omega: float | None = None
     shortest, longest = STEP_LIMITS
 
-    def excitation(self, parameter: float) -> tuple[float, float]:
-        """Frequency, rad/s, and amplitude, N, at a value of the parameter."""
-        if self.omega is None:
-            return parameter, self.excitation_amplitude
-        return self.omega, parameter * self.excitation_amplitude
-
     def joint_at(self, parameter: float) -> Joint:
         """Joint at a value of the parameter."""
-        return self.case.joint(*self.excitation(parameter))
+        if self.omega is None:
+            return self.case.joint(parameter, self.excitation_amplitude)
+        return self.case.joint(self.omega, parameter * self.excitation_amplitude)
 
     def joint_of(self, state: State) -> Joint:  # noqa: D102
         return self.joint_at(state.parameter)
 
     def state_of(self, known: PeriodicState) -> State:
         """A known state with the harmonics and samples of the path, evaluated and not solved again."""
-        balance, at = evaluated(self.case.joint(known.omega, known.excitation_amplitude), known)
         parameter = known.omega if self.omega is None else known.excitation_amplitude / self.excitation_amplitude
-        return State(at, final_history(balance, at), parameter)
+        return known_state(self.case, known, parameter)
 
     def balance_from(self, parameter: float, state: State) -> Balance:
         """Unworn balance at a value of the parameter, after a state."""

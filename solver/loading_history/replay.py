@@ -68,11 +68,9 @@ class EarlierSweep:
 
     def again(self, path: LoadingPath, run: Run, stride: int, *, with_switching: bool) -> StartState | None:
         """The state at the end, with the errors of the earlier one; None where the sweep has jumped over a fold, there
-        is no stable state, or the sweep may lead to another branch.
-
-        Above `VIBRATION_RECHECK` of the vibration with which nodes, harmonics and errors were chosen, a new sweep
-        chooses them. Where each pair slips or opens within the period, the state follows from the depths alone; without
-        a sweep, which alone says on which branch a state lies, the limit is `SMOOTH_CHANGE`.
+        is no stable state, or a new sweep has to choose nodes, harmonics and errors: above a change `VIBRATION_RECHECK`
+        of the vibration, or `SMOOTH_CHANGE` where each pair slips or opens, so that the state follows from the depths,
+        and no node says on which branch it lies.
 
         path: with harmonics and samples of the state. stride: nodes in a step. with_switching: as `find_instability`.
         """
@@ -92,21 +90,22 @@ class EarlierSweep:
                 return None
         except SingularStructureError:
             return None
-        periodic, iterations = periodic_state(joint, state), run.budget.iterations
-        return replace(start, state=periodic, reference=None, newton_iterations=iterations)
+        return replace(
+            start, state=periodic_state(joint, state), reference=None, newton_iterations=run.budget.iterations
+        )
 
     def _over_nodes(self, path: LoadingPath, target: float, run: Run, stride: int) -> State | None:
         """The state at a target of the path, over the nodes; None where it is not found."""
         if not self.nodes or self.resolution is None:
             return None
         coarse, (first, *nodes) = path.at(self.resolution), self.nodes[::stride]
-        begin = solve_first_state(coarse.case, *coarse.excitation(first), run)
+        joint = coarse.joint_at(first)
+        begin = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, run)
         if not isinstance(begin, State):
             return None
         rough, most = run.with_tolerance(path.case.settings.rough_tolerance), LARGEST_CHANGE * stride
-        # halvings lead past a corner at the resonance: without, half of the sweeps up to 212.6 Hz of the dovetail begin
-        # anew
+        # past a corner at the resonance: without halvings, half of the sweeps up to 212.6 Hz of the dovetail begin anew
         states = follow(coarse, (replace(begin, parameter=first),), [*nodes, target], run, rough, ATTEMPTS, most)
-        if not states or coarse.case is path.case:
-            return states[-1] if states else None
-        return coarse.move(states[-1], path, run)
+        if not states:
+            return None
+        return states[-1] if coarse.case is path.case else coarse.move(states[-1], path, run)

@@ -117,10 +117,6 @@ class BlockInput:
         friction, settings = self.block.friction_coefficient, self.mission.settings.of_steps
         return build_case(self.model, friction, start.penalty_omega, settings, start.resolution)
 
-    def new_run(self) -> Run:
-        """The solves of a state with which the block begins."""
-        return Run(self.mission.settings.tolerance, Budget(deadline=self.deadline))
-
     def wearing_joint(self, start: StartState) -> tuple[WearingJoint, WearState]:
         """The joint at the depth before the block, and a state of it."""
         wearing = WearingJoint(self.case_of(start), start, self.request)
@@ -151,13 +147,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
-    at = state.at
-    periodic = replace(
-        start.state,
-        displacement_h=at.displacement_h,
-        contact_force_h=at.force_h,
-        start_history=state.point.history,
-    )
+    motion, force, history = state.at.displacement_h, state.at.force_h, state.point.history
     return BlockResult(
         growth=depth[-1],
         response=values["response"],
@@ -172,7 +162,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         last=replace(
             start,
             outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
-            state=periodic,
+            state=replace(start.state, displacement_h=motion, contact_force_h=force, start_history=history),
             resolution=state.resolution,
             response_error=state.estimate.response,
             wear_rate_error=state.estimate.wear_rate,
@@ -186,13 +176,14 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
 def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
     """The state with which a block begins, or why there is none; and what the block of the next mission takes over."""
     block, earlier = given.block, given.earlier
+    run = Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
     if given.before is not None:
-        return _continued(given, given.before), None
+        return _continued(given, given.before, run), None
     if earlier is not None and earlier.start is not None:
         omega = 2.0 * np.pi * block.ends[0] if block.way == "ramp" else None
         path = LoadingPath(given.case_of(earlier.start), block.excitation_amplitude, omega)
         stride = 1 if given.guide is None else STEPS_OF_REFERENCE
-        again = earlier.again(path, given.new_run(), stride, with_switching=given.with_switching)
+        again = earlier.again(path, run, stride, with_switching=given.with_switching)
         if again is not None:
             return again, earlier
     direction = given.mission.first if block.way == "continue" else block.way
@@ -205,13 +196,13 @@ def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
     return start, EarlierSweep(passed, start, present.path.case.resolution)
 
 
-def _continued(given: BlockInput, last: StartState) -> StartState:
+def _continued(given: BlockInput, last: StartState, run: Run) -> StartState:
     """The state of a block that keeps the tangential history of the block before, or why there is none.
 
     last: state at the end of the block before, solved first at the depth before the block. Then amplitude and
     frequency change, one after the other, the frequency at the smaller amplitude. Raises as `guarded`.
     """
-    before, run = last.state, given.new_run()
+    before = last.state
     assert before is not None
     balance, at = evaluated(given.case_of(last).joint(before.omega, before.excitation_amplitude), before)
     found = run.state(balance, at.predicted_h)
@@ -231,8 +222,8 @@ def _continued(given: BlockInput, last: StartState) -> StartState:
         here = start.state
         if here is None:
             break
-        if here.excitation_amplitude == load if direction == "ramp" else here.omega == 2.0 * np.pi * target:
-            continue
-        start = given.sweeps(direction, load).go_on(start, given.case_of(start), target)
-        iterations += start.newton_iterations
+        arrived = here.excitation_amplitude == load if direction == "ramp" else here.omega == 2.0 * np.pi * target
+        if not arrived:
+            start = given.sweeps(direction, load).go_on(start, given.case_of(start), target)
+            iterations += start.newton_iterations
     return replace(start, newton_iterations=iterations)

@@ -102,7 +102,8 @@ class MissionProblem:
     def attempt(self, here: tuple[MissionState, Course], length: float) -> MissionStep | None:
         """As in SteppedProblem. The last mission of the step is computed."""
         nodes, rtol = here[1].nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
-        run_mission = partial(self._mission, here[0], int(nodes[-1].count + length))
+        number = int(nodes[-1].count + length)
+        run_mission = partial(self._mission, here[0], number, self._tests(number))
         step = attempt_step(nodes, int(length), self.mission.area, run_mission, STEP_ERROR_FRACTION * rtol)
         if isinstance(step, MissionStep):
             return step
@@ -122,7 +123,7 @@ class MissionProblem:
         if self._tests(done):
             return None
         self._sweeps, depth = list(state.sweeps), course.depths[-1].reshape(-1, self.mission.area.size).sum(axis=0)
-        behind = self._mission(state, done + 1, depth, False, tests=True)
+        behind = self._mission(state, done + 1, True, depth, False)
         if not isinstance(behind, Failure) and all(math.isfinite(each.inaccurate) for each in behind):
             return None
         unknown = Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
@@ -133,17 +134,14 @@ class MissionProblem:
         return self.history is None and number in (1, self.mission.missions[-1])
 
     def _mission(
-        self, state: MissionState, number: int, depth: FloatArray, with_slopes: bool, *, tests: bool = False
+        self, state: MissionState, number: int, with_switching: bool, depth: FloatArray, with_slopes: bool
     ) -> tuple[BlockResult, ...] | Failure:
-        """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m. tests: whether
-        stability is tested in any case.
-        """
+        """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
         mission, before, budget = self.mission, state.end, self.run.budget
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.history is not None:
             course = self.history.course
             guides = course.nodes[int(np.searchsorted(course.counts, number))].guides
-        with_switching = tests or self._tests(number)
         results: list[BlockResult] = []
         for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, self._sweeps, strict=True)):
             run = run_passage if isinstance(block.frequency, Passage) else run_block
