@@ -23,8 +23,6 @@ from solver.harmonic_balance.state import Failure, State, balance_after, transfe
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.results.history import PeriodicState
-from solver.results.state_report import known_state
 from solver.settings import Direction, Resolution, first_resolution
 from solver.structure.condensation import build_structure
 from solver.structure.joint import Case, Joint
@@ -166,11 +164,6 @@ class LoadingPath(Path[State]):
 
     def joint_of(self, state: State) -> Joint:  # noqa: D102
         return self.joint_at(state.parameter)
-
-    def state_of(self, known: PeriodicState) -> State:
-        """A known state with the harmonics and samples of the path, evaluated and not solved again."""
-        parameter = known.omega if self.omega is None else known.excitation_amplitude / self.excitation_amplitude
-        return known_state(self.case, known, parameter)
 
     def balance_from(self, parameter: float, state: State) -> Balance:
         """Unworn balance at a value of the parameter, after a state."""

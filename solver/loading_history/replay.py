@@ -12,7 +12,7 @@ from solver.loading_history.path import LoadingPath, Path, S
 from solver.newton.run import Run
 from solver.packing import packable
 from solver.results.history import StartState
-from solver.results.state_report import periodic_state
+from solver.results.state_report import known_state, periodic_state
 from solver.settings import Resolution
 from solver.stability.floquet import find_instability
 from solver.structure.condensation import SingularStructureError
@@ -77,8 +77,8 @@ class EarlierSweep:
         start = self.start
         if start is None or start.state is None or start.branch > 0:
             return None
-        before = replace(path.state_of(start.state), history=start.state.start_history)
-        target = before.parameter
+        target = start.state.omega if path.omega is None else 1.0
+        before = replace(known_state(path.case, start.state, target), history=start.state.start_history)
         try:
             state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
             if state is None or not path.forgets(state):

@@ -30,7 +30,7 @@ from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Outcome, describe_inaccurate
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
-from solver.results.state_report import periodic_state
+from solver.results.state_report import known_state, periodic_state
 from solver.settings import Direction, FollowedFrequency, Resolution, SolverSettings, allowed
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
@@ -111,13 +111,14 @@ class FrequencySweep:
 
         start: at the same frequency for a ramp, else under the same load. case: with its harmonics and penalty.
         """
-        assert start.state is not None
-        omega = 2.0 * np.pi * frequency
-        present = self._new_sweep(cell_of(frequency), omega if self.direction == "ramp" else None)
-        path = LoadingPath(case, self.excitation_amplitude, self.omega)
-        state = path.state_of(start.state)
-        present.sign = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
-        if not present.begin(path, state) and present.failure is not None:
+        known, omega = start.state, 2.0 * np.pi * frequency
+        assert known is not None
+        ramp = self.direction == "ramp"
+        present = self._new_sweep(cell_of(frequency), omega if ramp else None)
+        parameter = known.excitation_amplitude / self.excitation_amplitude if ramp else known.omega
+        present.sign = 1.0 if (1.0 if ramp else omega) >= parameter else -1.0
+        if not present.begin(replace(present.path, case=case), known_state(case, known, parameter)):
+            assert present.failure is not None
             return self._without_state(present.failure)
         _, after = next(self.states(np.array([frequency])))
         return replace(after, branch=start.branch + after.branch)

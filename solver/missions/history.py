@@ -63,6 +63,8 @@ class MissionProblem:
         self.mission, self.history, self.run = mission, history, Run(mission.settings.tolerance)
         self.name, self.course = "history" if history is None else "reference", unworn_course(mission)
         self.last = mission.missions[-1] if history is None else int(history.course.ends[-1])
+        # as in a wear history, stability is tested at the start and the end
+        self._tested = (1, self.last) if history is None else ()
         # the sweep with which each block began last, and why a step was not found
         self._sweeps: list[EarlierSweep | None] = []
         self._failure = Failure(Outcome.MARCH_FAILED, "the error of a step over one mission is too large")
@@ -103,7 +105,7 @@ class MissionProblem:
         """As in SteppedProblem. The last mission of the step is computed."""
         nodes, rtol = here[1].nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
         number = int(nodes[-1].count + length)
-        run_mission = partial(self._mission, here[0], number, self._tests(number))
+        run_mission = partial(self._mission, here[0], number, number in self._tested)
         step = attempt_step(nodes, int(length), self.mission.area, run_mission, STEP_ERROR_FRACTION * rtol)
         if isinstance(step, MissionStep):
             return step
@@ -120,7 +122,7 @@ class MissionProblem:
     def _unstable_behind(self, state: MissionState, course: Course) -> Failure | None:
         """Instability behind the mission with which a history has reached its target, None if stable."""
         done = int(course.ends[-1])
-        if self._tests(done):
+        if done in self._tested:
             return None
         self._sweeps, depth = list(state.sweeps), course.depths[-1].reshape(-1, self.mission.area.size).sum(axis=0)
         behind = self._mission(state, done + 1, True, depth, False)
@@ -129,12 +131,8 @@ class MissionProblem:
         unknown = Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
         return behind if isinstance(behind, Failure) else unknown
 
-    def _tests(self, number: int) -> bool:
-        """Whether stability is tested in a mission: as in a wear history, at the start and the end."""
-        return self.history is None and number in (1, self.mission.missions[-1])
-
     def _mission(
-        self, state: MissionState, number: int, with_switching: bool, depth: FloatArray, with_slopes: bool
+        self, state: MissionState, number: int, tested: bool, depth: FloatArray, with_slopes: bool
     ) -> tuple[BlockResult, ...] | Failure:
         """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
         mission, before, budget = self.mission, state.end, self.run.budget
@@ -146,9 +144,7 @@ class MissionProblem:
         for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, self._sweeps, strict=True)):
             run = run_passage if isinstance(block.frequency, Passage) else run_block
             last = before if block.way == "continue" else None
-            given = BlockInput(
-                mission, place, depth, budget.deadline, last, earlier, guide, with_slopes, with_switching
-            )
+            given = BlockInput(mission, place, depth, budget.deadline, last, earlier, guide, with_slopes, tested)
             result = guarded(partial(run, given))
             if isinstance(result, Failure):
                 where = f"in mission {number}, {mission.called(place)}"

@@ -1,6 +1,5 @@
 """What is reported of a converged state: pressures, slip, responses, loops, certificate; or its whole motion."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,7 +34,7 @@ def evaluated(joint: Joint, state: PeriodicState) -> tuple[Balance, Evaluation]:
     return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
 
 
-def known_state(case: Case, state: PeriodicState, parameter: float = math.nan) -> State:
+def known_state(case: Case, state: PeriodicState, parameter: float = np.nan) -> State:
     """A state with the harmonics and samples of a case, evaluated and not solved again; parameter: as of `State`."""
     balance, at = evaluated(case.joint(state.omega, state.excitation_amplitude), state)
     return State(at, final_history(balance, at), parameter)

@@ -159,10 +159,8 @@ def _completed(outputs: Compared, error: HistoryError, area: FloatArray) -> Hist
 def reach_target(
     solution: Solution, end: float, compare_at: Callable[[FloatArray], tuple[Compared, HistoryError]]
 ) -> tuple[float, float]:
-    """Count up to `end` at which a history has reached its target, NaN if never, and its estimated error: the
-    difference to that of the other solution, or the time that the error of the wear takes, if that is longer.
-
-    compare_at: as `compare` at some counts.
+    """Count up to `end` at which a history has reached its target, NaN if never, and its error: its difference to that
+    of the other solution, or the time that the error of the wear takes, if longer. compare_at: as `compare`.
     """
     course, other, reached = solution.course, solution.compared, solution.course.reached
     if course.target is None or not reached <= end:
