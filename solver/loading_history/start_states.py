@@ -111,17 +111,20 @@ class FrequencySweep:
 
         start: at the same frequency for a ramp, else under the same load. case: with its harmonics and penalty.
         """
-        known, omega = start.state, 2.0 * np.pi * frequency
+        known, omega, ramp = start.state, 2.0 * np.pi * frequency, self.direction == "ramp"
         assert known is not None
-        ramp = self.direction == "ramp"
-        present = self._new_sweep(cell_of(frequency), omega if ramp else None)
         parameter = known.excitation_amplitude / self.excitation_amplitude if ramp else known.omega
-        present.sign = 1.0 if (1.0 if ramp else omega) >= parameter else -1.0
+        target = 1.0 if ramp else omega
+        if parameter == target:
+            return start
+        present = self._new_sweep(cell_of(frequency), omega if ramp else None)
+        present.sign = 1.0 if target > parameter else -1.0
         if not present.begin(replace(present.path, case=case), known_state(case, known, parameter)):
             assert present.failure is not None
             return self._without_state(present.failure)
         _, after = next(self.states(np.array([frequency])))
-        return replace(after, branch=start.branch + after.branch)
+        iterations = start.newton_iterations + after.newton_iterations
+        return replace(after, branch=start.branch + after.branch, newton_iterations=iterations)
 
     def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
         """The sweep that leads to a frequency, Hz, at its first node or farther on; without a state if none is found.

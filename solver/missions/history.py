@@ -126,10 +126,11 @@ class MissionProblem:
             return None
         self._sweeps, depth = list(state.sweeps), course.depths[-1].reshape(-1, self.mission.area.size).sum(axis=0)
         behind = self._mission(state, done + 1, True, depth, False)
-        if not isinstance(behind, Failure) and all(math.isfinite(each.inaccurate) for each in behind):
+        if isinstance(behind, Failure):
+            return behind
+        if all(math.isfinite(each.inaccurate) for each in behind):
             return None
-        unknown = Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
-        return behind if isinstance(behind, Failure) else unknown
+        return Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
 
     def _mission(
         self, state: MissionState, number: int, tested: bool, depth: FloatArray, with_slopes: bool
