@@ -63,7 +63,7 @@ class BlockResult:
 class BlockInput:
     """What a block is computed with.
 
-    mission, place: the mission, and the place of the block in it. depth (n_contact,): m, worn before the block.
+    mission, block: the mission, and the block of it. depth (n_contact,): m, worn before the block.
     deadline: CPU time of the thread, s, at which the time of the history is over.
     before: last state of the block before, which the block continues; None for a block with a sweep of its own.
     earlier, guide: of this block in an earlier mission, and in the history for its reference solution; else None.
@@ -72,7 +72,7 @@ class BlockInput:
     """
 
     mission: MissionRequest
-    place: int
+    block: Block
     depth: FloatArray
     deadline: float = math.inf
     before: StartState | None = None
@@ -80,11 +80,6 @@ class BlockInput:
     guide: Guide | None = None
     with_slope: bool = False
     with_switching: bool = True
-
-    @property
-    def block(self) -> Block:
-        """The block."""
-        return self.mission.blocks[self.place]
 
     @property
     def passage(self) -> Passage:

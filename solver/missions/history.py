@@ -145,7 +145,7 @@ class MissionProblem:
         for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, self._sweeps, strict=True)):
             run = run_passage if isinstance(block.frequency, Passage) else run_block
             last = before if block.way == "continue" else None
-            given = BlockInput(mission, place, depth, budget.deadline, last, earlier, guide, with_slopes, tested)
+            given = BlockInput(mission, block, depth, budget.deadline, last, earlier, guide, with_slopes, tested)
             result = guarded(partial(run, given))
             if isinstance(result, Failure):
                 where = f"in mission {number}, {mission.called(place)}"

@@ -65,7 +65,7 @@ def test_a_vibration_is_late_by_its_decay_time():
     def case(rate, damping=6.0):
         # too little wear to change the pressures on the way
         block = Block(scene("sdof_slider", damping=damping), Passage(180.0, 220.0, rate), 10.0, FRICTION)
-        return BlockInput(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), 0, np.zeros(1))
+        return BlockInput(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), block, np.zeros(1))
 
     fast, slow = passages.run_passage(case(7.0)), passages.run_passage(case(0.07))
     assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
@@ -89,7 +89,7 @@ def swept_with(monkeypatch, density, depth, near=()):
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, FRICTION, begin="up")
     mission, earlier = MissionRequest((block,), WEAR, (0, 1), SETTINGS), EarlierSweep(near) if near else None
-    swept = passages.find_states(BlockInput(mission, 0, np.array([depth]), earlier=earlier))
+    swept = passages.find_states(BlockInput(mission, block, np.array([depth]), earlier=earlier))
     assert isinstance(swept, passages.Swept)
     return swept
 
