@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.replay import EarlierSweep
+from solver.loading_history.sweep import EarlierSweep
 from solver.missions.block_run import BlockInput, BlockResult, run_block
 from solver.missions.mission import MissionHistory, MissionRequest
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage

@@ -31,7 +31,7 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure, first_response, largest_responses
-from solver.loading_history.replay import EarlierSweep
+from solver.loading_history.sweep import EarlierSweep
 from solver.missions.block_run import BlockInput, BlockResult
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode

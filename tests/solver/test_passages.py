@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from solver import Block, Outcome, Passage, SolverSettings
-from solver.loading_history.replay import EarlierSweep
+from solver.loading_history.sweep import EarlierSweep
 from solver.missions import passage as passages
 from solver.missions.block_run import BlockInput
 from solver.missions.mission import MissionRequest
