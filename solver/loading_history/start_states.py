@@ -30,7 +30,7 @@ from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Outcome, describe_inaccurate
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
-from solver.results.state_report import periodic_state
+from solver.results.state_report import known_state, periodic_state
 from solver.settings import Direction, FollowedFrequency, Resolution, SolverSettings, allowed
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
@@ -105,16 +105,25 @@ class FrequencySweep:
         cell, omega, present = unpack(saved)
         self._new_sweep(cell, omega).load(present)
 
-    def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
-        """Begin at a known state; False where the state is rejected.
+    def go_on(self, start: StartState, case: Case, frequency: float) -> StartState:
+        """The state at a frequency, Hz, to which a sweep leads from a known state, or why there is none.
 
-        case: harmonics, samples and penalty of the state. state: its parameter is the frequency, rad/s, or for a ramp
-        its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
+        start: at the same frequency for a ramp, else under the same load. case: with its harmonics and penalty.
         """
-        omega = 2.0 * np.pi * frequency
-        present = self._new_sweep(cell_of(frequency), omega if self.direction == "ramp" else None)
-        present.sign = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
-        return present.begin(replace(present.path, case=case), state)
+        known, omega, ramp = start.state, 2.0 * np.pi * frequency, self.direction == "ramp"
+        assert known is not None
+        parameter = known.excitation_amplitude / self.excitation_amplitude if ramp else known.omega
+        target = 1.0 if ramp else omega
+        if parameter == target:
+            return start
+        present = self._new_sweep(cell_of(frequency), omega if ramp else None)
+        present.sign = 1.0 if target > parameter else -1.0
+        if not present.begin(replace(present.path, case=case), known_state(case, known, parameter)):
+            assert present.failure is not None
+            return self._without_state(present.failure)
+        _, after = next(self.states(np.array([frequency])))
+        iterations = start.newton_iterations + after.newton_iterations
+        return replace(after, branch=start.branch + after.branch, newton_iterations=iterations)
 
     def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
         """The sweep that leads to a frequency, Hz, at its first node or farther on; without a state if none is found.

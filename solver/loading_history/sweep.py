@@ -2,7 +2,8 @@
 
 Friction gives a joint a family of periodic states. The tangential displacements at which the pairs stick select one,
 and these depend on all vibration before. So a sweep has nodes of its own, whose distance depends only on the change of
-the vibration. A state between two nodes is solved from the node before and leaves the sweep unchanged.
+the vibration. A state between two nodes is solved from the node before and leaves the sweep unchanged. At other depths
+a sweep is made again over its nodes (`EarlierSweep`).
 
 The error of a sweep comes from its steps: from node to node the predicted force goes along a straight line, and pairs
 slide as it says (`solver.contact.slow_slide`). A reference sweep has a node in the middle of every second step, and
@@ -12,18 +13,25 @@ fold and where each pair slips or opens within the period: such a state follows 
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Generic
 
 import numpy as np
 
+from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.accuracy.resolved_state import NOTHING, fewer
-from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
-from solver.harmonic_balance.state import Failure
-from solver.loading_history.path import FREE_STEP, Path, S, Step
+from solver.continuation.first_state import solve_first_state
+from solver.continuation.natural import ATTEMPTS, LARGEST_STEP_RATIO, SMOOTH_CHANGE, Lengths, take_step
+from solver.harmonic_balance.state import Failure, State, vibration_change
+from solver.loading_history.path import FREE_STEP, LoadingPath, Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
-from solver.packing import in_rows
+from solver.packing import in_rows, packable
+from solver.results.history import StartState
+from solver.results.state_report import known_state, periodic_state
+from solver.settings import Resolution
+from solver.stability.floquet import find_instability
+from solver.structure.condensation import SingularStructureError
 
 LAST_NODES = 3
 """Last nodes of a sweep: the next one is predicted on the parabola through them. With a straight line the nodes of the
@@ -48,6 +56,8 @@ difference is three times the smaller one."""
 PARTS_TO_POINT = (1, 4, 16)
 """Parts of the way from the last node of a reference sweep to a point: more where the point is not found at once."""
 
+LARGEST_CHANGE = 2.0
+"""Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
 
 _OF_REFERENCE = ("reference", "reference_resolution", "skipped")
 _SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", *_OF_REFERENCE)
@@ -121,7 +131,7 @@ class Sweep(Generic[S]):
         # over states in between where the last part is too long
         for n_parts in PARTS_TO_POINT:
             way = np.linspace(node.parameter, state.parameter, n_parts + 1)[1:].tolist()
-            if found := _through(path, (node,), way, run.fresh()):
+            if found := follow(path, (node,), way, run.fresh()):
                 return found[-1]
         return None
 
@@ -227,7 +237,7 @@ class Sweep(Generic[S]):
             self._reference_run = self.run.fresh()
             moved = self.path.at(self.reference_resolution).move(states[-1], path, self.run)
             states = () if moved is None else (moved,)
-        return _through(path, states, targets, self._reference_run.with_tolerance(path.case.settings.rough_tolerance))
+        return follow(path, states, targets, self._reference_run.with_tolerance(path.case.settings.rough_tolerance))
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
@@ -248,9 +258,87 @@ class Sweep(Generic[S]):
         self.save()
 
 
-def _through(path: Path[S], states: tuple[S, ...], targets: Sequence[float], run: Run) -> tuple[S, ...]:
-    """The last states of a path that goes on from some over some targets; none where one of these is not found."""
-    for target in targets:
-        found = path.solve(states, target, run) if states else None
-        states = () if found is None else (*states, found)[-LAST_NODES:]
+def follow(
+    path: Path[S],
+    states: tuple[S, ...],
+    targets: Sequence[float],
+    run: Run,
+    rough: Run | None = None,
+    halvings: int = 0,
+    most: float = math.inf,
+) -> tuple[S, ...]:
+    """The last states of a path that goes on from some over some targets; none where one of these is not found.
+
+    rough: for the states before the last target; by default `run`. halvings: of a part whose end is not found, or whose
+    change, over that of a step of a sweep, is larger than `most`.
+    """
+    ahead = list(targets)
+    while states and ahead:
+        after = path.solve(states, ahead[0], run if len(ahead) == 1 else rough or run)
+        if after is not None and (math.isinf(most) or path.change(states[-1], after) <= most):
+            states = (*states, after)[-LAST_NODES:]
+            ahead.pop(0)
+        elif halvings == 0:
+            return ()
+        else:
+            halvings -= 1
+            ahead.insert(0, 0.5 * (states[-1].parameter + ahead[0]))
     return states
+
+
+@packable
+@dataclass(frozen=True)
+class EarlierSweep:
+    """A sweep to be made again at other depths. With other nodes, the wear would jump from depth to depth by its error.
+
+    nodes: frequencies, rad/s, or load factors of its nodes, none if lost; of a passage the frequencies that count, Hz.
+    start, resolution: state at its end, and harmonics and samples of the last node; None for a passage.
+    """
+
+    nodes: tuple[float, ...]
+    start: StartState | None = None
+    resolution: Resolution | None = None
+
+    def again(self, path: LoadingPath, run: Run, stride: int, *, with_switching: bool) -> StartState | None:
+        """The state at the end, with the errors of the earlier one; None where the sweep has jumped over a fold, there
+        is no stable state, or a new sweep has to choose nodes, harmonics and errors: above a change `VIBRATION_RECHECK`
+        of the vibration, or `SMOOTH_CHANGE` where each pair slips or opens, so that the state follows from the depths,
+        and no node says on which branch it lies.
+
+        path: with harmonics and samples of the state. stride: nodes in a step. with_switching: as `find_instability`.
+        """
+        start = self.start
+        if start is None or start.state is None or start.branch > 0:
+            return None
+        target = start.state.omega if path.omega is None else 1.0
+        before = replace(known_state(path.case, start.state, target), history=start.state.start_history)
+        try:
+            state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
+            if state is None or not path.forgets(state):
+                state, most = self._over_nodes(path, target, run.fresh(), stride), VIBRATION_RECHECK
+            if state is None or vibration_change(before.evaluation, state.evaluation) > most:
+                return None
+            joint = path.joint_at(target)
+            if find_instability(path.case, joint, state.evaluation, run, with_switching):
+                return None
+        except SingularStructureError:
+            return None
+        return replace(
+            start, state=periodic_state(joint, state), reference=None, newton_iterations=run.budget.iterations
+        )
+
+    def _over_nodes(self, path: LoadingPath, target: float, run: Run, stride: int) -> State | None:
+        """The state at a target of the path, over the nodes; None where it is not found."""
+        if not self.nodes or self.resolution is None:
+            return None
+        coarse, (first, *nodes) = path.at(self.resolution), self.nodes[::stride]
+        joint = coarse.joint_at(first)
+        begin = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, run)
+        if not isinstance(begin, State):
+            return None
+        rough, most = run.with_tolerance(path.case.settings.rough_tolerance), LARGEST_CHANGE * stride
+        # past a corner at the resonance: without halvings, half of the sweeps up to 212.6 Hz of the dovetail begin anew
+        states = follow(coarse, (replace(begin, parameter=first),), [*nodes, target], run, rough, ATTEMPTS, most)
+        if not states:
+            return None
+        return states[-1] if coarse.case is path.case else coarse.move(states[-1], path, run)

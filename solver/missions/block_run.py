@@ -6,47 +6,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.clock import computing_time
-from solver.continuation.first_state import solve_first_state
-from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
-from solver.harmonic_balance.state import Failure, State, vibration_change
+from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import FrequencySweep
-from solver.loading_history.sweep import LAST_NODES, STEPS_OF_REFERENCE
+from solver.loading_history.sweep import STEPS_OF_REFERENCE, EarlierSweep
 from solver.missions.mission import Block, MissionRequest
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
-from solver.outcome import Outcome, describe_inaccurate
-from solver.packing import packable
+from solver.outcome import Outcome
 from solver.results.history import StartState, first_cut_off
-from solver.results.state_report import periodic_state
-from solver.settings import Direction, Passage, Resolution
-from solver.stability.floquet import find_instability
-from solver.structure.condensation import SingularStructureError
+from solver.results.state_report import evaluated, periodic_state
+from solver.settings import Direction, Passage
 from solver.structure.joint import Case, build_case
 from solver.wear.errors import HISTORY_SAFETY
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
-
-LARGEST_CHANGE = 2.0
-"""Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
-
-
-@packable
-@dataclass(frozen=True)
-class EarlierSweep:
-    """The sweep with which a block began in an earlier mission.
-
-    nodes: frequencies, rad/s, or load factors of its nodes, none if lost; of a passage the frequencies that count, Hz.
-    start, resolution: state at its end, and harmonics and samples of the last node; None for a passage.
-    """
-
-    nodes: tuple[float, ...]
-    start: StartState | None = None
-    resolution: Resolution | None = None
 
 
 @dataclass(frozen=True)
@@ -60,7 +37,7 @@ class BlockResult:
     inaccurate: largest relative error of a state above rtol, 0 where there is none, inf where stability is not known.
     held, cut_off: whether a joint that slides as a whole was held, or a pair at an edge of the contact carries load.
     guide, sweep: what the reference solution takes over, and the next mission (None for a block that continues).
-    last: the state at the end, for a block that continues; its `start_history` is that of the next state.
+    last: the state at the end, which a block that continues solves again; `start_history` is that which it leaves.
     iterations: of Newton's method, start state included.
     sweep_rate: |df/dt| / (zeta f)^2 of a passage; 0 for steady vibration.
     """
@@ -85,7 +62,7 @@ class BlockResult:
 class BlockInput:
     """What a block is computed with.
 
-    mission, place: the mission, and the place of the block in it. depth (n_contact,): m, worn before the block.
+    mission, block: the mission, and the block of it. depth (n_contact,): m, worn before the block.
     deadline: CPU time of the thread, s, at which the time of the history is over.
     before: last state of the block before, which the block continues; None for a block with a sweep of its own.
     earlier, guide: of this block in an earlier mission, and in the history for its reference solution; else None.
@@ -94,7 +71,7 @@ class BlockInput:
     """
 
     mission: MissionRequest
-    place: int
+    block: Block
     depth: FloatArray
     deadline: float = math.inf
     before: StartState | None = None
@@ -104,21 +81,10 @@ class BlockInput:
     with_switching: bool = True
 
     @property
-    def block(self) -> Block:
-        """The block."""
-        return self.mission.blocks[self.place]
-
-    @property
     def passage(self) -> Passage:
         """The passage of a block that is one."""
         assert isinstance(self.block.frequency, Passage)
         return self.block.frequency
-
-    @property
-    def is_continued(self) -> bool:
-        """Whether the next block begins from the last state of this one."""
-        blocks = self.mission.blocks
-        return blocks[(self.place + 1) % len(blocks)].way == "continue"
 
     @property
     def model(self) -> ReducedModel:
@@ -127,15 +93,10 @@ class BlockInput:
         return replace(self.block.model, contact=replace(contact, gap=contact.gap + self.depth))
 
     @property
-    def counts(self) -> FloatArray:
-        """Cycle counts (2,) at start and end of a block of steady vibration."""
-        return np.array([0.0, self.block.cycles or 0.0])
-
-    @property
     def request(self) -> WearRequest:
         """The wear history of the block, with the wear law from the depth before on."""
-        mission, law = self.mission, self.mission.law.begun_at(self.depth)
-        return WearRequest(mission.wear_coefficient, None, self.counts, law=law, ends_at_last=True)
+        counts, law = np.array([0.0, self.block.cycles or 0.0]), self.mission.law.begun_at(self.depth)
+        return WearRequest(self.mission.wear_coefficient, None, counts, law=law, ends_at_last=True)
 
     def sweeps(self, direction: Direction, amplitude: float) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N."""
@@ -147,7 +108,7 @@ class BlockInput:
 
     def case_of(self, start: StartState) -> Case:
         """The case at the depth before the block, with harmonics, samples and penalty of a state."""
-        return build_case(self.model, start.penalty_omega, self.mission.settings, start.resolution)
+        return build_case(self.model, start.penalty_omega, self.mission.settings.of_steps, start.resolution)
 
     def wearing_joint(self, start: StartState) -> tuple[WearingJoint, WearState]:
         """The joint at the depth before the block, and a state of it."""
@@ -160,11 +121,12 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
     start, sweep = find_start(given)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    case, counts = given.case_of(start), given.counts
+    case, request = given.case_of(start), given.request
+    counts = np.array([0.0, request.end])
     if given.guide is None:
-        problem = WearProblem(case, start, given.request, stable_end=given.with_switching)
+        problem = WearProblem(case, start, request, stable_end=given.with_switching)
     else:
-        problem = reference_of(case, start, given.request, given.guide, counts)
+        problem = reference_of(case, start, request, given.guide, counts)
     solution = Integrator(given.deadline - computing_time()).integrate(problem)
     failure = solution.failure
     if failure is not None and not failure.outcome.complete:
@@ -178,6 +140,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
+    motion, force, history = state.at.displacement_h, state.at.force_h, state.point.history
     return BlockResult(
         growth=depth[-1],
         response=values["response"],
@@ -187,38 +150,35 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
         inaccurate=math.inf if failure else state.worst.largest if state.inaccurate_from <= counts[-1] else 0.0,
         held=state.held_from <= counts[-1],
-        cut_off=not math.isnan(first_cut_off(given.model.contact, counts, values["mean_pressure"], depth)),
+        cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
         guide=Guide(state.resolutions, state.first_length),
-        last=_last(state, start, given.mission.settings.rtol) if given.is_continued else None,
+        last=replace(
+            start,
+            outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
+            state=replace(start.state, displacement_h=motion, contact_force_h=force, start_history=history),
+            resolution=state.resolution,
+            response_error=state.estimate.response,
+            wear_rate_error=state.estimate.wear_rate,
+            reference=None,
+        ),
         sweep=sweep,
         iterations=start.newton_iterations + solution.iterations,
     )
 
 
-def _last(state: WearState, start: StartState, rtol: float) -> StartState:
-    """The last state of a block, with the tangential history for the next one."""
-    at, known = state.at, state.estimate
-    assert start.state is not None
-    motion, force, history = at.displacement_h, at.force_h, state.point.history
-    return replace(
-        start,
-        outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
-        state=replace(start.state, displacement_h=motion, contact_force_h=force, start_history=history),
-        resolution=state.resolution,
-        response_error=known.response,
-        wear_rate_error=known.wear_rate,
-        message="" if state.accurate else describe_inaccurate(known.response, known.wear_rate, rtol),
-        reference=None,
-    )
-
-
 def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
     """The state with which a block begins, or why there is none; and what the block of the next mission takes over."""
-    block = given.block
+    block, earlier = given.block, given.earlier
+    run = Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
     if given.before is not None:
-        return _continued(given, given.before), None
-    if given.earlier is not None and (again := _by_earlier_sweep(given, given.earlier)) is not None:
-        return again, given.earlier
+        return _continued(given, given.before, run), None
+    if earlier is not None and earlier.start is not None:
+        omega = 2.0 * np.pi * block.ends[0] if block.way == "ramp" else None
+        path = LoadingPath(given.case_of(earlier.start), block.excitation_amplitude, omega)
+        stride = 1 if given.guide is None else STEPS_OF_REFERENCE
+        again = earlier.again(path, run, stride, with_switching=given.with_switching)
+        if again is not None:
+            return again, earlier
     direction = given.mission.first if block.way == "continue" else block.way
     sweeps = given.sweeps(direction, block.excitation_amplitude)
     _, start = next(sweeps.states(np.array([block.ends[0]])))
@@ -229,96 +189,29 @@ def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
     return start, EarlierSweep(passed, start, present.path.case.resolution)
 
 
-def _by_earlier_sweep(given: BlockInput, earlier: EarlierSweep) -> StartState | None:
-    """The state through the nodes of an earlier sweep, at other depths, with its errors; else None: where the sweep has
-    jumped over a fold, there is no stable state, or the sweep may lead to another branch.
-
-    With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
-    Above `VIBRATION_RECHECK` of the vibration with which nodes, harmonics and errors were chosen, a new sweep chooses
-    them. Where each pair slips or opens within the period, the state follows from the depths alone; without a sweep,
-    which alone says on which branch a state lies, the limit is `SMOOTH_CHANGE`.
-    """
-    start, run = earlier.start, Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
-    if start is None or start.state is None or start.branch > 0:
-        return None
-    ramp, omega, (wearing, unworn) = given.block.way == "ramp", start.state.omega, given.wearing_joint(start)
-    path = LoadingPath(wearing.case, given.block.excitation_amplitude, omega if ramp else None)
-    target = 1.0 if ramp else omega
-    before = State(unworn.at, start.state.start_history, target)
-    try:
-        state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
-        if state is None or not path.forgets(state):
-            stride = 1 if given.guide is None else STEPS_OF_REFERENCE
-            state, most = _through_nodes(path, earlier, target, stride, run.fresh()), VIBRATION_RECHECK
-        if state is None or vibration_change(unworn.at, state.evaluation) > most:
-            return None
-        joint = path.joint_at(target)
-        if find_instability(wearing.case, joint, state.evaluation, run, given.with_switching):
-            return None
-    except SingularStructureError:
-        return None
-    return replace(start, state=periodic_state(joint, state), reference=None, newton_iterations=run.budget.iterations)
-
-
-def _through_nodes(path: LoadingPath, earlier: EarlierSweep, target: float, stride: int, run: Run) -> State | None:
-    """The state at a target of the path, through nodes of an earlier sweep; None where it is not found."""
-    if not earlier.nodes or earlier.resolution is None:
-        return None
-    coarse, (first, *nodes) = path.at(earlier.resolution), earlier.nodes[::stride]
-    joint = coarse.joint_at(first)
-    begin = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, run)
-    if not isinstance(begin, State):
-        return None
-    states: tuple[State, ...] = (replace(begin, parameter=first),)
-    ahead, halvings, rough = [*nodes, target], 0, run.with_tolerance(coarse.case.settings.rough_tolerance)
-    while ahead:
-        after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
-        if after is not None and coarse.change(states[-1], after) <= LARGEST_CHANGE * stride:
-            states = (*states, after)[-LAST_NODES:]
-            ahead.pop(0)
-        elif (halvings := halvings + 1) > ATTEMPTS:
-            return None
-        else:
-            # past a corner at the resonance: without, half of the sweeps up to 212.6 Hz of the dovetail begin anew
-            ahead.insert(0, 0.5 * (states[-1].parameter + ahead[0]))
-    return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
-
-
-def _continued(given: BlockInput, before: StartState) -> StartState:
+def _continued(given: BlockInput, last: StartState, run: Run) -> StartState:
     """The state of a block that keeps the tangential history of the block before, or why there is none.
 
-    before: state at the end of the block before, solved first at the depth before the block. Then amplitude and
+    last: state at the end of the block before, solved first at the depth before the block. Then amplitude and
     frequency change, one after the other, the frequency at the smaller amplitude. Raises as `guarded`.
     """
-    last, run = before.state, Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
-    assert last is not None
-    frequency, amplitude = given.block.ends[0], given.block.excitation_amplitude
-    wearing, unworn = given.wearing_joint(before)
-    balance = wearing.balance_of(unworn)
-    state = run.state(balance, unworn.at.predicted_h)
-    if state is None:
+    before = last.state
+    assert before is not None
+    balance, at = evaluated(given.case_of(last).joint(before.omega, before.excitation_amplitude), before)
+    found = run.state(balance, at.predicted_h)
+    if found is None:
         said = "the last state of the block before is not found at the depth before this block"
-        return replace(before, state=None, outcome=Outcome.BRANCH_LOST, message=said)
-    start = replace(before, state=periodic_state(balance.joint, State(state.evaluation, last.start_history)))
-    along: Direction = "up" if 2.0 * np.pi * frequency > last.omega else "down"
-    iterations, lower = run.budget.iterations, min(amplitude, last.excitation_amplitude)
+        return replace(last, state=None, outcome=Outcome.BRANCH_LOST, message=said)
+    start = replace(last, state=periodic_state(balance.joint, found), newton_iterations=run.budget.iterations)
+    frequency, amplitude = given.block.ends[0], given.block.excitation_amplitude
+    along: Direction = "up" if 2.0 * np.pi * frequency > before.omega else "down"
+    lower = min(amplitude, before.excitation_amplitude)
     legs: tuple[tuple[Direction, float, float], ...] = (
-        ("ramp", last.omega / (2.0 * np.pi), lower),
+        ("ramp", before.omega / (2.0 * np.pi), lower),
         (along, frequency, lower),
         ("ramp", frequency, amplitude),
     )
     for direction, target, load in legs:
-        here = start.state
-        if here is None:
-            break
-        if here.excitation_amplitude == load if direction == "ramp" else here.omega == 2.0 * np.pi * target:
-            continue
-        sweeps, (wearing, unworn) = given.sweeps(direction, load), given.wearing_joint(start)
-        parameter = here.excitation_amplitude / load if direction == "ramp" else here.omega
-        if not sweeps.go_on_from(wearing.case, replace(unworn.point, parameter=parameter), target):
-            said = "more harmonics change the last state of the block before by more than half"
-            return replace(start, state=None, outcome=Outcome.UNSETTLED, message=said)
-        _, after = next(sweeps.states(np.array([target])))
-        start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)
-        iterations += after.newton_iterations
-    return replace(start, newton_iterations=iterations)
+        if start.state is not None:
+            start = given.sweeps(direction, load).go_on(start, given.case_of(start), target)
+    return start

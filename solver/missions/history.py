@@ -10,7 +10,8 @@ import numpy as np
 
 from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep, run_block
+from solver.loading_history.sweep import EarlierSweep
+from solver.missions.block_run import BlockInput, BlockResult, run_block
 from solver.missions.mission import MissionHistory, MissionRequest
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
@@ -20,7 +21,7 @@ from solver.outcome import Outcome, absolute, known_to
 from solver.packing import Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import Passage
-from solver.wear.errors import Compared, HistoryError, compare, error_of_target
+from solver.wear.errors import Compared, HistoryError, compare, reach_target
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Solution
 
 STEP_ERROR_FRACTION = 0.5
@@ -62,6 +63,8 @@ class MissionProblem:
         self.mission, self.history, self.run = mission, history, Run(mission.settings.tolerance)
         self.name, self.course = "history" if history is None else "reference", unworn_course(mission)
         self.last = mission.missions[-1] if history is None else int(history.course.ends[-1])
+        # as in a wear history, stability is tested at the start and the end
+        self._tested = (1, self.last) if history is None else ()
         # the sweep with which each block began last, and why a step was not found
         self._sweeps: list[EarlierSweep | None] = []
         self._failure = Failure(Outcome.MARCH_FAILED, "the error of a step over one mission is too large")
@@ -101,7 +104,8 @@ class MissionProblem:
     def attempt(self, here: tuple[MissionState, Course], length: float) -> MissionStep | None:
         """As in SteppedProblem. The last mission of the step is computed."""
         nodes, rtol = here[1].nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
-        run_mission = partial(self._mission, here[0], int(nodes[-1].count + length))
+        number = int(nodes[-1].count + length)
+        run_mission = partial(self._mission, here[0], number, number in self._tested)
         step = attempt_step(nodes, int(length), self.mission.area, run_mission, STEP_ERROR_FRACTION * rtol)
         if isinstance(step, MissionStep):
             return step
@@ -118,43 +122,36 @@ class MissionProblem:
     def _unstable_behind(self, state: MissionState, course: Course) -> Failure | None:
         """Instability behind the mission with which a history has reached its target, None if stable."""
         done = int(course.ends[-1])
-        if self._tests(done):
+        if done in self._tested:
             return None
         self._sweeps, depth = list(state.sweeps), course.depths[-1].reshape(-1, self.mission.area.size).sum(axis=0)
-        behind = self._mission(state, done + 1, depth, False, tests=True)
-        if not isinstance(behind, Failure) and all(math.isfinite(each.inaccurate) for each in behind):
+        behind = self._mission(state, done + 1, True, depth, False)
+        if isinstance(behind, Failure):
+            return behind
+        if all(math.isfinite(each.inaccurate) for each in behind):
             return None
-        unknown = Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
-        return behind if isinstance(behind, Failure) else unknown
-
-    def _tests(self, number: int) -> bool:
-        """Whether stability is tested in a mission: as in a wear history, at the start and the end."""
-        return self.history is None and number in (1, self.mission.missions[-1])
+        return Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
 
     def _mission(
-        self, state: MissionState, number: int, depth: FloatArray, with_slopes: bool, *, tests: bool = False
+        self, state: MissionState, number: int, tested: bool, depth: FloatArray, with_slopes: bool
     ) -> tuple[BlockResult, ...] | Failure:
-        """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m. tests: whether
-        stability is tested in any case.
-        """
+        """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
         mission, before, budget = self.mission, state.end, self.run.budget
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.history is not None:
             course = self.history.course
             guides = course.nodes[int(np.searchsorted(course.counts, number))].guides
-        with_switching = tests or self._tests(number)
         results: list[BlockResult] = []
         for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, self._sweeps, strict=True)):
             run = run_passage if isinstance(block.frequency, Passage) else run_block
-            given = BlockInput(
-                mission, place, depth, budget.deadline, before, earlier, guide, with_slopes, with_switching
-            )
+            last = before if block.way == "continue" else None
+            given = BlockInput(mission, block, depth, budget.deadline, last, earlier, guide, with_slopes, tested)
             result = guarded(partial(run, given))
             if isinstance(result, Failure):
                 where = f"in mission {number}, {mission.called(place)}"
                 return Failure(result.outcome, ": ".join(filter(None, (where, result.message))))
             results.append(result)
-            self._sweeps[place] = result.sweep or earlier
+            self._sweeps[place] = result.sweep
             budget.iterations += result.iterations
             depth, before = depth + result.growth, result.last
         return tuple(results)
@@ -194,9 +191,8 @@ def _assembled(mission: MissionRequest, solution: Solution) -> MissionHistory:
     compare_at = partial(_compare, solution, slice(None))
     both, whole = compare_at(counts)
     blocks = [_compare(solution, slice(n, n + 1), counts)[1] for n in range(len(mission.blocks))]
-    values, depth, target, target_error = course.read(counts), both.values["wear_depth"], course.reached, math.nan
-    if mission.until is not None and not math.isnan(target):
-        target_error = error_of_target(solution, mission.until, *compare_at(np.array([0.0, target])))
+    values, depth = course.read(counts), both.values["wear_depth"]
+    target, target_error = reach_target(solution, math.inf, compare_at)
     return MissionHistory(
         **solution.totals,
         response_begin=values["response"][:, :, 0],

@@ -31,7 +31,8 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure, first_response, largest_responses
-from solver.missions.block_run import BlockInput, BlockResult, EarlierSweep
+from solver.loading_history.sweep import EarlierSweep
+from solver.missions.block_run import BlockInput, BlockResult
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
 from solver.newton.run import OutOfTimeError
@@ -115,7 +116,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         growth_error=error / volume if volume > 0.0 else 0.0,
         inaccurate=math.inf if any(start.unjudged for start in starts) else max(bad, default=0.0),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
-        last=ends[-1].start if given.is_continued else None,
+        last=ends[-1].start,
         sweep=EarlierSweep(swept.needed),
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,

@@ -10,12 +10,12 @@ from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
 from solver.continuation.transient import Transient
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import State, largest_responses
+from solver.harmonic_balance.state import State, final_history, largest_responses
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.results.history import PeriodicState
 from solver.structure.condensation import whole_motion
 from solver.structure.fourier import derivative, from_complex, synthesis, to_complex, with_static
-from solver.structure.joint import Joint
+from solver.structure.joint import Case, Joint
 
 LOOP_PHASES = 128
 """Number of phases of a loop, equally spaced over a period from 0 on, whatever the number of samples of a state is."""
@@ -32,6 +32,12 @@ def evaluated(joint: Joint, state: PeriodicState) -> tuple[Balance, Evaluation]:
     """The balance of a state, and its evaluation."""
     balance = Balance(joint, state.start_history, np.zeros(joint.contact.n_contact))
     return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+
+
+def known_state(case: Case, state: PeriodicState, parameter: float = np.nan) -> State:
+    """A state with the harmonics and samples of a case, evaluated and not solved again; parameter: as of `State`."""
+    balance, at = evaluated(case.joint(state.omega, state.excitation_amplitude), state)
+    return State(at, final_history(balance, at), parameter)
 
 
 def report_state(

@@ -14,7 +14,6 @@ import numpy as np
 
 from solver.model import FloatArray
 from solver.outcome import absolute, in_whole
-from solver.settings import WearTarget
 from solver.wear.slow_time import Solution
 
 HISTORY_SAFETY = 1.5
@@ -157,14 +156,19 @@ def _completed(outputs: Compared, error: HistoryError, area: FloatArray) -> Hist
     )
 
 
-def error_of_target(solution: Solution, target: WearTarget, both: Compared, error: HistoryError) -> float:
-    """Estimated error of the count at which a history has reached its target: its difference to that of the other
-    solution, or the time that the error of the wear takes, if that is longer. both, error: of the counts 0 and that.
+def reach_target(
+    solution: Solution, end: float, compare_at: Callable[[FloatArray], tuple[Compared, HistoryError]]
+) -> tuple[float, float]:
+    """Count up to `end` at which a history has reached its target, NaN if never, and its error: its difference to that
+    of the other solution, or the time that the error of the wear takes, if longer. compare_at: as `compare`.
     """
-    course, other = solution.course, solution.compared
+    course, other, reached = solution.course, solution.compared, solution.course.reached
+    if course.target is None or not reached <= end:
+        return math.nan, math.nan
     if other is None:
-        return math.inf
-    at, by_interpolation = course.reach(target)
+        return reached, math.inf
+    target, by_interpolation = course.target, course.reach(course.target)[1]
+    both, error = compare_at(np.array([0.0, reached]))
     depth, weights = both.values["wear_depth"][1], course.area
     wrong = float(error.worn_volume[1] * (depth @ weights))
     if target.quantity == "wear_depth":
@@ -174,8 +178,8 @@ def error_of_target(solution: Solution, target: WearTarget, both: Compared, erro
     last_rate = course.nodes[-1].rate.reshape(-1, depth.size).sum(axis=0)
     rate = min(float(rates @ weights) for rates in (both.values["depth_rate"][1], last_rate))
     by_wear = 0.0 if wrong == 0.0 else wrong / rate if rate > 0.0 else math.inf
-    apart = abs(other.course.reach(target)[0] - at)
-    return max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0) + by_interpolation
+    apart = abs(other.course.reach(target)[0] - reached)
+    return reached, max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0) + by_interpolation
 
 
 def _frequency_error(both: Compared, safety: float, known: FloatArray) -> FloatArray:

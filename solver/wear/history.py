@@ -16,7 +16,7 @@ from solver.results.history import StartState, WearHistory, first_cut_off, judge
 from solver.results.state_report import LOOP_PHASES
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
-from solver.wear.errors import compare, error_of_target
+from solver.wear.errors import compare, reach_target
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Course, Guide, Integrator, Node, Solution
 from solver.wear.wearing_joint import WearRequest, WearState
@@ -106,10 +106,8 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
     course, state, area, counts = solution.course, solution.state, model.contact.area, _counts(request, solution)
     compare_at = partial(compare, solution, given=request.steps is not None, follows=request.follow is not None)
     both, error = compare_at(counts)
-    values, totals, target, target_error = both.values, solution.totals, math.nan, math.nan
-    if request.until is not None and course.reached <= request.end:
-        target = course.reached
-        target_error = error_of_target(solution, request.until, *compare_at(np.array([0.0, target])))
+    values, totals = both.values, solution.totals
+    target, target_error = reach_target(solution, request.end, compare_at)
     last_cycle = math.nan if state is None else min(course.ends[-1], float(counts[-1]))
     return WearHistory(
         **{name: value for name, value in values.items() if name in _REPORTED}

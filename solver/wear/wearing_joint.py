@@ -26,7 +26,7 @@ from solver.newton.run import MOST_ITERATIONS, Run
 from solver.outcome import Outcome, in_digits, in_whole
 from solver.packing import packable
 from solver.results.history import PeriodicState, StartState
-from solver.results.state_report import evaluated
+from solver.results.state_report import known_state
 from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case, Hold, Joint
 
@@ -215,21 +215,20 @@ class WearingJoint:
     def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
         """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
         start, periodic = self.start, periodic or self.unworn
-        balance, at = evaluated(self.case.joint(periodic.omega, self.excitation_amplitude), periodic)
-        nothing = np.zeros(self.area.size + 1)
+        point, nothing = known_state(self.case, periodic), np.zeros(self.area.size + 1)
         state = WearState(
             0.0,
             periodic.omega,
-            State(at, final_history(balance, at)),
+            point,
             start.resolution,
-            left_out(start.resolution.orders, at),
+            left_out(start.resolution.orders, point.evaluation),
             start.by_resolution or Estimate(start.response_error, start.wear_rate_error),
             accurate=start.outcome is Outcome.CONVERGED,
             rate=nothing,
             rates=nothing,
             largest_rates=nothing,
             # the stability of a start state has been checked
-            judged_h=at.predicted_h,
+            judged_h=point.evaluation.predicted_h,
         )
         return self.with_rates(state)
 

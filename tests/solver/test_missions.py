@@ -110,8 +110,9 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, ex
 def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
     mission, pairs = MissionRequest(as_computed(block), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
-    first, own = (run_block(BlockInput(mission, 0, at * pairs)) for at in (0.0, depth))
-    return own, run_block(BlockInput(mission, 0, depth * pairs, earlier=first.sweep))
+    (block,) = mission.blocks
+    first, own = (run_block(BlockInput(mission, block, at * pairs)) for at in (0.0, depth))
+    return own, run_block(BlockInput(mission, block, depth * pairs, earlier=first.sweep))
 
 
 @pytest.mark.slow
@@ -134,8 +135,8 @@ def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
 )
 def test_an_earlier_sweep_serves_as_long_as_its_choices_do(where, cycles, kept):
     """Also with other harmonics of its nodes; a vibration that differs by 0.35 needs errors of its own."""
-    blocks = as_computed(Block(dovetail(5), *where, cycles))
-    unworn = BlockInput(MissionRequest(blocks, WEAR, (0, 2), SETTINGS), 0, np.zeros(16))
+    (block,) = blocks = as_computed(Block(dovetail(5), *where, cycles))
+    unworn = BlockInput(MissionRequest(blocks, WEAR, (0, 2), SETTINGS), block, np.zeros(16))
     start, sweep = find_start(unworn)
     worn = replace(unworn, depth=cycles * unworn.wearing_joint(start)[1].rate)
     earlier = replace(sweep, resolution=Resolution((1, 2, 3, 4, 5), 64))
@@ -177,8 +178,8 @@ LOSS = 2e-3 * np.array([1.0, 0.8])[:, None, None] * np.array([[1.0, -1.0], [-1.0
 
 def exact_run(case):
     """The wear of `dW/dn = r - L W` through a block; the reference solution wears a little more."""
-    flow = np.zeros((3, 3))
-    flow[:2, :2], flow[:2, 2] = -LOSS[case.place], RATES[case.place] * (1.0 if case.guide is None else 1.001)
+    flow, place = np.zeros((3, 3)), int(case.block.frequency) - 1
+    flow[:2, :2], flow[:2, 2] = -LOSS[place], RATES[place] * (1.0 if case.guide is None else 1.001)
     change = expm(case.block.cycles * flow) - np.eye(3)
     growth = change[:2] @ np.append(case.depth, 1.0)
     response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
@@ -200,7 +201,7 @@ def exact_blocks(monkeypatch):
 
 
 def known_blocks(missions, cycles=1.0, **more):
-    """Two pairs, of which only the areas count here."""
+    """Two pairs, of which only the areas count here; the frequencies are the numbers of the blocks."""
     one = scene("two_masses")
     contact = replace(one.contact, area=np.array([1e-4, 2e-4]), surface=("one", "other"))
     model = replace(one, contact=contact)
@@ -242,8 +243,8 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
 
     def run(depth, with_slope):
         runs = []
-        for place in (0, 1):
-            runs.append(exact_run(BlockInput(mission, place, depth, with_slope=with_slope)))
+        for block in mission.blocks:
+            runs.append(exact_run(BlockInput(mission, block, depth, with_slope=with_slope)))
             depth = depth + runs[-1].growth
         return tuple(runs)
 
@@ -283,7 +284,7 @@ def test_a_target_ends_the_missions(exact_blocks):
 def test_stability_is_tested_where_a_target_ends_the_missions(monkeypatch, outcome):
     def run(case):
         found = exact_run(case)
-        if not (case.with_switching and case.place == 0 and case.depth.any()):
+        if not (case.with_switching and case.block.frequency == 1.0 and case.depth.any()):
             return found
         return Failure(outcome, "grows") if outcome is Outcome.UNSTABLE else replace(found, inaccurate=np.inf)
 

@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from solver import Block, Outcome, Passage, SolverSettings
+from solver.loading_history.sweep import EarlierSweep
 from solver.missions import passage as passages
-from solver.missions.block_run import BlockInput, EarlierSweep
+from solver.missions.block_run import BlockInput
 from solver.missions.mission import MissionRequest
 from solver.model import with_friction
 from solver.results.history import StartState
@@ -66,7 +67,7 @@ def test_a_vibration_is_late_by_its_decay_time():
         # too little wear to change the pressures on the way
         model = with_friction(scene("sdof_slider", damping=damping), 0.5)
         block = Block(model, Passage(180.0, 220.0, rate), 10.0, None)
-        return BlockInput(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), 0, np.zeros(1))
+        return BlockInput(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), block, np.zeros(1))
 
     fast, slow = passages.run_passage(case(7.0)), passages.run_passage(case(0.07))
     assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
@@ -90,7 +91,7 @@ def swept_with(monkeypatch, density, depth, near=()):
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, None, begin="up")
     mission, earlier = MissionRequest((block,), WEAR, (0, 1), SETTINGS), EarlierSweep(near) if near else None
-    swept = passages.find_states(BlockInput(mission, 0, np.array([depth]), earlier=earlier))
+    swept = passages.find_states(BlockInput(mission, block, np.array([depth]), earlier=earlier))
     assert isinstance(swept, passages.Swept)
     return swept
 
