@@ -83,9 +83,9 @@ class Path(ABC, Generic[S]):
     shortest: ClassVar[float]
     longest: ClassVar[float]
 
-    @abstractmethod
     def joint_of(self, state: S) -> Joint:
-        """The joint of a state."""
+        """The joint at the frequency and load of a state."""
+        return self.case.joint(state.omega, state.excitation_amplitude)
 
     @abstractmethod
     def ahead(self, parameter: float, length: float) -> float:
@@ -161,9 +161,6 @@ class LoadingPath(Path[State]):
         if self.omega is None:
             return self.case.joint(parameter, self.excitation_amplitude)
         return self.case.joint(self.omega, parameter * self.excitation_amplitude)
-
-    def joint_of(self, state: State) -> Joint:  # noqa: D102
-        return self.joint_at(state.parameter)
 
     def balance_from(self, parameter: float, state: State) -> Balance:
         """Unworn balance at a value of the parameter, after a state."""
@@ -248,7 +245,7 @@ class LoadingPath(Path[State]):
         # where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice
         if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
             return True
-        before, now = (left_out(resolution.orders, at.evaluation) for at in (checked, state))
+        before, now = left_out(checked), left_out(state)
         if self.rests(state) or not (0.0 < error < np.inf and before > 0.0):
             return False
         foreseen = error * now / before
@@ -257,7 +254,7 @@ class LoadingPath(Path[State]):
         return enough and (foreseen <= settings.rtol or error > settings.rtol)
 
     def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:  # noqa: D102
-        found = refine(ResolvedState(self.case, self.joint_of(state), state), run, node=True)
+        found = refine(ResolvedState(self.case, state), run, node=True)
         found = with_level_above(found, run, node=True)
         return replace(self, case=found.case), found.point, found.estimate
 

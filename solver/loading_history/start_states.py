@@ -115,7 +115,9 @@ class FrequencySweep:
         omega = 2.0 * np.pi * frequency
         present = self._new_sweep(cell_of(frequency), omega if self.direction == "ramp" else None)
         present.sign = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
-        return present.begin(replace(present.path, case=case), state)
+        path = LoadingPath(case, self.excitation_amplitude, self.omega)
+        joint = path.joint_at(state.parameter)
+        return present.begin(path, replace(state, omega=joint.omega, excitation_amplitude=joint.excitation_amplitude))
 
     def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
         """The sweep that leads to a frequency, Hz, at its first node or farther on; without a state if none is found.
@@ -149,8 +151,8 @@ class FrequencySweep:
         run.budget.iterations, run.budget.most_iterations = 0, NODE_ITERATIONS
         present = self.sweep_to(frequency)
         target = 2.0 * np.pi * frequency if self.omega is None else 1.0
-        present.advance_to(target)
-        path, reached = present.path, present.state_at(target, run.fresh())
+        reached = present.state_at(target, run.fresh())
+        path = present.path
         if isinstance(reached, Failure):
             run.budget.most_iterations = run.budget.iterations + FIRST_ITERATIONS
             first = self._first(path, target, run)
@@ -158,7 +160,7 @@ class FrequencySweep:
                 return _lost(present, first)
             path, reached = first[0], Step(first[1])
         found = self._at_known(path, reached.state) if self.known else None
-        found = found or refine(ResolvedState(path.case, path.joint_of(reached.state), reached.state), run)
+        found = found or refine(ResolvedState(path.case, reached.state), run)
         return self._judged(found, present, reached.folds)
 
     def _without_state(self, failure: Failure) -> StartState:
@@ -195,23 +197,22 @@ class FrequencySweep:
 
     def _at_known(self, path: Path[State], state: State) -> ResolvedState | None:
         """The state with the known resolution; None where it is not found with it."""
-        omega = path.joint_of(state).omega
-        _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - omega))
+        _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - state.omega))
         wanted = path.at(resolution)
         moved = state if wanted.case is path.case else path.move(state, wanted, self.run)
-        return None if moved is None else ResolvedState(wanted.case, wanted.joint_of(moved), moved)
+        return None if moved is None else ResolvedState(wanted.case, moved)
 
     def _judged(self, found: ResolvedState, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
         """A state with all its errors, or why it is no result. folds: jumped over behind the last node."""
-        joint, at, estimate = found.joint, found.point.evaluation, found.estimate
-        if said := certify(joint, at).sentence(self.settings.tolerance):
+        estimate = found.estimate
+        if said := certify(found.joint, found.point.evaluation).sentence(self.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED, said)
-        unstable = find_instability(found.case, joint, at, self.run, self.with_switching)
+        unstable = find_instability(found.case, found.point, self.run, self.with_switching)
         if unstable is not None and not unstable.outcome.complete:
             return unstable
         reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
         if reference is not None:
-            estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
+            estimate = estimate + found.difference(ResolvedState(found.case, reference))
         elif present.here is not None and present.reference:
             estimate, found = UNKNOWN, replace(found, accurate=False)
         known = estimate.response, estimate.wear_rate
@@ -219,7 +220,7 @@ class FrequencySweep:
         fold = (present.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
         return StartState(
             outcome=Outcome.CONVERGED if found.accurate else Outcome.INACCURATE,
-            state=periodic_state(joint, found.point),
+            state=periodic_state(found.point),
             penalty_omega=found.case.penalty_omega,
             resolution=found.case.resolution,
             response_error=known[0],
@@ -228,7 +229,7 @@ class FrequencySweep:
             branch=present.branch + len(folds),
             fold_frequency=float(fold),
             unjudged="" if unstable is None else unstable.message,
-            reference=None if reference is None else periodic_state(joint, reference),
+            reference=None if reference is None else periodic_state(reference),
             by_resolution=found.estimate,
         )
 

@@ -152,7 +152,8 @@ class Sweep(Generic[S]):
                 self._advance(here, self.ahead)
 
     def state_at(self, parameter: float, run: Run) -> Step[S] | Failure:
-        """State at a parameter up to the next node, or why there is none. run: the sweep must not depend on it."""
+        """State at a parameter, to which the sweep goes on, or why there is none. run: of this state alone."""
+        self.advance_to(parameter)
         if self.here is None or self.ahead is None:
             assert self.failure is not None
             return self.failure

@@ -29,7 +29,7 @@ from solver.wear.errors import HISTORY_SAFETY
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
-from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
+from solver.wear.wearing_joint import Record, WearingJoint, WearRequest, WearState
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
@@ -171,6 +171,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
     if failure is not None and not failure.outcome.complete:
         return failure
     state, values, slope = solution.state, solution.course.read(counts), None
+    record: Record = state.record
     depth = values["wear_depth"]
     volume = float(depth[-1] @ given.mission.area)
     if given.with_slope:
@@ -186,10 +187,10 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         slope=slope,
         response_error=float(values["response_error"].max()),
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
-        inaccurate=math.inf if failure else state.worst.largest if state.inaccurate_from <= counts[-1] else 0.0,
-        held=state.held_from <= counts[-1],
+        inaccurate=math.inf if failure else record.worst.largest if record.inaccurate_from <= counts[-1] else 0.0,
+        held=record.held_from <= counts[-1],
         cut_off=not math.isnan(first_cut_off(given.model.contact, counts, values["mean_pressure"], depth)),
-        guide=Guide(state.resolutions, state.first_length),
+        guide=state.guide,
         last=_last(state, start, given.mission.settings.rtol) if given.is_continued else None,
         sweep=sweep,
         iterations=start.newton_iterations + solution.iterations,
@@ -198,17 +199,17 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
 
 def _last(state: WearState, start: StartState, rtol: float) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
-    at, known = state.at, state.estimate
+    at, known, accurate = state.at, state.checked.estimate, state.checked.accurate
     assert start.state is not None
     motion, force, history = at.displacement_h, at.force_h, state.point.history
     return replace(
         start,
-        outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
+        outcome=Outcome.CONVERGED if accurate else Outcome.INACCURATE,
         state=replace(start.state, displacement_h=motion, contact_force_h=force, start_history=history),
-        resolution=state.resolution,
+        resolution=state.point.resolution,
         response_error=known.response,
         wear_rate_error=known.wear_rate,
-        message="" if state.accurate else describe_inaccurate(known.response, known.wear_rate, rtol),
+        message="" if accurate else describe_inaccurate(known.response, known.wear_rate, rtol),
         reference=None,
     )
 
@@ -245,7 +246,7 @@ def _by_earlier_sweep(given: BlockInput, earlier: EarlierSweep) -> StartState | 
     ramp, omega, (wearing, unworn) = given.block.way == "ramp", start.state.omega, given.wearing_joint(start)
     path = LoadingPath(wearing.case, given.block.excitation_amplitude, omega if ramp else None)
     target = 1.0 if ramp else omega
-    before = State(unworn.at, start.state.start_history, target)
+    before = replace(unworn.point, history=start.state.start_history, parameter=target)
     try:
         state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if state is None or not path.forgets(state):
@@ -253,12 +254,11 @@ def _by_earlier_sweep(given: BlockInput, earlier: EarlierSweep) -> StartState | 
             state, most = _through_nodes(path, earlier, target, stride, run.fresh()), VIBRATION_RECHECK
         if state is None or vibration_change(unworn.at, state.evaluation) > most:
             return None
-        joint = path.joint_at(target)
-        if find_instability(wearing.case, joint, state.evaluation, run, given.with_switching):
+        if find_instability(wearing.case, state, run, given.with_switching):
             return None
     except SingularStructureError:
         return None
-    return replace(start, state=periodic_state(joint, state), reference=None, newton_iterations=run.budget.iterations)
+    return replace(start, state=periodic_state(state), reference=None, newton_iterations=run.budget.iterations)
 
 
 def _through_nodes(path: LoadingPath, earlier: EarlierSweep, target: float, stride: int, run: Run) -> State | None:
@@ -282,7 +282,7 @@ def _through_nodes(path: LoadingPath, earlier: EarlierSweep, target: float, stri
         else:
             # past a corner at the resonance: without, half of the sweeps up to 212.6 Hz of the dovetail begin anew
             ahead.insert(0, 0.5 * (states[-1].parameter + ahead[0]))
-    return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
+    return states[-1] if coarse.case is path.case else run.move(coarse.case, states[-1], path.case.resolution)
 
 
 def _continued(given: BlockInput, before: StartState) -> StartState:
@@ -300,7 +300,7 @@ def _continued(given: BlockInput, before: StartState) -> StartState:
     if state is None:
         said = "the last state of the block before is not found at the depth before this block"
         return replace(before, state=None, outcome=Outcome.BRANCH_LOST, message=said)
-    start = replace(before, state=periodic_state(balance.joint, State(state.evaluation, last.start_history)))
+    start = replace(before, state=periodic_state(state))
     along: Direction = "up" if 2.0 * np.pi * frequency > last.omega else "down"
     iterations, lower = run.budget.iterations, min(amplitude, last.excitation_amplitude)
     legs: tuple[tuple[Direction, float, float], ...] = (

@@ -6,7 +6,7 @@ safety factor, and the change with the tangential history that the reference swe
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal, cast
 
@@ -84,7 +84,7 @@ def follow_mode(
             response, shape = (np.full(len(part), math.nan, complex) for part in (linear.response, linear.mass))
             numbers = math.nan, math.nan, math.nan, math.nan
             point = ModePoint(point.outcome, point.message, *numbers, response, shape, pairs, pairs, 0, 0)
-        iterations = way.spent + run.budget.iterations
+        iterations = way.spent.iterations + run.budget.iterations
         yield index, replace(point, newton_iterations=iterations, run_time=computing_time() - began)
 
 
@@ -98,7 +98,7 @@ class _Way:
     """The sweeps to the points: one with rising amplitude, and one with falling amplitude from the present `top`.
 
     - asked: model, friction coefficient, number of the mode, settings.
-    - to_rest, spent: Newton iterations to the rest, and of the way to the last point without those to other points.
+    - to_rest, spent: Newton iterations to the rest, and those of the way to the last point without other points.
     """
 
     asked: tuple[ReducedModel, float | FloatArray | None, int, SolverSettings]
@@ -108,7 +108,7 @@ class _Way:
     down: Sweep[ModeState] | None = None
     top: float = 0.0
     to_rest: int = 0
-    spent: int = 0
+    spent: Budget = field(default_factory=Budget)
 
     def place(self, amplitude: float) -> tuple[float, float]:
         """Key by which amplitudes come in the order of the way."""
@@ -121,7 +121,7 @@ class _Way:
             own = Run(run.tolerance, Budget(deadline=deadline))
             self.rest = find_rest(*self.asked, own)
             self.to_rest = own.budget.iterations
-        self.spent, rest = self.to_rest, self.rest
+        self.spent, rest = Budget(self.to_rest), self.rest
         if isinstance(rest, Failure):
             return rest
         if self.direction == "up" and not rest.glued:
@@ -134,13 +134,11 @@ class _Way:
         sweep = self._lowered_from(rest, top, deadline) if lowered else self._raised_to(rest, amplitude, deadline)
         if sweep.last is None:
             return _NO_FIRST
-        self.spent = sweep.budget.iterations
+        self.spent = sweep.budget
         if self.up is not None and lowered and sweep.here is not None and sweep.here.parameter < amplitude:
             # the mode could not be raised to the amplitude from which it is lowered
             return _lost(self.up)
         sweep.budget.deadline = deadline
-        sweep.advance_to(amplitude)
-        self.spent = sweep.budget.iterations
         found = sweep.state_at(amplitude, run.fresh())
         if not isinstance(found, Step):
             return _lost(sweep)

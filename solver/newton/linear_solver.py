@@ -108,15 +108,15 @@ class JacobianSolver:
 
     _factor: Factor | None = None
     _corrections: tuple[tuple[FloatArray, FloatArray], ...] = ()
-    _orders: tuple[int, ...] = ()
+    _basis: tuple[tuple[int, ...], int] | None = None
 
     def _known(self, tangent: Linearisation) -> Factor | None:
-        """The earlier factorisation; None where it is of other harmonics: of no use, and maybe of another size."""
-        return self._factor if self._orders == tangent.joint.basis.orders else None
+        """The earlier factorisation; None where it is of other harmonics, and maybe of another size, or samples."""
+        return self._factor if self._basis == _basis_of(tangent) else None
 
     def _renewed(self, tangent: Linearisation) -> Factor:
         """A factorisation of this Jacobian, kept from now on."""
-        self._factor, self._corrections, self._orders = build_factor(tangent), (), tangent.joint.basis.orders
+        self._factor, self._corrections, self._basis = build_factor(tangent), (), _basis_of(tangent)
         return self._factor
 
     def solve(
@@ -190,6 +190,11 @@ class JacobianSolver:
                 return sign
         factor = self._renewed(tangent)
         return factor.sign if factor.exact else _sign_by_eigenvalues(factor, tangent)[0]
+
+
+def _basis_of(tangent: Linearisation) -> tuple[tuple[int, ...], int]:
+    """Harmonics and number of samples."""
+    return tangent.joint.basis.orders, tangent.joint.basis.n_samples
 
 
 def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:

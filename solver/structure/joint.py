@@ -70,7 +70,7 @@ class Joint:
 
 
 @packable
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hold:
     """A soft spring, N/m, on the mean position of a joint along a direction in which the joint can slide freely.
 
@@ -96,9 +96,9 @@ def held(structure: CondensedStructure, hold: Hold | None) -> CondensedStructure
     return replace(structure, static_stiffness=structure.static_stiffness + spring, force_h=force_h)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
-    """What all states of one computation share. friction_coefficient: (n_contact,).
+    """What all states of one computation share; equal to itself alone. friction_coefficient: (n_contact,).
 
     penalty_omega: angular frequency for which the penalty is built, rad/s.
     hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.
