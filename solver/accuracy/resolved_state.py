@@ -6,7 +6,7 @@ of harmonics, and the events in the period of a state that decide about them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -104,8 +104,8 @@ class ResolvedState:
         a small residual, which is no solution.
         """
         case, own, reached = self.case.at(resolution), run.fresh(), list[ResolvedState]()
-        joint = case.joint(self.point.omega, self.point.excitation_amplitude)
-        balance, predicted = transfer(self.case, joint, self.point.evaluation)
+        joint = replace(self.point, resolution=resolution).joint(self.case)
+        balance, predicted = transfer(self.case, self.point, joint)
         at = balance.evaluate(predicted)
         # a step that goes too far ends by its values, without a warning of numpy
         with np.errstate(over="ignore", invalid="ignore"):

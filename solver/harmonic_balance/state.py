@@ -80,18 +80,18 @@ def vibration_size(evaluation: Evaluation) -> float:
     return max(float(np.linalg.norm(evaluation.predicted_h[:, 1:])), 1e-300)
 
 
-def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
-    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old` with other
+def transfer(case: Case, state: State, joint: Joint, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
+    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of a case with other
     harmonics: they have another penalty, with which a pair may be inertial instead of elastic.
 
     with_tail: new harmonics of the force are those of its samples, as many as those of `joint`, instead of zeros; they
         contain impacts. New harmonics of the motion are those that this force causes.
     """
-    if with_tail and old.resolution.samples != joint.basis.n_samples:
-        old = old.at(Resolution(old.resolution.orders, joint.basis.n_samples))
-        sampled, start = transfer(old, old.joint(joint.omega, joint.excitation_amplitude), evaluation)
-        evaluation = sampled.evaluate(start)
-    orders, known = joint.basis.orders, old.resolution.orders
+    orders, known, n_samples = joint.basis.orders, state.resolution.orders, joint.basis.n_samples
+    if with_tail and state.resolution.samples != n_samples:
+        sampled, start = transfer(case, state, replace(state, resolution=Resolution(known, n_samples)).joint(case))
+        state = state_of(sampled.joint, sampled.evaluate(start))
+    old, evaluation = state.case(case), state.evaluation
     tangential, end = evaluation.displacement_h[:, 1:], np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
     begun = joint.law.begun_at(tangential[:, :, 0], (tangential @ synthesis(known, end))[:, :, 0])
     same = old.penalty.inertial == joint.penalty.inertial

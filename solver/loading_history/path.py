@@ -84,7 +84,7 @@ class Path(ABC, Generic[S]):
     longest: ClassVar[float]
 
     def joint_of(self, state: S) -> Joint:
-        """The joint at the frequency and load of a state."""
+        """The joint, with the harmonics and samples of the path, at the frequency and load of a state."""
         return self.case.joint(state.omega, state.excitation_amplitude)
 
     @abstractmethod
@@ -125,20 +125,20 @@ class Path(ABC, Generic[S]):
 
     def at(self, resolution: Resolution) -> Self:
         """The path with other harmonics and samples."""
-        return replace(self, case=self.case.at(resolution))
+        return self if resolution == self.case.resolution else replace(self, case=self.case.at(resolution))
 
     @abstractmethod
     def near(self, state: S, predicted_h: FloatArray, history: FloatArray, run: Run) -> S | None:
         """As `solve`, at the parameter of a state, from a first predicted force (n_rel, m), N, with a history, m."""
 
-    def move(self, state: S, other: Self, run: Run) -> S | None:
-        """The state with the harmonics and samples of another path; None where not found."""
-        balance, start = transfer(self.case, other.joint_of(state), state.evaluation)
-        return other.near(state, start, balance.history, run.fresh())
+    def moved(self, state: S, run: Run) -> S | None:
+        """A state of other harmonics and samples with those of the path; None where not found."""
+        balance, start = transfer(self.case, state, self.joint_of(state))
+        return self.near(state, start, balance.history, run.fresh())
 
     @abstractmethod
-    def choose(self, state: S, run: Run) -> tuple[Self, S, Estimate]:
-        """Path and state with the harmonics that the state needs, and its estimated error."""
+    def choose(self, state: S, run: Run) -> tuple[S, Estimate]:
+        """The state with the harmonics that it needs, and its estimated error."""
 
     @abstractmethod
     def describe(self, state: S) -> str:
@@ -194,12 +194,14 @@ class LoadingPath(Path[State]):
         state, fine, folds = start, FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_from, state, target, run, fine=fine)
-            if arrived and run.is_stable(self.joint_of(end), end.evaluation):
+            if arrived and run.is_stable(end.joint(self.case), end.evaluation):
                 return Step(end, tuple(folds))
             # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
-            settled = relax_to_periodic(self.joint_at(beyond), end.evaluation.wear_depth, end, self.joint_of(end), run)
+            settled = relax_to_periodic(
+                self.joint_at(beyond), end.evaluation.wear_depth, end, end.joint(self.case), run
+            )
             if isinstance(settled, Failure):
                 return settled
             # a fold with a smaller change is a corner of the branch
@@ -232,7 +234,7 @@ class LoadingPath(Path[State]):
     def forgets(self, state: State) -> bool:  # noqa: D102
         at = state.evaluation
         opens = (at.status_t == SEPARATED).any(axis=1)
-        slip = np.ptp(at.state_t, axis=2).max(axis=1) / self.joint_of(state).law.state_stiffness
+        slip = np.ptp(at.state_t, axis=2).max(axis=1) / state.joint(self.case).law.state_stiffness
         moved = np.abs(at.displacement_h[:, 1:, 1:]).sum(axis=(1, 2))
         return bool((opens | (slip > LEAST_SLIP * moved)).all())
 
@@ -253,10 +255,10 @@ class LoadingPath(Path[State]):
         # where the error is above rtol already, there are no more harmonics
         return enough and (foreseen <= settings.rtol or error > settings.rtol)
 
-    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:  # noqa: D102
+    def choose(self, state: State, run: Run) -> tuple[State, Estimate]:  # noqa: D102
         found = refine(ResolvedState(self.case, state), run, node=True)
         found = with_level_above(found, run, node=True)
-        return replace(self, case=found.case), found.point, found.estimate
+        return found.point, found.estimate
 
     def describe(self, state: State) -> str:  # noqa: D102
         at = f"{state.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {state.parameter:.3g}"

@@ -138,7 +138,7 @@ class FrequencySweep:
         if isinstance(first, Failure):
             present.failure = first
         else:
-            present.begin(*first)
+            present.begin(present.path.at(first.resolution), first)
         return present
 
     def _next(self, wanted: float | FollowedFrequency) -> StartState | Failure:
@@ -158,7 +158,7 @@ class FrequencySweep:
             first = self._first(path, target, run)
             if isinstance(first, Failure):
                 return _lost(present, first)
-            path, reached = first[0], Step(first[1])
+            path, reached = path.at(first.resolution), Step(first)
         found = self._at_known(path, reached.state) if self.known else None
         found = found or refine(ResolvedState(path.case, reached.state), run)
         return self._judged(found, present, reached.folds)
@@ -180,16 +180,15 @@ class FrequencySweep:
         self.present = Sweep(path, sign, budget, with_reference=not self.known, save=self.save)
         return self.present
 
-    def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Failure:
-        """First state at a value of the parameter, and its path, with the harmonics of a path, or else with one."""
+    def _first(self, path: Path[State], place: float, run: Run) -> State | Failure:
+        """First state at a value of the parameter, with the harmonics of a path, or else with one."""
         others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
         omega, load = (place, 1.0) if self.omega is None else (self.omega, place)
         why = list[Failure]()
         for resolution in (path.case.resolution, *others):
-            at = path.at(resolution)
-            found = solve_first_state(at.case, omega, load * self.excitation_amplitude, run.fresh())
+            found = solve_first_state(path.at(resolution).case, omega, load * self.excitation_amplitude, run.fresh())
             if isinstance(found, State):
-                return at, replace(found, parameter=place)
+                return replace(found, parameter=place)
             why.append(found)
             if found.outcome.static or run.budget.exhausted:
                 break
@@ -199,7 +198,7 @@ class FrequencySweep:
         """The state with the known resolution; None where it is not found with it."""
         _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - state.omega))
         wanted = path.at(resolution)
-        moved = state if wanted.case is path.case else path.move(state, wanted, self.run)
+        moved = state if wanted is path else wanted.moved(state, self.run)
         return None if moved is None else ResolvedState(wanted.case, moved)
 
     def _judged(self, found: ResolvedState, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
@@ -210,7 +209,7 @@ class FrequencySweep:
         unstable = find_instability(found.case, found.point, self.run, self.with_switching)
         if unstable is not None and not unstable.outcome.complete:
             return unstable
-        reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
+        reference = present.reference_of(found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, reference))
         elif present.here is not None and present.reference:
@@ -271,7 +270,7 @@ def _resonance_between(
     """Frequency, Hz, of a resonance between two nodes, with the history of the first one; None where there is none."""
     path, load, ahead = present.path, sweeps.excitation_amplitude, step.state
     # positive before a resonance on the way of the sweep, negative behind
-    one, other = (present.sign * math.cos(phase_lag(path.joint_of(at), at.evaluation)) for at in (here, ahead))
+    one, other = (present.sign * math.cos(phase_lag(at.joint(path.case), at.evaluation)) for at in (here, ahead))
     if not one > 0.0 >= other:
         return None
     part = 0.0 if step.folds else one / (one - other)

@@ -49,9 +49,8 @@ PARTS_TO_POINT = (1, 4, 16)
 """Parts of the way from the last node of a reference sweep to a point: more where the point is not found at once."""
 
 
-_OF_REFERENCE = ("reference", "reference_resolution", "skipped")
-_SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", *_OF_REFERENCE)
-"""Attributes of a `Sweep` with which it goes on from a node, beside its harmonics and the iterations so far."""
+_SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
+"""Attributes of a `Sweep` with which it goes on from a node, beside the iterations so far."""
 
 
 @dataclass(eq=False)
@@ -64,8 +63,7 @@ class Sweep(Generic[S]):
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
     checked, error: the node at which the harmonics were chosen, and its largest estimated error.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
-    reference: last nodes of the reference sweep, with their harmonics and samples; skipped: parameters of the nodes
-        since then.
+    reference: last nodes of the reference sweep; skipped: parameters of the nodes since then.
     """
 
     path: Path[S]
@@ -87,14 +85,14 @@ class Sweep(Generic[S]):
 
     def __post_init__(self) -> None:
         self.failure: Failure | None = Failure(Outcome.START_FAILED, "no first state is known")
-        self.length, self.reference_resolution = self.path.longest, self.path.case.resolution
+        self.length = self.path.longest
         self.run = self._reference_run = Run(self.path.case.settings.tolerance, self.budget)
 
     def load(self, saved: dict[str, Any]) -> None:
         """Go on from what another sweep has saved."""
         self.saved, self.budget.iterations = saved, saved["iterations"]
         vars(self).update({name: saved[name] for name in _SAVED})
-        self.path = self.path.at(saved["resolution"])
+        self.path = self.path.at(self.nodes[-1].resolution)
         # without the factorisations that are kept from node to node, and the next node
         self.run, self._reference_run, self.ahead = self.run.fresh(), self.run.fresh(), None
 
@@ -108,16 +106,16 @@ class Sweep(Generic[S]):
         """The current node, None where there is no state."""
         return self.last if self.failure is None else None
 
-    def reference_of(self, path: Path[S], state: S, run: Run) -> S | None:
-        """State of a path, with its harmonics, to which the last reference node leads; None where it is not found."""
+    def reference_of(self, state: S, run: Run) -> S | None:
+        """State to which the last reference node leads, with parameter and harmonics of a state; None if not found."""
         if self.here is None or not self.reference:
             return None
-        last, own = self.reference[-1], self.path.at(self.reference_resolution)
-        node = own.move(last, path, run)
+        last, path = self.reference[-1], self.path.at(state.resolution)
+        node = path.moved(last, run)
         if node is None:
             # there may be no state with these harmonics at the node, as there is one at the point
-            there = own.solve((last,), state.parameter, run.fresh())
-            return None if there is None else own.move(there, path, run)
+            there = self.path.at(last.resolution).solve((last,), state.parameter, run.fresh())
+            return None if there is None else path.moved(there, run)
         # over states in between where the last part is too long
         for n_parts in PARTS_TO_POINT:
             way = np.linspace(node.parameter, state.parameter, n_parts + 1)[1:].tolist()
@@ -213,20 +211,20 @@ class Sweep(Generic[S]):
         if not self.reference:
             if self.path.rests(step.state):
                 return
-            self.reference, self.reference_resolution = (before,), self.path.case.resolution
+            self.reference = (before,)
         self.skipped = (*self.skipped, step.state.parameter)
         if len(self.skipped) == STEPS_OF_REFERENCE:
             path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
             middle = 0.5 * (before.parameter + step.state.parameter)
             self.reference = self._led(path, middle) or self._led(path, *self.skipped[:-1], middle)
-            self.reference_resolution, self.skipped = path.case.resolution, ()
+            self.skipped = ()
 
     def _led(self, path: Path[S], *targets: float) -> tuple[S, ...]:
         """The reference sweep along a path with fewer harmonics, at the last of some targets; none if none is found."""
         states = self.reference
-        if self.reference_resolution != path.case.resolution:
+        if states[-1].resolution != path.case.resolution:
             self._reference_run = self.run.fresh()
-            moved = self.path.at(self.reference_resolution).move(states[-1], path, self.run)
+            moved = path.moved(states[-1], self.run)
             states = () if moved is None else (moved,)
         return _through(path, states, targets, self._reference_run.with_tolerance(path.case.settings.rough_tolerance))
 
@@ -234,8 +232,9 @@ class Sweep(Generic[S]):
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
         self.checked, error = self.nodes[-1], NOTHING
         if self.path.case.settings.automatic:
-            path, self.checked, error = self.path.choose(self.checked, self.run)
-            if path.case.resolution == self.path.case.resolution:
+            self.checked, error = self.path.choose(self.checked, self.run)
+            path = self.path.at(self.checked.resolution)
+            if path is self.path:
                 self.nodes = (*self.nodes[:-1], self.checked)
             else:
                 self.nodes, self.path, self.run = (self.checked,), path, self.run.fresh()
@@ -244,8 +243,7 @@ class Sweep(Generic[S]):
 
     def _save(self) -> None:
         """Save the current node, and go on as a sweep that is resumed there."""
-        others = {"resolution": self.path.case.resolution, "iterations": self.budget.iterations}
-        self.load(in_rows({name: vars(self)[name] for name in _SAVED} | others))
+        self.load(in_rows({name: vars(self)[name] for name in _SAVED} | {"iterations": self.budget.iterations}))
         self.save()
 
 

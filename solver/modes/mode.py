@@ -143,15 +143,15 @@ class NonlinearMode(Path[ModeState]):
     def near(self, state: ModeState, predicted_h: FloatArray, history: FloatArray, run: Run) -> ModeState | None:  # noqa: D102
         return self.find(state.parameter, (predicted_h, state.values), history, run)
 
-    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:  # noqa: D102
+    def choose(self, state: ModeState, run: Run) -> tuple[ModeState, Estimate]:  # noqa: D102
         # the error of the first response is judged in a sweep of the frequency only
-        return *self.refined(state, run, node=True), NOTHING
+        return self.refined(state, run, node=True), NOTHING
 
-    def refined(self, state: ModeState, run: Run, *, node: bool = False, part: float = 1.0) -> tuple[Self, ModeState]:
-        """Mode and state with the harmonics that the state needs for a part of rtol. node: as in `refine`."""
+    def refined(self, state: ModeState, run: Run, *, node: bool = False, part: float = 1.0) -> ModeState:
+        """The state with the harmonics that it needs for a part of rtol. node: as in `refine`."""
         settings = replace(self.case.settings, rtol=part * self.case.settings.rtol)
         chosen = refine(_resolved(replace(self, case=replace(self.case, settings=settings)), state), run, node=node)
-        return self.at(chosen.case.resolution), cast("ModeState", chosen.point)
+        return cast("ModeState", chosen.point)
 
     def describe(self, state: ModeState) -> str:  # noqa: D102
         return f"at the modal amplitude {state.parameter:.4g} m sqrt(kg)"
@@ -167,7 +167,7 @@ class ResolvedMode(ResolvedState):
 
     def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> "ResolvedMode | None":  # noqa: ARG002, D102
         other = self.mode.at(resolution)
-        found = self.mode.move(cast("ModeState", self.point), other, run)
+        found = other.moved(cast("ModeState", self.point), run)
         return None if found is None else _resolved(other, found)
 
     def steps_to(self, _: Resolution, run: Run) -> tuple[list[ResolvedState], bool]:

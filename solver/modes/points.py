@@ -181,13 +181,14 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     """The point with the harmonics that it needs, and its errors. sweep: that has led to the state, if any."""
     settings = mode.case.settings
     # half of rtol is left for the error by the steps of the sweep
-    mode, found = mode.refined(found, run, part=0.5)
+    found = mode.refined(found, run, part=0.5)
+    mode = mode.at(found.resolution)
     joint, at, resolution = mode.joint_of(found), found.evaluation, mode.case.resolution
     certificate = certify(joint, at)
     if certificate.failures(settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
     errors = _errors_by_resolution(mode, found, run)
-    if sweep is not None and (reference := sweep.reference_of(mode, found, run)) is not None:
+    if sweep is not None and (reference := sweep.reference_of(found, run)) is not None:
         errors = errors + np.abs(reference.values - found.values)
     # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
     by_friction = float(joint.law.friction_work(at).sum()) / (2.0 * np.pi * (found.omega * found.parameter) ** 2)
@@ -219,9 +220,9 @@ def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> Fl
     # another number of samples, as an event may stay next to the same one
     for samples in (3 * two_up.samples + 2, 4 * two_up.samples + 2) if mode.model.has_harmonics(two_up.highest) else ():
         wanted, between = (mode.at(Resolution(each.orders, samples)) for each in (two_up, above))
-        found = mode.move(state, wanted, run)
-        if found is None and (near := mode.move(state, between, run)) is not None:
-            found = between.move(near, wanted, run)
+        found = wanted.moved(state, run)
+        if found is None and (near := between.moved(state, run)) is not None:
+            found = wanted.moved(near, run)
         if found is not None:
             return ERROR_OVER_CHANGE * np.abs(found.values - state.values)
     return np.full(3, math.inf)

@@ -270,9 +270,8 @@ class Run:
 
     def move(self, case: Case, state: State, resolution: Resolution, *, with_tail: bool = False) -> State | None:
         """The state of a case with other harmonics and samples, as `transfer`; None where not found."""
-        old = state.case(case)
-        joint = old.at(resolution).joint(state.omega, state.excitation_amplitude)
-        balance, start = transfer(old, joint, state.evaluation, with_tail=with_tail)
+        joint = replace(state, resolution=resolution).joint(case)
+        balance, start = transfer(case, state, joint, with_tail=with_tail)
         return self.fresh().state(balance, start, state.parameter)
 
 

@@ -99,7 +99,7 @@ def choose_harmonics(wearing: WearingJoint, state: WearState, *, anew: bool = Fa
     checked = state.checked
     here = ResolvedState(state.point.case(wearing.case), state.point, checked.estimate, checked.accurate)
     here = refine(here, wearing.run) if anew else here
-    if wearing.request.steps is None and state.wears and wearing.request.end > 0.0:
+    if wearing.request.steps is None and wearing.wears(state) and wearing.request.end > 0.0:
         here = with_level_above(here, wearing.run)
     checked = Checked(left_out(here.point), here.estimate, here.accurate, checked.judged_h)
     return wearing.at_followed(wearing.with_rates(replace(state, point=here.point, checked=checked)))

@@ -137,7 +137,7 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
 def _of_record(record: Record, end: float) -> dict[str, Any]:
     """What the record says of a history up to a count."""
     return {
-        "step_limit": record.step_limit if record.step_limit > 0.0 else math.inf,
+        "step_limit": record.step_limit,
         "inaccurate_from": record.inaccurate_from,
         "inaccurate_in": "wear rate" if record.worst.wear_rate >= record.worst.response else "response",
         "inaccurate_error": record.worst.largest,

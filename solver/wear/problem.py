@@ -100,7 +100,7 @@ class WearProblem(WearingJoint):
             return unstable_at_end(self, state) if self.stable_end else None
         elif (failure := self._gives_up(state, course)) is not None:
             return failure
-        elif not state.wears:
+        elif not self.wears(state):
             # the state holds for all later counts
             return state, course.after(replace(course.nodes[-1], count=self.request.end))
         else:
@@ -118,7 +118,9 @@ class WearProblem(WearingJoint):
             report["wear_rate_error"] += self.by_sweep.wear_rate
         if state is None:
             after = self.with_first_length(after)
-        after = replace(after, guide=after.guide.then(after.cycle, after.point.resolution))
+        known, now = after.guide.resolutions, after.point.resolution
+        if not known or known[-1][1] != now:
+            after = replace(after, guide=replace(after.guide, resolutions=(*known, (after.cycle, now))))
         # local: sum of the local errors of the steps so far, m3
         values = report | {"local": after.steps.error + local}
         return after, course.after(Node(after.cycle, after.depth, after.rate, values))
@@ -127,9 +129,9 @@ class WearProblem(WearingJoint):
         """Whether a history has come to its last count, its target, or its final state."""
         cycles = self.request.cycles
         if isinstance(cycles, ToTheEnd):
-            largest = state.rates.largest[:-1]
+            largest = state.record.largest_rates[:-1]
             least = cycles.final_share * np.maximum(largest, cycles.final_share * float(largest.max(initial=0.0)))
-            if not state.wears or (state.rates.volumes[:-1] <= least).all():
+            if not self.wears(state) or (state.rate * self.area <= least).all():
                 return True
         return not math.isnan(course.reached) or course.ends[-1] >= self.request.end * (1.0 - 1e-12)
 
@@ -139,19 +141,19 @@ class WearProblem(WearingJoint):
         within = state.depth.max() <= DEEPEST and state.cycle <= LONGEST_HISTORY and n_steps < STEPS_TO_THE_END
         if isinstance(self.request.cycles, ToTheEnd) and not within:
             at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
-            rate = f"the joint still wears at {float(state.rates.volumes[-1]):.6g} m3 a cycle"
+            rate = f"the joint still wears at {self.volume_rate(state):.6g} m3 a cycle"
             return Failure(Outcome.NO_FINAL_STATE, f"{at}, {rate}")
-        if state.wears and self.run.budget.iterations > most:
+        if self.wears(state) and self.run.budget.iterations > most:
             said = f"more than {most} iterations in {n_steps + 1} steps, up to cycle {in_digits(state.cycle)}"
             return Failure(Outcome.MARCH_FAILED, said)
         return None
 
     def with_first_length(self, state: WearState) -> WearState:
         """The first state with its step limit, and the length of an adaptive step; at least two lead to the limit."""
-        length, limit = state.steps.length, math.nan
+        length, limit = state.steps.length, math.inf
         if self.guide is not None:
             length = self.guide.first_length
-        elif state.wears:
+        elif self.wears(state):
             limit = explicit_step_limit(self, state)
             moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), state.rate.max()
             # the step limit is no bound where almost nothing slips
@@ -167,7 +169,7 @@ class WearProblem(WearingJoint):
             if steps.depth is not None:
                 length = steps.depth / float(state.rate.max())
             elif self.limit == math.inf:
-                length *= float(state.rates.largest[-1] / state.rates.volumes[-1])
+                length *= float(state.record.largest_rates[-1] / self.volume_rate(state))
             else:
                 left = length * (math.floor(state.cycle / length + ROUND_OFF) + 1.0) - state.cycle
                 length = left if left < (1.0 - ROUND_OFF) * length else length

@@ -236,12 +236,6 @@ class Guide:
     resolutions: tuple[tuple[float, Resolution], ...]
     first_length: float
 
-    def then(self, count: float, resolution: Resolution) -> Guide:
-        """With a resolution from a cycle count on."""
-        if self.resolutions and self.resolutions[-1][1] == resolution:
-            return self
-        return replace(self, resolutions=(*self.resolutions, (count, resolution)))
-
 
 @packable
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 A `StartState` of a sweep has a `PeriodicState`, which is evaluated (`WearingJoint.unworn_state`) and becomes a `State`,
 as Newton's method gives it. A `WearState` has a `State` at a cycle count, and all with which the history goes on:
-`Rates`, what has been `Checked`, the `Steps` so far, and the `Record` for the result.
+what was `Checked`, the last of the `Steps`, and the `Record` for the result.
 
 A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
 amplitude (`solver.continuation.phase_lag`).
@@ -33,7 +33,7 @@ from solver.structure.joint import Case, Joint
 from solver.wear.slow_time import Guide
 
 NO_WEAR = 1e-12
-"""Fraction of `Rates.most`: a joint that wears less sticks, and its rate is round-off."""
+"""Fraction of `Record.most_rate`: a joint that wears less sticks, and its rate is round-off."""
 
 
 @dataclass(frozen=True)
@@ -91,21 +91,6 @@ class WearRequest:
 
 @packable
 @dataclass(frozen=True)
-class Rates:
-    """Wear rates of a state and, since the start, their largest values.
-
-    of_pairs (n_contact,): m per cycle. volumes, largest (n_contact + 1,): of the pairs and, last, of all together, m3
-    per cycle. most: the largest rate if every pair slipped as far as it moves, m3 per cycle.
-    """
-
-    of_pairs: FloatArray
-    volumes: FloatArray
-    largest: FloatArray
-    most: float = 0.0
-
-
-@packable
-@dataclass(frozen=True)
 class Checked:
     """What the last checks have found.
 
@@ -136,14 +121,18 @@ class Steps:
 @packable
 @dataclass(frozen=True)
 class Record:
-    """What a history says at its end.
+    """What a history says at its end, and by what it judges when nothing wears any more.
 
-    step_limit: largest stable explicit step at the first state, cycles; NaN where nothing wears.
+    largest_rates (n_contact + 1,), most_rate: largest wear rates so far of the pairs and, last, of all together, m3 per
+        cycle; and if every pair slipped as far as it moves.
+    step_limit: largest stable explicit step at the first state, cycles; or inf.
     inaccurate_from, worst: count from which on the errors are above rtol, inf if never; the largest ones from there on.
     held_from: count from which on a hold acts, inf if never. jump_cycle: first jump to another branch, NaN if none.
     """
 
-    step_limit: float = math.nan
+    largest_rates: FloatArray
+    most_rate: float = 0.0
+    step_limit: float = math.inf
     inaccurate_from: float = math.inf
     worst: Estimate = NOTHING
     held_from: float = math.inf
@@ -155,17 +144,18 @@ class Record:
 class WearState:
     """A wearing joint at one cycle count; the next step depends on this state only.
 
-    cycle: count. point: periodic state with its depth and tangential history. guide: for the reference solution.
+    cycle: count. point: periodic state with its depth and tangential history. rate (n_contact,): of its wear, m per
+    cycle. guide: for the reference solution.
     lag, half_width: of a followed frequency: phase lag, rad, and change of the frequency over that of the lag, rad/s.
     """
 
     cycle: float
     point: State
-    rates: Rates
+    rate: FloatArray
     checked: Checked
+    record: Record
     guide: Guide
     steps: Steps = Steps()
-    record: Record = Record()
     lag: float = 0.5 * math.pi
     half_width: float = 0.0
 
@@ -178,16 +168,6 @@ class WearState:
     def depth(self) -> FloatArray:
         """Worn depth (n_contact,), m."""
         return self.at.wear_depth
-
-    @property
-    def rate(self) -> FloatArray:
-        """Wear rate (n_contact,), m per cycle."""
-        return self.rates.of_pairs
-
-    @property
-    def wears(self) -> bool:
-        """Whether the wear rate is above the round-off of the slip by the static load."""
-        return bool(self.rates.volumes[-1] > NO_WEAR * self.rates.most)
 
 
 class WearingJoint:
@@ -232,7 +212,7 @@ class WearingJoint:
         # the stability of a start state has been checked
         judged_h, accurate = point.evaluation.predicted_h, start.outcome is Outcome.CONVERGED
         checked = Checked(left_out(point), start.by_resolution or estimate, accurate, judged_h)
-        return self.with_rates(WearState(0.0, point, Rates(nothing, nothing, nothing), checked, Guide((), 0.0)))
+        return self.with_rates(WearState(0.0, point, nothing, checked, Record(nothing), Guide((), 0.0)))
 
     @cached_property
     def by_sweep(self) -> Estimate:
@@ -244,20 +224,28 @@ class WearingJoint:
             lost = start.by_resolution is not None and math.isinf(start.wear_rate_error)
             return UNKNOWN if lost else NOTHING
         own, other = self.unworn_state(), self.unworn_state(reference)
-        whole = float(own.rates.volumes[-1])
-        rate = float(in_whole((own.rates.volumes - other.rates.volumes)[:-1])) / whole if whole > 0.0 else 0.0
+        apart, whole = own.rate * self.area - other.rate * self.area, self.volume_rate(own)
+        rate = float(in_whole(apart)) / whole if whole > 0.0 else 0.0
         return Estimate(vibration_change(own.at, other.at), rate)
 
     def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, Eqs. (7), (21), (25)."""
         rate = self.gain(1.0) * self.wearing_work.work(*worn_by(state.at))
-        volumes = rate * self.area
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
-        most = max(state.rates.most, self.request.wear_coefficient * (self.wearing_work.largest_factor * moved))
-        volumes = np.append(volumes, volumes.sum())
-        return replace(state, rates=Rates(rate, volumes, np.maximum(state.rates.largest, np.abs(volumes)), most))
+        most = max(state.record.most_rate, self.request.wear_coefficient * (self.wearing_work.largest_factor * moved))
+        rates = rate * self.area
+        largest = np.maximum(state.record.largest_rates, np.abs(np.append(rates, rates.sum())))
+        return replace(state, rate=rate, record=replace(state.record, largest_rates=largest, most_rate=most))
+
+    def volume_rate(self, state: WearState) -> float:
+        """Wear rate of all pairs together, m3 per cycle."""
+        return float((state.rate * self.area).sum())
+
+    def wears(self, state: WearState) -> bool:
+        """Whether the wear rate of a state is above the round-off of the slip by the static load."""
+        return self.volume_rate(state) > NO_WEAR * state.record.most_rate
 
     def solve(
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS

@@ -38,8 +38,7 @@ def wall(omega):
         return case.joint(omega, amplitude)
 
     def first(amplitude):
-        found = first_point(case, omega, amplitude)
-        return State(found.evaluation, found.history, amplitude)
+        return replace(first_point(case, omega, amplitude), parameter=amplitude)
 
     def size(point):
         structure = case.joint(omega, point.parameter).structure
