@@ -91,10 +91,10 @@ def transfer(case: Case, state: State, joint: Joint, *, with_tail: bool = False)
     if with_tail and state.resolution.samples != n_samples:
         sampled, start = transfer(case, state, replace(state, resolution=Resolution(known, n_samples)).joint(case))
         state = state_of(sampled.joint, sampled.evaluate(start))
-    old, evaluation = state.case(case), state.evaluation
+    evaluation = state.evaluation
     tangential, end = evaluation.displacement_h[:, 1:], np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
     begun = joint.law.begun_at(tangential[:, :, 0], (tangential @ synthesis(known, end))[:, :, 0])
-    same = old.penalty.inertial == joint.penalty.inertial
+    same = state.case(case).penalty.inertial == joint.penalty.inertial
     balance = Balance(joint, np.where(same[:, None], evaluation.history, begun), evaluation.wear_depth)
     motion_h, force_h = (
         change_orders(joint.to_relative(part), known, orders)

@@ -115,9 +115,9 @@ class FrequencySweep:
         omega = 2.0 * np.pi * frequency
         present = self._new_sweep(cell_of(frequency), omega if self.direction == "ramp" else None)
         present.sign = 1.0 if (omega if self.omega is None else 1.0) >= state.parameter else -1.0
-        path = LoadingPath(case, self.excitation_amplitude, self.omega)
+        present.path = path = LoadingPath(case, self.excitation_amplitude, self.omega)
         joint = path.joint_at(state.parameter)
-        return present.begin(path, replace(state, omega=joint.omega, excitation_amplitude=joint.excitation_amplitude))
+        return present.begin(replace(state, omega=joint.omega, excitation_amplitude=joint.excitation_amplitude))
 
     def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
         """The sweep that leads to a frequency, Hz, at its first node or farther on; without a state if none is found.
@@ -138,7 +138,7 @@ class FrequencySweep:
         if isinstance(first, Failure):
             present.failure = first
         else:
-            present.begin(present.path.at(first.resolution), first)
+            present.begin(first)
         return present
 
     def _next(self, wanted: float | FollowedFrequency) -> StartState | Failure:
@@ -152,13 +152,13 @@ class FrequencySweep:
         present = self.sweep_to(frequency)
         target = 2.0 * np.pi * frequency if self.omega is None else 1.0
         reached = present.state_at(target, run.fresh())
-        path = present.path
         if isinstance(reached, Failure):
             run.budget.most_iterations = run.budget.iterations + FIRST_ITERATIONS
-            first = self._first(path, target, run)
+            first = self._first(present.path, target, run)
             if isinstance(first, Failure):
                 return _lost(present, first)
-            path, reached = path.at(first.resolution), Step(first)
+            reached = Step(first)
+        path = present.path.at(reached.state.resolution)
         found = self._at_known(path, reached.state) if self.known else None
         found = found or refine(ResolvedState(path.case, reached.state), run)
         return self._judged(found, present, reached.folds)

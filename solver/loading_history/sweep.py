@@ -123,16 +123,16 @@ class Sweep(Generic[S]):
                 return found[-1]
         return None
 
-    def begin(self, path: Path[S], state: S) -> bool:
-        """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
+    def begin(self, state: S) -> bool:
+        """Take the first state, and go on with its harmonics and samples; False where it is rejected.
 
         One harmonic can give a joint that slips and opens everywhere a state that does not exist: more harmonics change
         it by more than half, and no state with more is found.
         """
-        self.path, self.passed, self.nodes = path, [state.parameter], (state,)
+        self.path, self.passed, self.nodes = self.path.at(state.resolution), [state.parameter], (state,)
         error = self._choose_resolution()
-        if error > SENSITIVE_ERROR and self.path.case.resolution.highest <= path.case.resolution.highest:
-            said = f"more harmonics change the first state, {path.describe(state)}, by more than half"
+        if error > SENSITIVE_ERROR and self.path.case.resolution.highest <= state.resolution.highest:
+            said = f"more harmonics change the first state, {self.path.describe(state)}, by more than half"
             self.nodes, self.failure = (), Failure(Outcome.UNSETTLED, said)
             return False
         self.failure = None

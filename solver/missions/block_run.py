@@ -29,7 +29,7 @@ from solver.wear.errors import HISTORY_SAFETY
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
-from solver.wear.wearing_joint import Record, WearingJoint, WearRequest, WearState
+from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
@@ -171,8 +171,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
     if failure is not None and not failure.outcome.complete:
         return failure
     state, values, slope = solution.state, solution.course.read(counts), None
-    record: Record = state.record
-    depth = values["wear_depth"]
+    depth, worst = values["wear_depth"], state.record.worst
     volume = float(depth[-1] @ given.mission.area)
     if given.with_slope:
         # the flow of the linearised wear rate
@@ -187,8 +186,8 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         slope=slope,
         response_error=float(values["response_error"].max()),
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
-        inaccurate=math.inf if failure else record.worst.largest if record.inaccurate_from <= counts[-1] else 0.0,
-        held=record.held_from <= counts[-1],
+        inaccurate=math.inf if failure else worst.largest if state.record.inaccurate_from <= counts[-1] else 0.0,
+        held=state.record.held_from <= counts[-1],
         cut_off=not math.isnan(first_cut_off(given.model.contact, counts, values["mean_pressure"], depth)),
         guide=state.guide,
         last=_last(state, start, given.mission.settings.rtol) if given.is_continued else None,

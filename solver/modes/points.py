@@ -173,7 +173,7 @@ class _Way:
 def _begun(mode: NonlinearMode, first: ModeState | None, sign: float, budget: Budget) -> Sweep[ModeState]:
     sweep: Sweep[ModeState] = Sweep(mode, sign, budget)
     if first is not None:
-        sweep.begin(mode, first)
+        sweep.begin(first)
     return sweep
 
 

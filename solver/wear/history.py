@@ -136,12 +136,9 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
 
 def _of_record(record: Record, end: float) -> dict[str, Any]:
     """What the record says of a history up to a count."""
-    return {
-        "step_limit": record.step_limit,
-        "inaccurate_from": record.inaccurate_from,
+    return {name: value for name, value in vars(record).items() if name in _REPORTED} | {
         "inaccurate_in": "wear rate" if record.worst.wear_rate >= record.worst.response else "response",
         "inaccurate_error": record.worst.largest,
-        "held_from": record.held_from,
         # adaptive steps go beyond the last count
         "jump_cycle": record.jump_cycle if record.jump_cycle <= end else math.nan,
     }
