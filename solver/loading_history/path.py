@@ -194,14 +194,12 @@ class LoadingPath(Path[State]):
         state, fine, folds = start, FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_from, state, target, run, fine=fine)
-            if arrived and run.is_stable(end.joint(self.case), end.evaluation):
+            if arrived and run.is_stable(self.joint_of(end), end.evaluation):
                 return Step(end, tuple(folds))
             # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
-            settled = relax_to_periodic(
-                self.joint_at(beyond), end.evaluation.wear_depth, end, end.joint(self.case), run
-            )
+            settled = relax_to_periodic(self.joint_at(beyond), end.evaluation.wear_depth, end, self.joint_of(end), run)
             if isinstance(settled, Failure):
                 return settled
             # a fold with a smaller change is a corner of the branch
