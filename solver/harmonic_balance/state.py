@@ -65,9 +65,8 @@ def balance_after(joint: Joint, state: State) -> Balance:
 
 def state_of(joint: Joint, at: Evaluation, parameter: float = math.nan) -> State:
     """The state of a joint from its evaluation, with the tangential history that it leaves."""
-    resolution = Resolution(joint.basis.orders, joint.basis.n_samples)
     history = joint.law.final_history(at, at.displacement_h)
-    return State(at, history, joint.omega, joint.excitation_amplitude, resolution, joint.hold, parameter)
+    return State(at, history, joint.omega, joint.excitation_amplitude, joint.resolution, joint.hold, parameter)
 
 
 def vibration_change(before: Evaluation, after: Evaluation) -> float:

@@ -15,6 +15,7 @@ from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
+from solver.settings import Resolution
 
 FORCING = 1e-3
 """Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
@@ -108,15 +109,15 @@ class JacobianSolver:
 
     _factor: Factor | None = None
     _corrections: tuple[tuple[FloatArray, FloatArray], ...] = ()
-    _basis: tuple[tuple[int, ...], int] | None = None
+    _resolution: Resolution | None = None
 
     def _known(self, tangent: Linearisation) -> Factor | None:
         """The earlier factorisation; None where it is of other harmonics, and maybe of another size, or samples."""
-        return self._factor if self._basis == _basis_of(tangent) else None
+        return self._factor if self._resolution == tangent.joint.resolution else None
 
     def _renewed(self, tangent: Linearisation) -> Factor:
         """A factorisation of this Jacobian, kept from now on."""
-        self._factor, self._corrections, self._basis = build_factor(tangent), (), _basis_of(tangent)
+        self._factor, self._corrections, self._resolution = build_factor(tangent), (), tangent.joint.resolution
         return self._factor
 
     def solve(
@@ -190,11 +191,6 @@ class JacobianSolver:
                 return sign
         factor = self._renewed(tangent)
         return factor.sign if factor.exact else _sign_by_eigenvalues(factor, tangent)[0]
-
-
-def _basis_of(tangent: Linearisation) -> tuple[tuple[int, ...], int]:
-    """Harmonics and number of samples."""
-    return tangent.joint.basis.orders, tangent.joint.basis.n_samples
 
 
 def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:

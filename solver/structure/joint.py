@@ -49,6 +49,11 @@ class Joint:
         return build_law(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
 
     @property
+    def resolution(self) -> Resolution:
+        """Harmonics and samples."""
+        return Resolution(self.basis.orders, self.basis.n_samples)
+
+    @property
     def relative_penalty(self) -> FloatArray:
         """Penalty (n_rel,), N/m, of each relative displacement."""
         return self.penalty.stiffness.ravel()[self.component_index]
