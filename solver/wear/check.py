@@ -108,9 +108,8 @@ def choose_harmonics(wearing: WearingJoint, state: WearState, *, anew: bool = Fa
 def vibrates_otherwise(state: WearState) -> bool:
     """Whether the vibration differs from the vibration of the last stability check."""
     before, now = state.checked.judged_h[:, 1:], state.at.predicted_h[:, 1:]
-    if before.shape != now.shape:
-        return True
-    return float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
+    other = before.shape != now.shape
+    return other or float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
 
 
 def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:

@@ -186,7 +186,7 @@ class WearingJoint:
         if request.steps is None:
             case = replace(case, settings=case.settings.of_steps)
         self.case, self.start, self.request, self.follow = case, start, request, request.follow
-        self.area = case.model.contact.area
+        self.unworn, self.area = start.state, case.model.contact.area
         self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
         self.wearing_work = wearing_work(request.law, case.model.contact, case.friction_coefficient)
         self.run = Run(case.settings.tolerance)
@@ -206,9 +206,7 @@ class WearingJoint:
     def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
         """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
         start, nothing = self.start, np.zeros(self.area.size + 1)
-        known = periodic or start.state
-        assert known is not None
-        point, estimate = evaluated(self.case, known), Estimate(start.response_error, start.wear_rate_error)
+        point, estimate = evaluated(self.case, periodic or self.unworn), Estimate(start.response_error, start.wear_rate_error)
         # the stability of a start state has been checked
         judged_h, accurate = point.evaluation.predicted_h, start.outcome is Outcome.CONVERGED
         checked = Checked(left_out(point), start.by_resolution or estimate, accurate, judged_h)
