@@ -206,7 +206,8 @@ class WearingJoint:
     def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
         """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
         start, nothing = self.start, np.zeros(self.area.size + 1)
-        point, estimate = evaluated(self.case, periodic or self.unworn), Estimate(start.response_error, start.wear_rate_error)
+        point = evaluated(self.case, periodic or self.unworn)
+        estimate = Estimate(start.response_error, start.wear_rate_error)
         # the stability of a start state has been checked
         judged_h, accurate = point.evaluation.predicted_h, start.outcome is Outcome.CONVERGED
         checked = Checked(left_out(point), start.by_resolution or estimate, accurate, judged_h)
