@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import first_response, largest_responses
+from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.loading_history.start_states import FrequencySweep
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Ended, Outcome, check
@@ -147,8 +147,8 @@ def _read(
         nothing = np.full(len(model.response_names), np.nan)
         return nothing.astype(np.complex128), nothing, outcome, message
     case = build_case(model, start.penalty_omega, settings, start.resolution)
-    joint = case.joint(state.omega, state.excitation_amplitude)
-    at = evaluated(joint, state)[1]
+    found = evaluated(case, state)
+    joint, at = found.joint(case), found.evaluation
     pressure = state.contact_force_h[:, 0, 0] / model.contact.area
     if not math.isnan(first_cut_off(model.contact, np.zeros(1), pressure[None], np.zeros_like(pressure[None]))):
         outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
@@ -176,16 +176,17 @@ def balance_of(
     """
     wanted = check_number("frequency", frequency, above=0.0)
     model, load, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
-    start, _, balance, at = balance_at_start(worn_model(model, wear_depth), load, wanted, sweep, settings)
+    start, _, balance, found = balance_at_start(worn_model(model, wear_depth), load, wanted, sweep, settings)
     unknown = np.full((balance.joint.component_index.size, len(balance.joint.basis.synthesis)), np.nan)
-    return functions_of(balance, unknown if at is None else at.predicted_h, start.outcome, start.message)
+    predicted_h = unknown if found is None else found.evaluation.predicted_h
+    return functions_of(balance, predicted_h, start.outcome, start.message)
 
 
 def balance_at_start(
     model: ReducedModel, load: float, frequency: float, sweep: Direction, settings: SolverSettings
-) -> tuple[StartState, Case, Balance, Evaluation | None]:
-    """State to which a sweep comes at a frequency, Hz, with its case, its balance and its evaluation. Where there is no
-    state, the evaluation is None, and the balance has no history.
+) -> tuple[StartState, Case, Balance, State | None]:
+    """State to which a sweep comes at a frequency, Hz, as a result, and as a state of a case, with its balance. Where
+    there is none, the state is None, and the balance has no history.
     """
     ((_, start),) = FrequencySweep(model, load, sweep, settings).states(np.array([frequency]))
     fixed = replace(settings, harmonics=start.resolution.highest, samples=start.resolution.samples)
@@ -193,7 +194,7 @@ def balance_at_start(
     joint = case.joint(2.0 * np.pi * frequency, load)
     if start.state is None:
         return start, case, Balance(joint, np.zeros((model.contact.n_contact, joint.law.n_history))), None
-    return start, case, *evaluated(joint, start.state)
+    return start, case, Balance(joint, start.state.start_history), evaluated(case, start.state)
 
 
 def functions_of(balance: Balance, predicted_h: FloatArray, outcome: Outcome, message: str) -> HarmonicBalance:

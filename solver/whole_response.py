@@ -1,6 +1,6 @@
 """A whole response curve of a joint, over frequency or excitation amplitude: folds, unstable parts, multipliers."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -125,15 +125,15 @@ def response_curve(
     sweep: Direction = ("up" if first < last else "down") if over_frequency else "ramp"
     model, load, settings = check_case(model, loads[0], friction_coefficient, sweep, settings)
     worn, omega = worn_model(model, wear_depth), float(omegas[0])
-    start, case, balance, at = balance_at_start(worn, load, omega / (2.0 * np.pi), sweep, settings)
+    start, case, balance, found = balance_at_start(worn, load, omega / (2.0 * np.pi), sweep, settings)
     path = LoadingPath(case, load) if over_frequency else LoadingPath(case, 1.0, omega)
-    if at is None:
+    if found is None:
         branch: _Branch = [], [], start.outcome, start.message
     else:
         # a branch may turn back behind its start before it comes to the last value
         back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
         span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
-        begun, run = State(at, balance.history, float(first)), Run(settings.tolerance)
+        begun, run = replace(found, history=balance.history, parameter=float(first)), Run(settings.tolerance)
         arc = Arc(lambda parameter: Balance(path.joint_at(parameter), balance.history), path.slope, begun, span, run)
         branch = _follow_branch(arc, last, back, most, over_frequency)
     return _reported(path, branch, errors)
@@ -183,8 +183,8 @@ def _reported(path: LoadingPath, branch: _Branch, errors: bool) -> ResponseCurve
         joint, run = balance.joint, Run(case.settings.tolerance)
         response[index], peak[index] = first_response(joint, at), largest_responses(joint, at)
         if errors:
-            error[index] = refine(ResolvedState(case, joint, point), run).estimate.response
-        found.append(find_multipliers(case, joint, at, run))
+            error[index] = refine(ResolvedState(case, point), run).estimate.response
+        found.append(find_multipliers(case, point, run))
         stability.append(found[-1].stability(odd=not run.fresh().is_stable(joint, at)))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
     return ResponseCurve(

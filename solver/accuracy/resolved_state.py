@@ -6,7 +6,7 @@ of harmonics, and the events in the period of a state that decide about them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.contact.coulomb import OTHER, SEPARATED, SLIP, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import State, first_response, largest_responses, transfer
+from solver.harmonic_balance.state import State, first_response, largest_responses, state_of, transfer
 from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.packing import packable
@@ -76,7 +76,7 @@ UNKNOWN = Estimate(np.inf, np.inf)
 
 @dataclass(frozen=True)
 class ResolvedState:
-    """A state with the case and the joint of its solution.
+    """A state with the case of its solution.
 
     estimate: estimated errors, as far as estimated.
     accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given; for
@@ -84,44 +84,43 @@ class ResolvedState:
     """
 
     case: Case
-    joint: Joint
     point: State
     estimate: Estimate = NOTHING
     accurate: bool = True
 
+    @cached_property
+    def joint(self) -> Joint:
+        """The joint of the state."""
+        return self.point.joint(self.case)
+
     def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedState | None:
         """The state with other harmonics and samples; None where it is not found. with_tail: as in `transfer`."""
-        case = self.case.at(resolution)
-        joint = self._joint_of(case)
-        point = run.move(self.case, joint, self.point, with_tail=with_tail)
+        point = run.move(self.case, self.point, resolution, with_tail=with_tail)
         # the mean position of a mass depends a little on the harmonics
-        return None if point is None else ResolvedState(case, joint, point).at_rest(run)
+        return None if point is None else ResolvedState(self.case.at(resolution), point).at_rest(run)
 
     def steps_to(self, resolution: Resolution, run: Run) -> tuple[list[ResolvedState], bool]:
         """The states after each of two Newton steps towards other harmonics and samples, and whether these contract: to
         a small residual, which is no solution.
         """
         case, own, reached = self.case.at(resolution), run.fresh(), list[ResolvedState]()
-        joint = self._joint_of(case)
-        balance, predicted = transfer(self.case, joint, self.point.evaluation)
+        joint = replace(self.point, resolution=resolution).joint(self.case)
+        balance, predicted = transfer(self.case, self.point, joint)
         at = balance.evaluate(predicted)
         # a step that goes too far ends by its values, without a warning of numpy
         with np.errstate(over="ignore", invalid="ignore"):
             for _ in range(2):
                 at = balance.evaluate(at.predicted_h + own.steps(balance, at, [-at.residual])[0])
-                reached.append(ResolvedState(case, joint, State(at, balance.history)))
+                reached.append(ResolvedState(case, state_of(joint, at)))
         run.budget.iterations += 2
         return reached, at.scaled_residual() <= CONTRACTED
-
-    def _joint_of(self, case: Case) -> Joint:
-        return case.joint(self.joint.omega, self.joint.excitation_amplitude)
 
     def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
         fraction = FAINT_SHARE * self.case.settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
-        return ResolvedState(self.case, self.joint, shake_down(self.joint, self.point, fraction, run))
+        return ResolvedState(self.case, shake_down(self.joint, self.point, fraction, run))
 
     def with_its_symmetry(self, run: Run) -> ResolvedState:
         """The state without even harmonics where its forces have none, and with them where its forces have some."""
@@ -129,7 +128,7 @@ class ResolvedState:
         orders = resolution.orders
         if half_wave_symmetric(at, ROUND_OFF):
             orders = tuple(order for order in orders if order % 2)
-        elif lacks_even(orders, at):
+        elif lacks_even(self.point):
             orders = all_orders(resolution.highest)
         wanted = Resolution(orders, resolution.samples)
         return self if wanted == resolution else self.solve_at(wanted, run) or self
@@ -228,9 +227,9 @@ def _is_constant(values_t: FloatArray) -> BoolArray:
     return np.asarray((np.ptp(values_t, axis=2) <= ROUND_OFF * np.abs(values_t).max(axis=2)).all(axis=1))
 
 
-def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
+def lacks_even(state: State) -> bool:
     """Whether a state has odd harmonics only although its contact forces have even ones."""
-    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, NEGLIGIBLE)
+    return all(order % 2 for order in state.resolution.orders) and not half_wave_symmetric(state.evaluation, NEGLIGIBLE)
 
 
 def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
@@ -243,12 +242,12 @@ def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
     return bool(np.ptp(total, axis=2).max(initial=0.0) <= fraction * size)
 
 
-def left_out(orders: tuple[int, ...], evaluation: Evaluation) -> float:
-    """Fraction of the vibrating contact force in harmonics other than `orders`, which only its samples hold.
+def left_out(state: State) -> float:
+    """Fraction of the vibrating contact force of a state in harmonics that it leaves out, which only its samples hold.
 
     The fraction grows and falls with the error of the state, and needs no further solve.
     """
-    force_h = np.fft.rfft(evaluation.force_t, axis=2)[:, :, 1:]
+    force_h = np.fft.rfft(state.evaluation.force_t, axis=2)[:, :, 1:]
     size = np.linalg.norm(force_h)
-    beyond = np.delete(force_h, np.array(orders, int) - 1, axis=2)
+    beyond = np.delete(force_h, np.array(state.resolution.orders, int) - 1, axis=2)
     return float(np.linalg.norm(beyond) / size) if size > 0.0 else 0.0

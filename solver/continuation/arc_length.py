@@ -3,14 +3,14 @@ system, whose further equation puts the point in a plane across the tangent of t
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import State, state_of
 from solver.model import FloatArray
 from solver.newton.run import Bordered, Run
 
@@ -80,7 +80,8 @@ class Arc:
 
     def state_of(self, here: Bordered) -> State:
         """State of the branch from an evaluation with the scaled parameter."""
-        return State(here.at, self.start.history, float(here.values[0] * self.span))
+        found = state_of(here.balance.joint, here.at, float(here.values[0] * self.span))
+        return replace(found, history=self.start.history)
 
     def tangent(self, state: State, along: FloatArray) -> FloatArray | None:
         """Unit tangent of the branch, of the sign of a direction `along`; None where the tangent is not defined."""
@@ -122,7 +123,7 @@ class Arc:
         fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
         found = self.run.state(self.balance_at(target), one + fraction * (other - one), target, NEAR_ITERATIONS)
-        return None if found is None else State(found.evaluation, self.start.history, target)
+        return None if found is None else replace(found, history=self.start.history)
 
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
         """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""

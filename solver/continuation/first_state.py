@@ -19,7 +19,7 @@ from solver.contact.coulomb import friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
 from solver.continuation.transient import RUNAWAY, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import Failure, State, balance_after
+from solver.harmonic_balance.state import Failure, State, balance_after, state_of
 from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -129,7 +129,7 @@ def solve_static_state(joint: Joint, run: Run) -> State | Failure:
     n_steps = LOAD_STEPS if contact.gap.any() or not contact.has_normal.all() else 1
     unmoved = np.zeros((contact.n_contact, 3, 1))
     rest = Balance(static_joint(joint, 0.0), np.zeros((contact.n_contact, joint.law.n_history)))
-    state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history)
+    state = replace(state_of(rest.joint, rest.evaluate(rest.predict(unmoved, unmoved))), history=rest.history)
     for step in range(1, n_steps + 1):
         balance = Balance(static_joint(joint, step / n_steps), state.history)
         before = state.evaluation.predicted_h

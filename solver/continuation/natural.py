@@ -7,7 +7,7 @@ it fails (`follow_naturally`).
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -137,18 +137,19 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
     for _ in range(ATTEMPTS):
         if not ratchets(joint, state.evaluation, fraction):
             break
-        moved, arrived = _shifted(joint, state.evaluation, run)
+        moved, arrived = _shifted(joint, state, run)
         if not arrived:
             break
-        state = State(moved.evaluation, moved.history, state.parameter)
+        state = replace(moved, parameter=state.parameter)
     return state
 
 
-def _shifted(joint: Joint, at: Evaluation, run: Run) -> tuple[State, bool]:
+def _shifted(joint: Joint, state: State, run: Run) -> tuple[State, bool]:
     """As `follow_naturally`, along the history of the masses from that of a state to that which the state leaves."""
+    at = state.evaluation
     shift = np.where(joint.law.moves_on[:, None], joint.law.final_history(at, at.displacement_h) - at.history, 0.0)
 
     def balance_from(part: float, _: State) -> Balance:
         return Balance(joint, at.history + part * shift, at.wear_depth)
 
-    return follow_naturally(balance_from, State(at, at.history, 0.0), 1.0, run)
+    return follow_naturally(balance_from, replace(state, parameter=0.0), 1.0, run)

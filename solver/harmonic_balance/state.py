@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,9 +13,9 @@ from solver.model import ComplexArray, FloatArray
 from solver.outcome import Ended, Outcome
 from solver.packing import packable
 from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC, Resolution
-from solver.structure.condensation import SingularStructureError, build_structure
+from solver.structure.condensation import CACHED_STRUCTURES, SingularStructureError, build_structure
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
-from solver.structure.joint import Case, Joint
+from solver.structure.joint import Case, Hold, Joint
 
 
 @packable
@@ -23,11 +24,29 @@ class State:
     """A converged periodic state; the next one depends on it alone.
 
     history (n_contact, 2): tangential history for the next state, m. parameter: of the path; NaN where there is none.
+    omega, excitation_amplitude, resolution, hold: of its joint: rad/s, N, harmonics and samples, as in `Case`.
     """
 
     evaluation: Evaluation
     history: FloatArray
+    omega: float
+    excitation_amplitude: float
+    resolution: Resolution
+    hold: Hold | None = None
     parameter: float = math.nan
+
+    def case(self, of: Case) -> Case:
+        """A case with the harmonics, samples and hold of the state."""
+        return replace(of.at(self.resolution), hold=self.hold)
+
+    def joint(self, of: Case) -> Joint:
+        """The joint of the state in a case; the last ones are cached."""
+        return _joint(of, self.resolution, self.hold, self.omega, self.excitation_amplitude)
+
+
+@lru_cache(maxsize=CACHED_STRUCTURES)
+def _joint(case: Case, resolution: Resolution, hold: Hold | None, omega: float, excitation_amplitude: float) -> Joint:
+    return replace(case.at(resolution), hold=hold).joint(omega, excitation_amplitude)
 
 
 @packable
@@ -44,9 +63,10 @@ def balance_after(joint: Joint, state: State) -> Balance:
     return Balance(joint, state.history, first=state.evaluation.predicted_t)
 
 
-def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
-    """Tangential history (n_contact, 2), m, that a state of a balance leaves."""
-    return balance.joint.law.final_history(evaluation, evaluation.displacement_h)
+def state_of(joint: Joint, at: Evaluation, parameter: float = math.nan) -> State:
+    """The state of a joint from its evaluation, with the tangential history that it leaves."""
+    history = joint.law.final_history(at, at.displacement_h)
+    return State(at, history, joint.omega, joint.excitation_amplitude, joint.resolution, joint.hold, parameter)
 
 
 def vibration_change(before: Evaluation, after: Evaluation) -> float:
@@ -59,21 +79,21 @@ def vibration_size(evaluation: Evaluation) -> float:
     return max(float(np.linalg.norm(evaluation.predicted_h[:, 1:])), 1e-300)
 
 
-def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
-    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old` with other
+def transfer(case: Case, state: State, joint: Joint, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
+    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of a case with other
     harmonics: they have another penalty, with which a pair may be inertial instead of elastic.
 
     with_tail: new harmonics of the force are those of its samples, as many as those of `joint`, instead of zeros; they
         contain impacts. New harmonics of the motion are those that this force causes.
     """
-    if with_tail and old.resolution.samples != joint.basis.n_samples:
-        old = old.at(Resolution(old.resolution.orders, joint.basis.n_samples))
-        sampled, start = transfer(old, old.joint(joint.omega, joint.excitation_amplitude), evaluation)
-        evaluation = sampled.evaluate(start)
-    orders, known = joint.basis.orders, old.resolution.orders
+    orders, known, n_samples = joint.basis.orders, state.resolution.orders, joint.basis.n_samples
+    if with_tail and state.resolution.samples != n_samples:
+        sampled, start = transfer(case, state, replace(state, resolution=Resolution(known, n_samples)).joint(case))
+        state = state_of(sampled.joint, sampled.evaluate(start))
+    evaluation = state.evaluation
     tangential, end = evaluation.displacement_h[:, 1:], np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
     begun = joint.law.begun_at(tangential[:, :, 0], (tangential @ synthesis(known, end))[:, :, 0])
-    same = old.penalty.inertial == joint.penalty.inertial
+    same = state.case(case).penalty.inertial == joint.penalty.inertial
     balance = Balance(joint, np.where(same[:, None], evaluation.history, begun), evaluation.wear_depth)
     motion_h, force_h = (
         change_orders(joint.to_relative(part), known, orders)

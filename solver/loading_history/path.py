@@ -84,9 +84,9 @@ class Path(ABC, Generic[S]):
     shortest: ClassVar[float]
     longest: ClassVar[float]
 
-    @abstractmethod
     def joint_of(self, state: S) -> Joint:
-        """The joint of a state."""
+        """The joint, with the harmonics and samples of the path, at the frequency and load of a state."""
+        return self.case.joint(state.omega, state.excitation_amplitude)
 
     @abstractmethod
     def ahead(self, parameter: float, length: float) -> float:
@@ -126,20 +126,20 @@ class Path(ABC, Generic[S]):
 
     def at(self, resolution: Resolution) -> Self:
         """The path with other harmonics and samples."""
-        return replace(self, case=self.case.at(resolution))
+        return self if resolution == self.case.resolution else replace(self, case=self.case.at(resolution))
 
     @abstractmethod
     def near(self, state: S, predicted_h: FloatArray, history: FloatArray, run: Run) -> S | None:
         """As `solve`, at the parameter of a state, from a first predicted force (n_rel, m), N, with a history, m."""
 
-    def move(self, state: S, other: Self, run: Run) -> S | None:
-        """The state with the harmonics and samples of another path; None where not found."""
-        balance, start = transfer(self.case, other.joint_of(state), state.evaluation)
-        return other.near(state, start, balance.history, run.fresh())
+    def moved(self, state: S, run: Run) -> S | None:
+        """A state of other harmonics and samples with those of the path; None where not found."""
+        balance, start = transfer(self.case, state, self.joint_of(state))
+        return self.near(state, start, balance.history, run.fresh())
 
     @abstractmethod
-    def choose(self, state: S, run: Run) -> tuple[Self, S, Estimate]:
-        """Path and state with the harmonics that the state needs, and its estimated error."""
+    def choose(self, state: S, run: Run) -> tuple[S, Estimate]:
+        """The state with the harmonics that it needs, and its estimated error."""
 
     @abstractmethod
     def describe(self, state: S) -> str:
@@ -162,9 +162,6 @@ class LoadingPath(Path[State]):
         if self.omega is None:
             return self.case.joint(parameter, self.excitation_amplitude)
         return self.case.joint(self.omega, parameter * self.excitation_amplitude)
-
-    def joint_of(self, state: State) -> Joint:  # noqa: D102
-        return self.joint_at(state.parameter)
 
     def balance_from(self, parameter: float, state: State) -> Balance:
         """Unworn balance at a value of the parameter, after a state."""
@@ -244,7 +241,7 @@ class LoadingPath(Path[State]):
     def forgets(self, state: State) -> bool:  # noqa: D102
         at = state.evaluation
         opens = (at.status_t == SEPARATED).any(axis=1)
-        slip = np.ptp(at.state_t, axis=2).max(axis=1) / self.joint_of(state).law.state_stiffness
+        slip = np.ptp(at.state_t, axis=2).max(axis=1) / state.joint(self.case).law.state_stiffness
         moved = np.abs(at.displacement_h[:, 1:, 1:]).sum(axis=(1, 2))
         return bool((opens | (slip > LEAST_SLIP * moved)).all())
 
@@ -257,7 +254,7 @@ class LoadingPath(Path[State]):
         # where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice
         if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
             return True
-        before, now = (left_out(resolution.orders, at.evaluation) for at in (checked, state))
+        before, now = left_out(checked), left_out(state)
         if self.rests(state) or not (0.0 < error < np.inf and before > 0.0):
             return False
         foreseen = error * now / before
@@ -265,10 +262,10 @@ class LoadingPath(Path[State]):
         # where the error is above rtol already, there are no more harmonics
         return enough and (foreseen <= settings.rtol or error > settings.rtol)
 
-    def choose(self, state: State, run: Run) -> tuple[Self, State, Estimate]:  # noqa: D102
-        found = refine(ResolvedState(self.case, self.joint_of(state), state), run, node=True)
+    def choose(self, state: State, run: Run) -> tuple[State, Estimate]:  # noqa: D102
+        found = refine(ResolvedState(self.case, state), run, node=True)
         found = with_level_above(found, run, node=True)
-        return replace(self, case=found.case), found.point, found.estimate
+        return found.point, found.estimate
 
     def describe(self, state: State) -> str:  # noqa: D102
         at = f"{state.parameter / (2.0 * np.pi):.6g} Hz" if self.omega is None else f"load factor {state.parameter:.3g}"

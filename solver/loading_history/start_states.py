@@ -30,7 +30,7 @@ from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Outcome, describe_inaccurate
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
-from solver.results.state_report import known_state, periodic_state
+from solver.results.state_report import evaluated, periodic_state
 from solver.settings import Direction, FollowedFrequency, Resolution, SolverSettings, allowed
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
@@ -118,7 +118,9 @@ class FrequencySweep:
             return start
         present = self._new_sweep(cell_of(frequency), omega if ramp else None)
         present.sign = 1.0 if target > parameter else -1.0
-        if not present.begin(replace(present.path, case=case), known_state(case, known, parameter)):
+        present.path = path = LoadingPath(case, self.excitation_amplitude, self.omega)
+        joint, first = path.joint_at(parameter), replace(evaluated(case, known), parameter=parameter)
+        if not present.begin(replace(first, omega=joint.omega, excitation_amplitude=joint.excitation_amplitude)):
             assert present.failure is not None
             return self._without_state(present.failure)
         _, after = next(self.states(np.array([frequency])))
@@ -144,7 +146,7 @@ class FrequencySweep:
         if isinstance(first, Failure):
             present.failure = first
         else:
-            present.begin(*first)
+            present.begin(first)
         return present
 
     def _next(self, wanted: float | FollowedFrequency) -> StartState | Failure:
@@ -157,16 +159,16 @@ class FrequencySweep:
         run.budget.iterations, run.budget.most_iterations = 0, NODE_ITERATIONS
         present = self.sweep_to(frequency)
         target = 2.0 * np.pi * frequency if self.omega is None else 1.0
-        present.advance_to(target)
-        path, reached = present.path, present.state_at(target, run.fresh())
+        reached = present.state_at(target, run.fresh())
         if isinstance(reached, Failure):
             run.budget.most_iterations = run.budget.iterations + FIRST_ITERATIONS
-            first = self._first(path, target, run)
+            first = self._first(present.path, target, run)
             if isinstance(first, Failure):
                 return _lost(present, first)
-            path, reached = first[0], Step(first[1])
+            reached = Step(first)
+        path = present.path.at(reached.state.resolution)
         found = self._at_known(path, reached.state) if self.known else None
-        found = found or refine(ResolvedState(path.case, path.joint_of(reached.state), reached.state), run)
+        found = found or refine(ResolvedState(path.case, reached.state), run)
         return self._judged(found, present, reached.folds)
 
     def _without_state(self, failure: Failure) -> StartState:
@@ -186,16 +188,15 @@ class FrequencySweep:
         self.present = Sweep(path, sign, budget, with_reference=not self.known, save=self.save)
         return self.present
 
-    def _first(self, path: Path[State], place: float, run: Run) -> tuple[Path[State], State] | Failure:
-        """First state at a value of the parameter, and its path, with the harmonics of a path, or else with one."""
+    def _first(self, path: Path[State], place: float, run: Run) -> State | Failure:
+        """First state at a value of the parameter, with the harmonics of a path, or else with one."""
         others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
         omega, load = (place, 1.0) if self.omega is None else (self.omega, place)
         why = list[Failure]()
         for resolution in (path.case.resolution, *others):
-            at = path.at(resolution)
-            found = solve_first_state(at.case, omega, load * self.excitation_amplitude, run.fresh())
+            found = solve_first_state(path.at(resolution).case, omega, load * self.excitation_amplitude, run.fresh())
             if isinstance(found, State):
-                return at, replace(found, parameter=place)
+                return replace(found, parameter=place)
             why.append(found)
             if found.outcome.static or run.budget.exhausted:
                 break
@@ -203,23 +204,22 @@ class FrequencySweep:
 
     def _at_known(self, path: Path[State], state: State) -> ResolvedState | None:
         """The state with the known resolution; None where it is not found with it."""
-        omega = path.joint_of(state).omega
-        _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - omega))
+        _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - state.omega))
         wanted = path.at(resolution)
-        moved = state if wanted.case is path.case else path.move(state, wanted, self.run)
-        return None if moved is None else ResolvedState(wanted.case, wanted.joint_of(moved), moved)
+        moved = state if wanted is path else wanted.moved(state, self.run)
+        return None if moved is None else ResolvedState(wanted.case, moved)
 
     def _judged(self, found: ResolvedState, present: Sweep[State], folds: tuple[float, ...]) -> StartState | Failure:
         """A state with all its errors, or why it is no result. folds: jumped over behind the last node."""
-        joint, at, estimate = found.joint, found.point.evaluation, found.estimate
-        if said := certify(joint, at).sentence(self.settings.tolerance):
+        estimate = found.estimate
+        if said := certify(found.joint, found.point.evaluation).sentence(self.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED, said)
-        unstable = find_instability(found.case, joint, at, self.run, self.with_switching)
+        unstable = find_instability(found.case, found.point, self.run, self.with_switching)
         if unstable is not None and not unstable.outcome.complete:
             return unstable
-        reference = present.reference_of(replace(present.path, case=found.case), found.point, self.run)
+        reference = present.reference_of(found.point, self.run)
         if reference is not None:
-            estimate = estimate + found.difference(ResolvedState(found.case, joint, reference))
+            estimate = estimate + found.difference(ResolvedState(found.case, reference))
         elif present.here is not None and present.reference:
             estimate, found = UNKNOWN, replace(found, accurate=False)
         known = estimate.response, estimate.wear_rate
@@ -227,7 +227,7 @@ class FrequencySweep:
         fold = (present.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
         return StartState(
             outcome=Outcome.CONVERGED if found.accurate else Outcome.INACCURATE,
-            state=periodic_state(joint, found.point),
+            state=periodic_state(found.point),
             penalty_omega=found.case.penalty_omega,
             resolution=found.case.resolution,
             response_error=known[0],
@@ -236,7 +236,7 @@ class FrequencySweep:
             branch=present.branch + len(folds),
             fold_frequency=float(fold),
             unjudged="" if unstable is None else unstable.message,
-            reference=None if reference is None else periodic_state(joint, reference),
+            reference=None if reference is None else periodic_state(reference),
             by_resolution=found.estimate,
         )
 
@@ -278,7 +278,7 @@ def _resonance_between(
     """Frequency, Hz, of a resonance between two nodes, with the history of the first one; None where there is none."""
     path, load, ahead = present.path, sweeps.excitation_amplitude, step.state
     # positive before a resonance on the way of the sweep, negative behind
-    one, other = (present.sign * math.cos(phase_lag(path.joint_of(at), at.evaluation)) for at in (here, ahead))
+    one, other = (present.sign * math.cos(phase_lag(at.joint(path.case), at.evaluation)) for at in (here, ahead))
     if not one > 0.0 >= other:
         return None
     part = 0.0 if step.folds else one / (one - other)

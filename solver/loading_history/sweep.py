@@ -28,7 +28,7 @@ from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
 from solver.results.history import StartState
-from solver.results.state_report import known_state, periodic_state
+from solver.results.state_report import evaluated, periodic_state
 from solver.settings import Resolution
 from solver.stability.floquet import find_instability
 from solver.structure.condensation import SingularStructureError
@@ -59,9 +59,8 @@ PARTS_TO_POINT = (1, 4, 16)
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
 
-_OF_REFERENCE = ("reference", "reference_resolution", "skipped")
-_SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", *_OF_REFERENCE)
-"""Attributes of a `Sweep` with which it goes on from a node, beside its harmonics and the iterations so far."""
+_SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
+"""Attributes of a `Sweep` with which it goes on from a node, beside the iterations so far."""
 
 
 @dataclass(eq=False)
@@ -74,8 +73,7 @@ class Sweep(Generic[S]):
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
     checked, error: the node at which the harmonics were chosen, and its largest estimated error.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
-    reference: last nodes of the reference sweep, with their harmonics and samples; skipped: parameters of the nodes
-        since then.
+    reference: last nodes of the reference sweep; skipped: parameters of the nodes since then.
     """
 
     path: Path[S]
@@ -97,14 +95,14 @@ class Sweep(Generic[S]):
 
     def __post_init__(self) -> None:
         self.failure: Failure | None = Failure(Outcome.START_FAILED, "no first state is known")
-        self.length, self.reference_resolution = self.path.longest, self.path.case.resolution
+        self.length = self.path.longest
         self.run = self._reference_run = Run(self.path.case.settings.tolerance, self.budget)
 
     def load(self, saved: dict[str, Any]) -> None:
         """Go on from what another sweep has saved."""
         self.saved, self.budget.iterations = saved, saved["iterations"]
         vars(self).update({name: saved[name] for name in _SAVED})
-        self.path = self.path.at(saved["resolution"])
+        self.path = self.path.at(self.nodes[-1].resolution)
         # without the factorisations that are kept from node to node, and the next node
         self.run, self._reference_run, self.ahead = self.run.fresh(), self.run.fresh(), None
 
@@ -118,16 +116,16 @@ class Sweep(Generic[S]):
         """The current node, None where there is no state."""
         return self.last if self.failure is None else None
 
-    def reference_of(self, path: Path[S], state: S, run: Run) -> S | None:
-        """State of a path, with its harmonics, to which the last reference node leads; None where it is not found."""
+    def reference_of(self, state: S, run: Run) -> S | None:
+        """State to which the last reference node leads, with parameter and harmonics of a state; None if not found."""
         if self.here is None or not self.reference:
             return None
-        last, own = self.reference[-1], self.path.at(self.reference_resolution)
-        node = own.move(last, path, run)
+        last, path = self.reference[-1], self.path.at(state.resolution)
+        node = path.moved(last, run)
         if node is None:
             # there may be no state with these harmonics at the node, as there is one at the point
-            there = own.solve((last,), state.parameter, run.fresh())
-            return None if there is None else own.move(there, path, run)
+            there = self.path.at(last.resolution).solve((last,), state.parameter, run.fresh())
+            return None if there is None else path.moved(there, run)
         # over states in between where the last part is too long
         for n_parts in PARTS_TO_POINT:
             way = np.linspace(node.parameter, state.parameter, n_parts + 1)[1:].tolist()
@@ -135,16 +133,16 @@ class Sweep(Generic[S]):
                 return found[-1]
         return None
 
-    def begin(self, path: Path[S], state: S) -> bool:
-        """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
+    def begin(self, state: S) -> bool:
+        """Take the first state, and go on with its harmonics and samples; False where it is rejected.
 
         One harmonic can give a joint that slips and opens everywhere a state that does not exist: more harmonics change
         it by more than half, and no state with more is found.
         """
-        self.path, self.passed, self.nodes = path, [state.parameter], (state,)
+        self.path, self.passed, self.nodes = self.path.at(state.resolution), [state.parameter], (state,)
         error = self._choose_resolution()
-        if error > SENSITIVE_ERROR and self.path.case.resolution.highest <= path.case.resolution.highest:
-            said = f"more harmonics change the first state, {path.describe(state)}, by more than half"
+        if error > SENSITIVE_ERROR and self.path.case.resolution.highest <= state.resolution.highest:
+            said = f"more harmonics change the first state, {self.path.describe(state)}, by more than half"
             self.nodes, self.failure = (), Failure(Outcome.UNSETTLED, said)
             return False
         self.failure = None
@@ -162,7 +160,8 @@ class Sweep(Generic[S]):
                 self._advance(here, self.ahead)
 
     def state_at(self, parameter: float, run: Run) -> Step[S] | Failure:
-        """State at a parameter up to the next node, or why there is none. run: the sweep must not depend on it."""
+        """State at a parameter, to which the sweep goes on, or why there is none. run: of this state alone."""
+        self.advance_to(parameter)
         if self.here is None or self.ahead is None:
             assert self.failure is not None
             return self.failure
@@ -222,20 +221,20 @@ class Sweep(Generic[S]):
         if not self.reference:
             if self.path.rests(step.state):
                 return
-            self.reference, self.reference_resolution = (before,), self.path.case.resolution
+            self.reference = (before,)
         self.skipped = (*self.skipped, step.state.parameter)
         if len(self.skipped) == STEPS_OF_REFERENCE:
             path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
             middle = 0.5 * (before.parameter + step.state.parameter)
             self.reference = self._led(path, middle) or self._led(path, *self.skipped[:-1], middle)
-            self.reference_resolution, self.skipped = path.case.resolution, ()
+            self.skipped = ()
 
     def _led(self, path: Path[S], *targets: float) -> tuple[S, ...]:
         """The reference sweep along a path with fewer harmonics, at the last of some targets; none if none is found."""
         states = self.reference
-        if self.reference_resolution != path.case.resolution:
+        if states[-1].resolution != path.case.resolution:
             self._reference_run = self.run.fresh()
-            moved = self.path.at(self.reference_resolution).move(states[-1], path, self.run)
+            moved = path.moved(states[-1], self.run)
             states = () if moved is None else (moved,)
         return follow(path, states, targets, self._reference_run.with_tolerance(path.case.settings.rough_tolerance))
 
@@ -243,8 +242,9 @@ class Sweep(Generic[S]):
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
         self.checked, error = self.nodes[-1], NOTHING
         if self.path.case.settings.automatic:
-            path, self.checked, error = self.path.choose(self.checked, self.run)
-            if path.case.resolution == self.path.case.resolution:
+            self.checked, error = self.path.choose(self.checked, self.run)
+            path = self.path.at(self.checked.resolution)
+            if path is self.path:
                 self.nodes = (*self.nodes[:-1], self.checked)
             else:
                 self.nodes, self.path, self.run = (self.checked,), path, self.run.fresh()
@@ -253,8 +253,7 @@ class Sweep(Generic[S]):
 
     def _save(self) -> None:
         """Save the current node, and go on as a sweep that is resumed there."""
-        others = {"resolution": self.path.case.resolution, "iterations": self.budget.iterations}
-        self.load(in_rows({name: vars(self)[name] for name in _SAVED} | others))
+        self.load(in_rows({name: vars(self)[name] for name in _SAVED} | {"iterations": self.budget.iterations}))
         self.save()
 
 
@@ -311,21 +310,19 @@ class EarlierSweep:
         if start is None or start.state is None or start.branch > 0:
             return None
         target = start.state.omega if path.omega is None else 1.0
-        before = replace(known_state(path.case, start.state, target), history=start.state.start_history)
+        known, history = evaluated(path.case, start.state), start.state.start_history
+        before = replace(known, history=history, parameter=target)
         try:
             state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
             if state is None or not path.forgets(state):
                 state, most = self._over_nodes(path, target, run.fresh(), stride), VIBRATION_RECHECK
             if state is None or vibration_change(before.evaluation, state.evaluation) > most:
                 return None
-            joint = path.joint_at(target)
-            if find_instability(path.case, joint, state.evaluation, run, with_switching):
+            if find_instability(path.case, state, run, with_switching):
                 return None
         except SingularStructureError:
             return None
-        return replace(
-            start, state=periodic_state(joint, state), reference=None, newton_iterations=run.budget.iterations
-        )
+        return replace(start, state=periodic_state(state), reference=None, newton_iterations=run.budget.iterations)
 
     def _over_nodes(self, path: LoadingPath, target: float, run: Run, stride: int) -> State | None:
         """The state at a target of the path, over the nodes; None where it is not found."""
@@ -341,4 +338,4 @@ class EarlierSweep:
         states = follow(coarse, (replace(begin, parameter=first),), [*nodes, target], run, rough, ATTEMPTS, most)
         if not states:
             return None
-        return states[-1] if coarse.case is path.case else coarse.move(states[-1], path, run)
+        return states[-1] if coarse.case is path.case else path.moved(states[-1], run)

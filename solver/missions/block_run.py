@@ -7,6 +7,7 @@ import numpy as np
 import scipy.linalg
 
 from solver.clock import computing_time
+from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import FrequencySweep
@@ -132,7 +133,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
     if failure is not None and not failure.outcome.complete:
         return failure
     state, values, slope = solution.state, solution.course.read(counts), None
-    depth = values["wear_depth"]
+    depth, worst, checked = values["wear_depth"], state.record.worst, state.checked
     volume = float(depth[-1] @ given.mission.area)
     if given.with_slope:
         # the flow of the linearised wear rate
@@ -148,17 +149,17 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         slope=slope,
         response_error=float(values["response_error"].max()),
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
-        inaccurate=math.inf if failure else state.worst.largest if state.inaccurate_from <= counts[-1] else 0.0,
-        held=state.held_from <= counts[-1],
+        inaccurate=math.inf if failure else worst.largest if state.record.inaccurate_from <= counts[-1] else 0.0,
+        held=state.record.held_from <= counts[-1],
         cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
-        guide=Guide(state.resolutions, state.first_length),
+        guide=state.guide,
         last=replace(
             start,
-            outcome=Outcome.CONVERGED if state.accurate else Outcome.INACCURATE,
+            outcome=Outcome.CONVERGED if checked.accurate else Outcome.INACCURATE,
             state=replace(start.state, displacement_h=motion, contact_force_h=force, start_history=history),
-            resolution=state.resolution,
-            response_error=state.estimate.response,
-            wear_rate_error=state.estimate.wear_rate,
+            resolution=state.point.resolution,
+            response_error=checked.estimate.response,
+            wear_rate_error=checked.estimate.wear_rate,
             reference=None,
         ),
         sweep=sweep,
@@ -197,12 +198,13 @@ def _continued(given: BlockInput, last: StartState, run: Run) -> StartState:
     """
     before = last.state
     assert before is not None
-    balance, at = evaluated(given.case_of(last).joint(before.omega, before.excitation_amplitude), before)
-    found = run.state(balance, at.predicted_h)
+    case = given.case_of(last)
+    state = evaluated(case, before)
+    found = run.state(Balance(state.joint(case), before.start_history), state.evaluation.predicted_h)
     if found is None:
         said = "the last state of the block before is not found at the depth before this block"
         return replace(last, state=None, outcome=Outcome.BRANCH_LOST, message=said)
-    start = replace(last, state=periodic_state(balance.joint, found), newton_iterations=run.budget.iterations)
+    start = replace(last, state=periodic_state(found), newton_iterations=run.budget.iterations)
     frequency, amplitude = given.block.ends[0], given.block.excitation_amplitude
     along: Direction = "up" if 2.0 * np.pi * frequency > before.omega else "down"
     lower = min(amplitude, before.excitation_amplitude)

@@ -20,7 +20,7 @@ from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
 from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.harmonic_balance.state import Failure, State, final_history
+from solver.harmonic_balance.state import Failure, State, state_of
 from solver.loading_history.path import FREE_STEP, LINEAR_CHANGE, Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
@@ -54,11 +54,6 @@ class ModeState(State):
 
     values: FloatArray
     shape: ComplexArray
-
-    @property
-    def omega(self) -> float:
-        """The first of the values."""
-        return float(self.values[0])
 
     @property
     def damping_ratio(self) -> float:
@@ -112,8 +107,8 @@ class NonlinearMode(Path[ModeState]):
         # frequency 0 there is the mode once more, backwards
         if found is None or abs(found.values[1]) > 1.0 or found.values[0] <= 0.0:
             return None
-        after = final_history(found.balance, found.at)
-        return ModeState(found.at, after, amplitude, values=found.values, shape=found.extra)
+        state = state_of(found.balance.joint, found.at, amplitude)
+        return ModeState(**vars(state), values=found.values, shape=found.extra)
 
     def ahead(self, parameter: float, length: float) -> float:  # noqa: D102
         return parameter * math.exp(length)
@@ -148,15 +143,15 @@ class NonlinearMode(Path[ModeState]):
     def near(self, state: ModeState, predicted_h: FloatArray, history: FloatArray, run: Run) -> ModeState | None:  # noqa: D102
         return self.find(state.parameter, (predicted_h, state.values), history, run)
 
-    def choose(self, state: ModeState, run: Run) -> tuple[Self, ModeState, Estimate]:  # noqa: D102
+    def choose(self, state: ModeState, run: Run) -> tuple[ModeState, Estimate]:  # noqa: D102
         # the error of the first response is judged in a sweep of the frequency only
-        return *self.refined(state, run, node=True), NOTHING
+        return self.refined(state, run, node=True), NOTHING
 
-    def refined(self, state: ModeState, run: Run, *, node: bool = False, part: float = 1.0) -> tuple[Self, ModeState]:
-        """Mode and state with the harmonics that the state needs for a part of rtol. node: as in `refine`."""
+    def refined(self, state: ModeState, run: Run, *, node: bool = False, part: float = 1.0) -> ModeState:
+        """The state with the harmonics that it needs for a part of rtol. node: as in `refine`."""
         settings = replace(self.case.settings, rtol=part * self.case.settings.rtol)
         chosen = refine(_resolved(replace(self, case=replace(self.case, settings=settings)), state), run, node=node)
-        return self.at(chosen.case.resolution), cast("ModeState", chosen.point)
+        return cast("ModeState", chosen.point)
 
     def describe(self, state: ModeState) -> str:  # noqa: D102
         return f"at the modal amplitude {state.parameter:.4g} m sqrt(kg)"
@@ -172,7 +167,7 @@ class ResolvedMode(ResolvedState):
 
     def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> "ResolvedMode | None":  # noqa: ARG002, D102
         other = self.mode.at(resolution)
-        found = self.mode.move(cast("ModeState", self.point), other, run)
+        found = other.moved(cast("ModeState", self.point), run)
         return None if found is None else _resolved(other, found)
 
     def steps_to(self, _: Resolution, run: Run) -> tuple[list[ResolvedState], bool]:
@@ -188,7 +183,7 @@ class ResolvedMode(ResolvedState):
 
 
 def _resolved(mode: NonlinearMode, state: ModeState) -> ResolvedMode:
-    return ResolvedMode(case=mode.case_of(state.values), joint=mode.joint_of(state), point=state, mode=mode)
+    return ResolvedMode(case=mode.case_of(state.values), point=state, mode=mode)
 
 
 @dataclass(frozen=True)

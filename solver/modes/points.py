@@ -6,7 +6,7 @@ safety factor, and the change with the tangential history that the reference swe
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal, cast
 
@@ -79,7 +79,7 @@ def follow_mode(
             response, shape = (np.full(len(part), math.nan, complex) for part in (linear.response, linear.mass))
             numbers = math.nan, math.nan, math.nan, math.nan
             point = ModePoint(point.outcome, point.message, *numbers, response, shape, pairs, pairs, 0, 0)
-        iterations = way.spent + run.budget.iterations
+        iterations = way.spent.iterations + run.budget.iterations
         yield index, replace(point, newton_iterations=iterations, run_time=computing_time() - began)
 
 
@@ -93,7 +93,7 @@ class _Way:
     """The sweeps to the points: one with rising amplitude, and one with falling amplitude from the present `top`.
 
     - asked: model, number of the mode, settings.
-    - to_rest, spent: Newton iterations to the rest, and of the way to the last point without those to other points.
+    - to_rest, spent: Newton iterations to the rest, and those of the way to the last point without other points.
     """
 
     asked: tuple[ReducedModel, int, SolverSettings]
@@ -103,7 +103,7 @@ class _Way:
     down: Sweep[ModeState] | None = None
     top: float = 0.0
     to_rest: int = 0
-    spent: int = 0
+    spent: Budget = field(default_factory=Budget)
 
     def place(self, amplitude: float) -> tuple[float, float]:
         """Key by which amplitudes come in the order of the way."""
@@ -116,7 +116,7 @@ class _Way:
             own = Run(run.tolerance, Budget(deadline=deadline))
             self.rest = find_rest(*self.asked, own)
             self.to_rest = own.budget.iterations
-        self.spent, rest = self.to_rest, self.rest
+        self.spent, rest = Budget(self.to_rest), self.rest
         if isinstance(rest, Failure):
             return rest
         if self.direction == "up" and not rest.glued:
@@ -129,13 +129,11 @@ class _Way:
         sweep = self._lowered_from(rest, top, deadline) if lowered else self._raised_to(rest, amplitude, deadline)
         if sweep.last is None:
             return _NO_FIRST
-        self.spent = sweep.budget.iterations
+        self.spent = sweep.budget
         if self.up is not None and lowered and sweep.here is not None and sweep.here.parameter < amplitude:
             # the mode could not be raised to the amplitude from which it is lowered
             return _lost(self.up)
         sweep.budget.deadline = deadline
-        sweep.advance_to(amplitude)
-        self.spent = sweep.budget.iterations
         found = sweep.state_at(amplitude, run.fresh())
         if not isinstance(found, Step):
             return _lost(sweep)
@@ -170,7 +168,7 @@ class _Way:
 def _begun(mode: NonlinearMode, first: ModeState | None, sign: float, budget: Budget) -> Sweep[ModeState]:
     sweep: Sweep[ModeState] = Sweep(mode, sign, budget)
     if first is not None:
-        sweep.begin(mode, first)
+        sweep.begin(first)
     return sweep
 
 
@@ -178,13 +176,14 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     """The point with the harmonics that it needs, and its errors. sweep: that has led to the state, if any."""
     settings = mode.case.settings
     # half of rtol is left for the error by the steps of the sweep
-    mode, found = mode.refined(found, run, part=0.5)
+    found = mode.refined(found, run, part=0.5)
+    mode = mode.at(found.resolution)
     joint, at, resolution = mode.joint_of(found), found.evaluation, mode.case.resolution
     certificate = certify(joint, at)
     if certificate.failures(settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
     errors = _errors_by_resolution(mode, found, run)
-    if sweep is not None and (reference := sweep.reference_of(mode, found, run)) is not None:
+    if sweep is not None and (reference := sweep.reference_of(found, run)) is not None:
         errors = errors + np.abs(reference.values - found.values)
     # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
     by_friction = float(joint.law.friction_work(at).sum()) / (2.0 * np.pi * (found.omega * found.parameter) ** 2)
@@ -216,9 +215,9 @@ def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> Fl
     # another number of samples, as an event may stay next to the same one
     for samples in (3 * two_up.samples + 2, 4 * two_up.samples + 2) if mode.model.has_harmonics(two_up.highest) else ():
         wanted, between = (mode.at(Resolution(each.orders, samples)) for each in (two_up, above))
-        found = mode.move(state, wanted, run)
-        if found is None and (near := mode.move(state, between, run)) is not None:
-            found = between.move(near, wanted, run)
+        found = wanted.moved(state, run)
+        if found is None and (near := between.moved(state, run)) is not None:
+            found = wanted.moved(near, run)
         if found is not None:
             return ERROR_OVER_CHANGE * np.abs(found.values - state.values)
     return np.full(3, math.inf)

@@ -15,6 +15,7 @@ from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
+from solver.settings import Resolution
 
 FORCING = 1e-3
 """Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
@@ -108,15 +109,15 @@ class JacobianSolver:
 
     _factor: Factor | None = None
     _corrections: tuple[tuple[FloatArray, FloatArray], ...] = ()
-    _orders: tuple[int, ...] = ()
+    _resolution: Resolution | None = None
 
     def _known(self, tangent: Linearisation) -> Factor | None:
-        """The earlier factorisation; None where it is of other harmonics: of no use, and maybe of another size."""
-        return self._factor if self._orders == tangent.joint.basis.orders else None
+        """The earlier factorisation; None where it is of other harmonics, and maybe of another size, or samples."""
+        return self._factor if self._resolution == tangent.joint.resolution else None
 
     def _renewed(self, tangent: Linearisation) -> Factor:
         """A factorisation of this Jacobian, kept from now on."""
-        self._factor, self._corrections, self._orders = build_factor(tangent), (), tangent.joint.basis.orders
+        self._factor, self._corrections, self._resolution = build_factor(tangent), (), tangent.joint.resolution
         return self._factor
 
     def solve(

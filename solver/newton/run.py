@@ -14,10 +14,11 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
-from solver.harmonic_balance.state import Failure, State, final_history, transfer
+from solver.harmonic_balance.state import Failure, State, state_of, transfer
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING, JacobianSolver
 from solver.outcome import Outcome, describe_error, is_machine_fault
+from solver.settings import Resolution
 from solver.structure.condensation import SingularStructureError
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
@@ -207,7 +208,7 @@ class Run:
             return np.asarray(self.steps(balance, at, [-at.residual], residual)[0])
 
         at = self._iterate(balance.evaluate, direction, start, most)
-        return None if at is None else State(at, final_history(balance, at), parameter)
+        return None if at is None else state_of(balance.joint, at, parameter)
 
     def solve_bordered(
         self, problem: BorderedProblem, start: FloatArray, values: FloatArray, most: int = MOST_ITERATIONS
@@ -267,9 +268,10 @@ class Run:
         tangent = sampled.linearise(sampled.evaluate(at.predicted_h))
         return bool(JacobianSolver().determinant_sign(tangent) >= 0.0)
 
-    def move(self, old: Case, joint: Joint, state: State, *, with_tail: bool = False) -> State | None:
-        """The state of a case with the harmonics and samples of another joint, as `transfer`; None where not found."""
-        balance, start = transfer(old, joint, state.evaluation, with_tail=with_tail)
+    def move(self, case: Case, state: State, resolution: Resolution, *, with_tail: bool = False) -> State | None:
+        """The state of a case with other harmonics and samples, as `transfer`; None where not found."""
+        joint = replace(state, resolution=resolution).joint(case)
+        balance, start = transfer(case, state, joint, with_tail=with_tail)
         return self.fresh().state(balance, start, state.parameter)
 
 

@@ -10,7 +10,7 @@ from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
 from solver.continuation.transient import Transient
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import State, final_history, largest_responses
+from solver.harmonic_balance.state import State, largest_responses, state_of
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.results.history import PeriodicState
 from solver.structure.condensation import whole_motion
@@ -21,23 +21,18 @@ LOOP_PHASES = 128
 """Number of phases of a loop, equally spaced over a period from 0 on, whatever the number of samples of a state is."""
 
 
-def periodic_state(joint: Joint, point: State) -> PeriodicState:
+def periodic_state(state: State) -> PeriodicState:
     """The state as a result in physical units; its arrays lie in rows, as when read from a file."""
-    at = point.evaluation
+    at = state.evaluation
     arrays = (at.displacement_h, at.force_h, at.history)
-    return PeriodicState(joint.omega, joint.excitation_amplitude, *(np.array(each, order="C") for each in arrays))
+    return PeriodicState(state.omega, state.excitation_amplitude, *(np.array(each, order="C") for each in arrays))
 
 
-def evaluated(joint: Joint, state: PeriodicState) -> tuple[Balance, Evaluation]:
-    """The balance of a state, and its evaluation."""
-    balance = Balance(joint, state.start_history, np.zeros(joint.contact.n_contact))
-    return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
-
-
-def known_state(case: Case, state: PeriodicState, parameter: float = np.nan) -> State:
-    """A state with the harmonics and samples of a case, evaluated and not solved again; parameter: as of `State`."""
-    balance, at = evaluated(case.joint(state.omega, state.excitation_amplitude), state)
-    return State(at, final_history(balance, at), parameter)
+def evaluated(case: Case, state: PeriodicState) -> State:
+    """The state of a case, which has its harmonics and samples."""
+    joint = case.joint(state.omega, state.excitation_amplitude)
+    balance = Balance(joint, state.start_history)
+    return state_of(joint, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h)))
 
 
 def report_state(

@@ -101,17 +101,18 @@ class Multipliers:
         return "fold" if self.values[0].real > 0.0 else "period doubling"
 
 
-def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, with_switching: bool = True) -> Failure | None:
+def find_instability(case: Case, state: State, run: Run, with_switching: bool = True) -> Failure | None:
     """Why a state is unstable at a fixed wear depth, or INACCURATE where that is not known; None where it is stable.
 
     with_switching: False, within a wear history, leaves out joints that switch, but for small ones that open and close.
     Raises OutOfTimeError.
     """
+    joint, at = state.joint(case), state.evaluation
     switches = bool(switching_pairs(at)[0].any())
     left_out = switches and not with_switching and not _bounces(joint, at)
     if left_out or (not switches and all(map(_is_passive, _structures(joint, at)))):
         return None
-    found = find_multipliers(case, joint, at, run, growing_only=True)
+    found = find_multipliers(case, state, run, growing_only=True)
     kind = found.stability(odd=False)
     if kind == "stable":
         return None
@@ -127,12 +128,13 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, with_sw
     return Failure(Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE, said)
 
 
-def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, *, growing_only: bool = False) -> Multipliers:
+def find_multipliers(case: Case, state: State, run: Run, *, growing_only: bool = False) -> Multipliers:
     """Multipliers of a state at a fixed wear depth; none where there are too many switching pairs, where a small joint
     that opens and closes has no state with `OPENING_HARMONICS` on this branch, or Arnoldi's method does not converge.
 
     growing_only: without the error of multipliers that do not grow. Raises OutOfTimeError.
     """
+    joint, at = state.joint(case), state.evaluation
     (switching, stuck), nothing = switching_pairs(at), np.empty(0, np.complex128)
     if not switching.any():
         exponents = np.concatenate([linear_exponents(each, moving(joint, stuck)) for each in _structures(joint, at)])
@@ -143,7 +145,7 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, *, grow
         return Multipliers(nothing, np.inf, f"more than {most} pairs slip or open in a part of the period")
     if not _bounces(joint, at):
         return _integrated(joint, at, case.settings.rtol, growing_only)
-    sharp = _sharper(case, joint, at, run)
+    sharp = _sharper(case, state, run)
     if sharp is None:
         return Multipliers(nothing, np.inf, f"no vibration with {OPENING_HARMONICS} harmonics is found near")
     if n_sectors == 1 and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
@@ -178,22 +180,20 @@ def _bounces(joint: Joint, at: Evaluation) -> bool:
     return bool((opens.any(axis=1) & ~opens.all(axis=1)).any()) and _moving(joint, at) <= SMALL_JOINT
 
 
-def _sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint, Evaluation] | None:
+def _sharper(case: Case, state: State, run: Run) -> tuple[Joint, Evaluation] | None:
     """The state with at least `OPENING_HARMONICS`; None where no such state is found on the same branch."""
-    if case.resolution.highest >= OPENING_HARMONICS:
-        return joint, at
-    if not joint.model.has_harmonics(OPENING_HARMONICS):
+    if state.resolution.highest >= OPENING_HARMONICS:
+        return state.joint(case), state.evaluation
+    if not case.model.has_harmonics(OPENING_HARMONICS):
         return None
-    samples = max(case.resolution.samples, samples_for(OPENING_HARMONICS))
-    sharp = case.at(Resolution(all_orders(OPENING_HARMONICS), samples))
-    finer = sharp.joint(joint.omega, joint.excitation_amplitude)
-    moved = run.move(case, finer, State(at, at.history))
+    samples = max(state.resolution.samples, samples_for(OPENING_HARMONICS))
+    moved = run.move(case, state, Resolution(all_orders(OPENING_HARMONICS), samples))
     if moved is None:
         return None
     # beside folds a solve may change the branch: means and first harmonics
-    one, other = (state.displacement_h[..., :3] for state in (moved.evaluation, at))
+    one, other = (each.evaluation.displacement_h[..., :3] for each in (moved, state))
     same = np.linalg.norm(one - other) <= OTHER_BRANCH * np.linalg.norm(other)
-    return (finer, moved.evaluation) if same else None
+    return (moved.joint(case), moved.evaluation) if same else None
 
 
 def _sorted(values: ComplexArray) -> ComplexArray:

@@ -48,6 +48,11 @@ class Joint:
         return build_law(self.penalty, self.contact, self.basis, self.omega)
 
     @property
+    def resolution(self) -> Resolution:
+        """Harmonics and samples."""
+        return Resolution(self.basis.orders, self.basis.n_samples)
+
+    @property
     def relative_penalty(self) -> FloatArray:
         """Penalty (n_rel,), N/m, of each relative displacement."""
         return self.penalty.stiffness.ravel()[self.component_index]
@@ -69,7 +74,7 @@ class Joint:
 
 
 @packable
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hold:
     """A soft spring, N/m, on the mean position of a joint along a direction in which the joint can slide freely.
 
@@ -95,9 +100,9 @@ def held(structure: CondensedStructure, hold: Hold | None) -> CondensedStructure
     return replace(structure, static_stiffness=structure.static_stiffness + spring, force_h=force_h)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
-    """What all states of one computation share.
+    """What all states of one computation share; equal to itself alone.
 
     penalty_omega: angular frequency for which the penalty is built, rad/s.
     hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.

@@ -18,8 +18,8 @@ from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
 from solver.wear.errors import compare, reach_target
 from solver.wear.problem import WearProblem, reference_of
-from solver.wear.slow_time import Course, Guide, Integrator, Node, Solution
-from solver.wear.wearing_joint import WearRequest, WearState
+from solver.wear.slow_time import Course, Integrator, Node, Solution
+from solver.wear.wearing_joint import Record, WearRequest
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
 
@@ -88,8 +88,7 @@ def _solve(integrator: Integrator, case: Case, start: StartState, request: WearR
         return replace(solution, compared=_solve(integrator, case, start, request.adaptive_to(cycles), spent))
     # NaN where no target was reached
     counts = np.concatenate([[0.0, course.reached], _counts(request, solution), course.counts])
-    guide = Guide(state.resolutions, state.first_length)
-    reference = reference_of(case, start, request, guide, np.unique(counts[counts <= end]))
+    reference = reference_of(case, start, request, state.guide, np.unique(counts[counts <= end]))
     return replace(solution, compared=integrator.integrate(reference, spent))
 
 
@@ -112,7 +111,7 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
     return WearHistory(
         **{name: value for name, value in values.items() if name in _REPORTED}
         | {f"{name}_error": values for name, values in vars(error).items()}
-        | ({} if state is None else _of_state(state, request.end))
+        | ({} if state is None else _of_record(state.record, request.end))
         | totals
         | {
             "newton_iterations": start.newton_iterations + totals["newton_iterations"],
@@ -132,14 +131,11 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
     )
 
 
-def _of_state(state: WearState, end: float) -> dict[str, Any]:
-    """What the last state says of its history up to a count."""
-    return {
-        "step_limit": state.step_limit if state.step_limit > 0.0 else math.inf,
-        "inaccurate_from": state.inaccurate_from,
-        "inaccurate_in": "wear rate" if state.worst.wear_rate >= state.worst.response else "response",
-        "inaccurate_error": state.worst.largest,
-        "held_from": state.held_from,
+def _of_record(record: Record, end: float) -> dict[str, Any]:
+    """What the record says of a history up to a count."""
+    return {name: value for name, value in vars(record).items() if name in _REPORTED} | {
+        "inaccurate_in": "wear rate" if record.worst.wear_rate >= record.worst.response else "response",
+        "inaccurate_error": record.worst.largest,
         # adaptive steps go beyond the last count
-        "jump_cycle": state.jump_cycle if state.jump_cycle <= end else math.nan,
+        "jump_cycle": record.jump_cycle if record.jump_cycle <= end else math.nan,
     }

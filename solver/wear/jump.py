@@ -23,7 +23,7 @@ from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.wearing_joint import Steps, WearingJoint, WearState
 
 
 def jump(wearing: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
@@ -36,22 +36,23 @@ def jump(wearing: WearingJoint, state: WearState, worn: FloatArray, cycle: float
     wearing.run.budget.most_iterations = float("inf")
     if isinstance(reached, Failure):
         return reached
-    return wearing.with_rates(replace(reached, cycle=cycle, previous=None, error=0.0))
+    return wearing.with_rates(replace(reached, cycle=cycle, steps=Steps(length=state.steps.length)))
 
 
 def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
     """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends."""
-    case, joint = wearing.case_and_joint(state)
-    hold = None if state.hold is not None else free_slide(joint, state.at, drifts=drifts)
+    hold = None if state.point.hold else free_slide(wearing.joint_of(state), state.at, drifts=drifts)
     if hold is None:
         return None
-    joint = replace(case, hold=hold).joint(state.omega, wearing.excitation_amplitude)
+    joint = replace(state.point, hold=hold).joint(wearing.case)
     point = wearing.run.state(Balance(joint, state.point.history, worn), state.at.predicted_h)
     if point is None or not wearing.run.is_stable(joint, point.evaluation):
         return None
     if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         return None
-    return replace(state, point=point, hold=hold, held_from=state.cycle)
+    # without a factorisation of the joint without a hold
+    wearing.run = wearing.run.fresh()
+    return replace(state, point=point, record=replace(state.record, held_from=state.cycle))
 
 
 def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
@@ -67,7 +68,8 @@ def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray
         return Failure(reason, f"no state is found beyond cycle {in_digits(state.cycle)}: {point.message}")
     # a small fold of the branch at a corner is no jump, and there may be many corners
     if vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
-        state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))
+        first = float(np.fmin(state.record.jump_cycle, state.cycle))
+        state = replace(state, record=replace(state.record, jump_cycle=first))
     return replace(state, point=point)
 
 

@@ -102,7 +102,7 @@ class WearProblem(WearingJoint):
             return unstable_at_end(self, state) if self.stable_end else None
         elif (failure := self._gives_up(state, course)) is not None:
             return failure
-        elif not state.wears:
+        elif not self.wears(state):
             # the state holds for all later counts
             return state, course.after(replace(course.nodes[-1], count=self.request.end))
         else:
@@ -120,19 +120,20 @@ class WearProblem(WearingJoint):
             report["wear_rate_error"] += self.by_sweep.wear_rate
         if state is None:
             after = self.with_first_length(after)
-        if not after.resolutions or after.resolutions[-1][1] != after.resolution:
-            after = replace(after, resolutions=(*after.resolutions, (after.cycle, after.resolution)))
+        known, now = after.guide.resolutions, after.point.resolution
+        if not known or known[-1][1] != now:
+            after = replace(after, guide=replace(after.guide, resolutions=(*known, (after.cycle, now))))
         # local: sum of the local errors of the steps so far, m3
-        values = report | {"local": after.error + local}
+        values = report | {"local": after.steps.error + local}
         return after, course.after(Node(after.cycle, after.depth, after.rate, values))
 
     def _is_complete(self, state: WearState, course: Course) -> bool:
         """Whether a history has come to its last count, its target, or its final state."""
         cycles = self.request.cycles
         if isinstance(cycles, ToTheEnd):
-            largest = state.largest_rates[:-1]
+            largest = state.record.largest_rates[:-1]
             least = cycles.final_share * np.maximum(largest, cycles.final_share * float(largest.max(initial=0.0)))
-            if not state.wears or (state.rates[:-1] <= least).all():
+            if not self.wears(state) or (state.rate * self.area <= least).all():
                 return True
         return not math.isnan(course.reached) or course.ends[-1] >= self.request.end * (1.0 - 1e-12)
 
@@ -142,39 +143,40 @@ class WearProblem(WearingJoint):
         within = state.depth.max() <= DEEPEST and state.cycle <= LONGEST_HISTORY and n_steps < STEPS_TO_THE_END
         if isinstance(self.request.cycles, ToTheEnd) and not within:
             at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
-            rate = f"the joint still wears at {float(state.rates[-1]):.6g} m3 a cycle"
+            rate = f"the joint still wears at {self.volume_rate(state):.6g} m3 a cycle"
             return Failure(Outcome.NO_FINAL_STATE, f"{at}, {rate}")
-        if state.wears and self.run.budget.iterations > most:
+        if self.wears(state) and self.run.budget.iterations > most:
             said = f"more than {most} iterations in {n_steps + 1} steps, up to cycle {in_digits(state.cycle)}"
             return Failure(Outcome.MARCH_FAILED, said)
         return None
 
     def with_first_length(self, state: WearState) -> WearState:
         """The first state with its step limit, and the length of an adaptive step; at least two lead to the limit."""
-        length = state.length
+        length, limit = state.steps.length, math.inf
         if self.guide is not None:
             length = self.guide.first_length
-        elif state.wears:
-            state = replace(state, step_limit=explicit_step_limit(self, state))
+        elif self.wears(state):
+            limit = explicit_step_limit(self, state)
             moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), state.rate.max()
             # the step limit is no bound where almost nothing slips
-            length = min(FIRST_STEP * state.step_limit, float(FIRST_DEPTH * moved / fastest), 0.5 * self.limit)
-        return replace(state, length=length, first_length=length)
+            length = min(FIRST_STEP * limit, float(FIRST_DEPTH * moved / fastest), 0.5 * self.limit)
+        steps, record = replace(state.steps, length=length), replace(state.record, step_limit=limit)
+        return replace(state, steps=steps, record=record, guide=replace(state.guide, first_length=length))
 
     def step(self, state: WearState) -> WearState | Failure:
         """The state after one step, with the largest length of the next one; or why there is none."""
-        length, shortest, steps = state.length, self._shortest(state), self.steps
+        length, shortest, steps = state.steps.length, self._shortest(state), self.steps
         if steps is not None:
             length = steps.length
             if steps.depth is not None:
                 length = steps.depth / float(state.rate.max())
             elif self.limit == math.inf:
-                length *= float(state.largest_rates[-1] / state.rates[-1])
+                length *= float(state.record.largest_rates[-1] / self.volume_rate(state))
             else:
                 left = length * (math.floor(state.cycle / length + ROUND_OFF) + 1.0) - state.cycle
                 length = left if left < (1.0 - ROUND_OFF) * length else length
             shortest = SHORTEST_STEP * length
-        length = length if state.previous is None else min(length, state.length)
+        length = length if state.steps.before is None else min(length, state.steps.length)
         # no extra step for a remainder below the round-off of the count
         if state.cycle + length >= self.limit * (1.0 - 1e-12):
             length = self.limit - state.cycle
@@ -182,15 +184,15 @@ class WearProblem(WearingJoint):
         taken = take_step(self, state, length, Lengths(2, shortest=shortest, rescue=shortest))
         if isinstance(taken, Failure):
             return taken
-        end, follow = replace(taken[0], length=taken[1]), self.follow
-        if follow is not None and not follow.low <= end.omega / (2.0 * math.pi) <= follow.high:
+        end, follow = replace(taken[0], steps=replace(taken[0].steps, length=taken[1])), self.follow
+        if follow is not None and not follow.low <= end.point.omega / (2.0 * math.pi) <= follow.high:
             return self.lost(end)
         refused = too_long(self, state, end.depth, end.cycle - state.cycle) if steps is not None else None
         return refused or end
 
     def _shortest(self, state: WearState) -> float:
         """Shortest adaptive step, cycles: the accuracy to which the end of a branch is located."""
-        return max(FOLD_RESOLUTION * state.cycle, SHORTEST_SLOW_STEP * state.first_length)
+        return max(FOLD_RESOLUTION * state.cycle, SHORTEST_SLOW_STEP * state.guide.first_length)
 
     def attempt(self, state: WearState, length: float, scheme: Scheme | None = None) -> WearState | None:
         """As in SteppedProblem. scheme: another one than that of the steps. A step ends in a stable state, which is
@@ -214,7 +216,7 @@ class WearProblem(WearingJoint):
             return 0.0
         before, after = (float(each.depth @ self.area) for each in (state, end))
         rtol = self.case.settings.rtol if self.guide is None else RTOL_RATIO * self.case.settings.rtol
-        ratio = end.error / allowed_error(STEP_ERROR_FRACTION * rtol, before, after, state.cycle, length)
+        ratio = end.steps.error / allowed_error(STEP_ERROR_FRACTION * rtol, before, after, state.cycle, length)
         smooth = length <= self._shortest(state) and vibration_change(state.at, end.at) < SMOOTH_CHANGE
         return min(ratio, 1.0) if smooth else ratio
 

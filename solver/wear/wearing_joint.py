@@ -1,7 +1,8 @@
 """A joint that wears: what its history is asked for, its state, from which it goes on, and how its states are solved.
 
 A `StartState` of a sweep has a `PeriodicState`, which is evaluated (`WearingJoint.unworn_state`) and becomes a `State`,
-as Newton's method gives it. A `WearState` has a `State` at a cycle count, and all with which the history goes on.
+as Newton's method gives it. A `WearState` has a `State` at a cycle count, and all with which the history goes on:
+what was `Checked`, the last of the `Steps`, and the `Record` for the result.
 
 A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
 amplitude (`solver.continuation.phase_lag`).
@@ -20,18 +21,19 @@ from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
-from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
+from solver.harmonic_balance.state import Failure, State, state_of, vibration_change
 from solver.model import FloatArray
 from solver.newton.run import MOST_ITERATIONS, Run
 from solver.outcome import Outcome, in_digits, in_whole
 from solver.packing import packable
 from solver.results.history import PeriodicState, StartState
-from solver.results.state_report import known_state
-from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
-from solver.structure.joint import Case, Hold, Joint
+from solver.results.state_report import evaluated
+from solver.settings import FollowedFrequency, Scheme, ToTheEnd, WearTarget
+from solver.structure.joint import Case, Joint
+from solver.wear.slow_time import Guide
 
 NO_WEAR = 1e-12
-"""Fraction of `WearState.most_rate`: a joint that wears less sticks, and its rate is round-off."""
+"""Fraction of `Record.most_rate`: a joint that wears less sticks, and its rate is round-off."""
 
 
 @dataclass(frozen=True)
@@ -89,17 +91,52 @@ class WearRequest:
 
 @packable
 @dataclass(frozen=True)
-class LastStep:
-    """The last step, for BDF2 and for the extrapolation to the next state.
+class Checked:
+    """What the last checks have found.
 
-    length: cycles. At its start: depth (n_contact,), m, predicted_h (n_rel, 2H+1), N, omega, rad/s, resolution.
+    left_out, estimate, accurate: of the state for which harmonics were chosen: fraction of the contact force in
+        harmonics that are left out, errors, and whether these are below rtol (True for given harmonics).
+    judged_h (n_rel, 2H+1): predicted force at the last stability check, N.
     """
 
-    length: float
-    depth: FloatArray
-    predicted_h: FloatArray
-    omega: float
-    resolution: Resolution
+    left_out: float
+    estimate: Estimate
+    accurate: bool
+    judged_h: FloatArray
+
+
+@packable
+@dataclass(frozen=True)
+class Steps:
+    """The last step: the state before it, None at the first state and after a jump, its length, cycles, and its local
+    error, m3; and the largest length of the next one.
+    """
+
+    before: State | None = None
+    last: float = math.nan
+    error: float = 0.0
+    length: float = 1.0
+
+
+@packable
+@dataclass(frozen=True)
+class Record:
+    """What a history says at its end, and by what it judges when nothing wears any more.
+
+    largest_rates (n_contact + 1,), most_rate: largest wear rates so far of the pairs and, last, of all together, m3 per
+        cycle; and if every pair slipped as far as it moves.
+    step_limit: largest stable explicit step at the first state, cycles; or inf.
+    inaccurate_from, worst: count from which on the errors are above rtol, inf if never; the largest ones from there on.
+    held_from: count from which on a hold acts, inf if never. jump_cycle: first jump to another branch, NaN if none.
+    """
+
+    largest_rates: FloatArray
+    most_rate: float = 0.0
+    step_limit: float = math.inf
+    inaccurate_from: float = math.inf
+    worst: Estimate = NOTHING
+    held_from: float = math.inf
+    jump_cycle: float = math.nan
 
 
 @packable
@@ -107,47 +144,20 @@ class LastStep:
 class WearState:
     """A wearing joint at one cycle count; the next step depends on this state only.
 
-    cycle: count. omega: of the excitation, rad/s. point: periodic state with its depth and tangential history.
-    resolution: harmonics and samples; resolutions: those from a cycle count on.
-    left_out, estimate, accurate: of the state for which they were chosen: fraction of the contact force in harmonics
-        that are left out, errors, and whether these are below rtol (True for given harmonics).
-    rate (n_contact,): wear rate, m per cycle. rates, largest_rates (n_contact + 1,): of the pairs and, last, of all
-        together, and their largest values so far, m3 per cycle. most_rate: if every pair slipped as far as it moves.
-    step_limit: largest stable explicit step at the first state, cycles; NaN where nothing wears.
-    previous: the last step; None at the first state and after a jump. error: local error of the last step, m3.
-    length, first_length: largest length of the next step, and length of the first adaptive step, cycles.
-    judged_h (n_rel, 2H+1): predicted force at the last stability check, N.
+    cycle: count. point: periodic state with its depth and tangential history. rate (n_contact,): of its wear, m per
+    cycle. guide: for the reference solution.
     lag, half_width: of a followed frequency: phase lag, rad, and change of the frequency over that of the lag, rad/s.
-    hold, held_from: soft hold of the mean position, None without, and the count from which on it acts, inf if never.
-    jump_cycle: count of the first jump to another branch, NaN if none.
-    inaccurate_from, worst: count from which on the errors are above rtol, inf if never; the largest ones from there on.
     """
 
     cycle: float
-    omega: float
     point: State
-    resolution: Resolution
-    left_out: float
-    estimate: Estimate
-    accurate: bool
     rate: FloatArray
-    rates: FloatArray
-    largest_rates: FloatArray
-    judged_h: FloatArray
-    resolutions: tuple[tuple[float, Resolution], ...] = ()
-    most_rate: float = 0.0
-    step_limit: float = math.nan
-    previous: LastStep | None = None
-    error: float = 0.0
-    length: float = 1.0
-    first_length: float = 0.0
+    checked: Checked
+    record: Record
+    guide: Guide
+    steps: Steps = Steps()
     lag: float = 0.5 * math.pi
     half_width: float = 0.0
-    hold: Hold | None = None
-    held_from: float = math.inf
-    jump_cycle: float = math.nan
-    inaccurate_from: float = math.inf
-    worst: Estimate = NOTHING
 
     @property
     def at(self) -> Evaluation:
@@ -158,11 +168,6 @@ class WearState:
     def depth(self) -> FloatArray:
         """Worn depth (n_contact,), m."""
         return self.at.wear_depth
-
-    @property
-    def wears(self) -> bool:
-        """Whether the wear rate is above the round-off of the slip by the static load."""
-        return bool(self.rates[-1] > NO_WEAR * self.most_rate)
 
 
 class WearingJoint:
@@ -180,29 +185,14 @@ class WearingJoint:
         if request.steps is None:
             case = replace(case, settings=case.settings.of_steps)
         self.case, self.start, self.request, self.follow = case, start, request, request.follow
-        self.unworn, self.excitation_amplitude = start.state, start.state.excitation_amplitude
-        self.area = case.model.contact.area
+        self.unworn, self.area = start.state, case.model.contact.area
         self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
         self.wearing_work = wearing_work(request.law, case.model.contact)
         self.run = Run(case.settings.tolerance)
-        self._stored: tuple[Case, Joint] | None = None
-
-    def case_and_joint(self, state: WearState) -> tuple[Case, Joint]:
-        """Case and joint of a state. The last ones are stored; others drop the factorisation."""
-        last = self._stored
-        if last is None or state.resolution != last[0].resolution or state.hold is not last[0].hold:
-            case = replace(self.case, hold=state.hold).at(state.resolution)
-            self.run = self.run.fresh()
-        elif state.omega != last[1].omega:
-            case = last[0]
-        else:
-            return last
-        self._stored = case, case.joint(state.omega, self.excitation_amplitude)
-        return self._stored
 
     def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
-        return self.case_and_joint(state)[1]
+        return state.point.joint(self.case)
 
     def balance_of(self, state: WearState) -> Balance:
         """The balance that a state solves at constant wear depth."""
@@ -214,23 +204,13 @@ class WearingJoint:
 
     def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
         """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
-        start, periodic = self.start, periodic or self.unworn
-        point, nothing = known_state(self.case, periodic), np.zeros(self.area.size + 1)
-        state = WearState(
-            0.0,
-            periodic.omega,
-            point,
-            start.resolution,
-            left_out(start.resolution.orders, point.evaluation),
-            start.by_resolution or Estimate(start.response_error, start.wear_rate_error),
-            accurate=start.outcome is Outcome.CONVERGED,
-            rate=nothing,
-            rates=nothing,
-            largest_rates=nothing,
-            # the stability of a start state has been checked
-            judged_h=point.evaluation.predicted_h,
-        )
-        return self.with_rates(state)
+        start, nothing = self.start, np.zeros(self.area.size + 1)
+        point = evaluated(self.case, periodic or self.unworn)
+        estimate = Estimate(start.response_error, start.wear_rate_error)
+        # the stability of a start state has been checked
+        judged_h, accurate = point.evaluation.predicted_h, start.outcome is Outcome.CONVERGED
+        checked = Checked(left_out(point), start.by_resolution or estimate, accurate, judged_h)
+        return self.with_rates(WearState(0.0, point, nothing, checked, Record(nothing), Guide((), 0.0)))
 
     @cached_property
     def by_sweep(self) -> Estimate:
@@ -242,21 +222,28 @@ class WearingJoint:
             lost = start.by_resolution is not None and math.isinf(start.wear_rate_error)
             return UNKNOWN if lost else NOTHING
         own, other = self.unworn_state(), self.unworn_state(reference)
-        whole = float(own.rates[-1])
-        rate = float(in_whole((own.rates - other.rates)[:-1])) / whole if whole > 0.0 else 0.0
+        apart, whole = own.rate * self.area - other.rate * self.area, self.volume_rate(own)
+        rate = float(in_whole(apart)) / whole if whole > 0.0 else 0.0
         return Estimate(vibration_change(own.at, other.at), rate)
 
     def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, Eqs. (7), (21), (25)."""
         rate = self.gain(1.0) * self.wearing_work.work(*worn_by(state.at))
-        volumes = rate * self.area
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
-        most = max(state.most_rate, self.request.wear_coefficient * (self.wearing_work.largest_factor * moved))
-        rates = np.append(volumes, volumes.sum())
-        largest = np.maximum(state.largest_rates, np.abs(rates))
-        return replace(state, rate=rate, rates=rates, largest_rates=largest, most_rate=most)
+        most = max(state.record.most_rate, self.request.wear_coefficient * (self.wearing_work.largest_factor * moved))
+        rates = rate * self.area
+        largest = np.maximum(state.record.largest_rates, np.abs(np.append(rates, rates.sum())))
+        return replace(state, rate=rate, record=replace(state.record, largest_rates=largest, most_rate=most))
+
+    def volume_rate(self, state: WearState) -> float:
+        """Wear rate of all pairs together, m3 per cycle."""
+        return float((state.rate * self.area).sum())
+
+    def wears(self, state: WearState) -> bool:
+        """Whether the wear rate of a state is above the round-off of the slip by the static load."""
+        return self.volume_rate(state) > NO_WEAR * state.record.most_rate
 
     def solve(
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS
@@ -265,7 +252,7 @@ class WearingJoint:
         if self.follow is None:
             point = self.run.state(balance, start, most=most)
             return None if point is None else self.with_rates(replace(state, point=point))
-        case, lag = self.case_and_joint(state)[0], state.lag
+        case, lag = state.point.case(self.case), state.lag
         if self.follow.of == "peak":
             peak = solve_at_peak(case, balance, start, lag, self.run, most)
             solved, lag = (None, lag) if peak is None else peak
@@ -277,9 +264,8 @@ class WearingJoint:
         if math.isnan(turn) and state.half_width == 0.0:
             turn = abs(rise_of_response(solved, self.run, accepted_rise(case.settings.rtol))[1])
         half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
-        point = State(solved.at, final_history(solved.balance, solved.at))
-        omega = float(solved.values[0])
-        return self.with_rates(replace(state, point=point, omega=omega, lag=lag, half_width=half_width))
+        point = state_of(solved.balance.joint, solved.at)
+        return self.with_rates(replace(state, point=point, lag=lag, half_width=half_width))
 
     def at_followed(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depth and its tangential history."""
@@ -289,7 +275,7 @@ class WearingJoint:
 
     def lost(self, state: WearState) -> Failure:
         """The end of a history whose frequency leaves its range, or beyond whose last state none is found."""
-        wanted, frequency = self.follow, state.omega / (2.0 * math.pi)
+        wanted, frequency = self.follow, state.point.omega / (2.0 * math.pi)
         assert wanted is not None
         reason = "ends: no state beyond is found to go on with"
         if not wanted.low <= frequency <= wanted.high:
@@ -303,7 +289,7 @@ class WearingJoint:
         """
         if self.follow is None:
             return 0.0
-        lag = state.estimate.response
+        lag = state.checked.estimate.response
         if self.follow.of == "peak":
             lag = math.sqrt(2.0 * lag) + accepted_rise(self.case.settings.rtol)
         return state.half_width * lag / (2.0 * math.pi)

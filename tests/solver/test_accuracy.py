@@ -125,8 +125,7 @@ def test_a_state_is_found_again_where_its_mass_is_no_longer_marched():
     beam, omega, force = Cantilever(spring=200.0), 0.85, 6.0
     rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (79, 27))
     case = case_of(beam.model(), FRICTION, omega, SolverSettings(), rich)
-    point = first_point(case, omega, force)
-    level = ResolvedState(case, case.joint(omega, force), point)
+    level = ResolvedState(case, first_point(case, omega, force))
     other = level.solve_at(poor, Run(case.settings.tolerance))
     assert case.penalty.inertial[0] != other.case.penalty.inertial[0]
     for each in (level, other):

@@ -38,8 +38,7 @@ def wall(omega):
         return case.joint(omega, amplitude)
 
     def first(amplitude):
-        found = first_point(case, omega, amplitude)
-        return State(found.evaluation, found.history, amplitude)
+        return replace(first_point(case, omega, amplitude), parameter=amplitude)
 
     def size(point):
         structure = case.joint(omega, point.parameter).structure
@@ -93,7 +92,7 @@ def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     rest = first_point(case, omega, 0.0)
     quiet, joint = case.joint(omega, 0.0), case.joint(omega, 20.0)
     found = relax_to_periodic(joint, idle, rest, quiet, Run(1e-8))
-    moved = np.abs(full_motion(case.model, periodic_state(joint, found))[1])
+    moved = np.abs(full_motion(case.model, periodic_state(found))[1])
     assert moved == pytest.approx([abs(orbit.harmonic(dof)) for dof in (0, 1)], rel=0.02, abs=0.0)
 
 

@@ -97,8 +97,9 @@ def judge_start(case, start):
     assert (start.state is None) == (start.outcome is not Outcome.CONVERGED) == bool(start.message)
     if start.state is None:
         return
-    joint = case_of(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
-    assert not certify(joint, evaluated(joint, start.state)[1]).failures(case.settings.tolerance)
+    of = case_of(case.model, case.friction, start.penalty_omega, case.settings)
+    state = evaluated(of, start.state)
+    assert not certify(state.joint(of), state.evaluation).failures(case.settings.tolerance)
 
 
 def judge_history(case, start, history):

@@ -63,11 +63,11 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed,
     scene = drawn(kind, seed)
     start = start_of(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
     case = case_of(scene.model, scene.friction, start.penalty_omega, SETTINGS, start.resolution)
-    joint = case.joint(scene.omega, scene.excitation)
-    at = evaluated(joint, start.state)[1]
+    state = evaluated(case, start.state)
+    joint, at = state.joint(case), state.evaluation
     exact = largest(scene.orbit_next_to(joint, at.displacement_h).multipliers())
     assert largest(multipliers_of(build_monodromy(joint, at, 512), every=True)) == pytest.approx(exact, abs=allowed)
-    assert (find_instability(case, joint, at, Run(SETTINGS.tolerance)) is not None) == (exact > 1.0)
+    assert (find_instability(case, state, Run(SETTINGS.tolerance)) is not None) == (exact > 1.0)
 
 
 def with_matrices(name, **matrices):

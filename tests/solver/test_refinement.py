@@ -28,8 +28,8 @@ def on_branch(name, friction, amplitude, omega, n_harmonics):
     """The state of a sweep up, evaluated from what is stored of it: joint and evaluation."""
     model, settings = scene(name, n_harmonics), SolverSettings(n_harmonics, 256)
     (start,) = branch_states(model, friction, amplitude, [omega], settings)
-    joint = case_of(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
-    return joint, evaluated(joint, start.state)[1]
+    case = case_of(model, friction, start.penalty_omega, settings)
+    return case.joint(omega, amplitude), evaluated(case, start.state).evaluation
 
 
 @lru_cache
@@ -122,8 +122,7 @@ SLIPPING = 400.0  # N: excitation at which the pairs of the random models slip
 def started(model, friction, omega, amplitude, settings, resolution=None):
     """A state found from nothing."""
     case = case_of(model, friction, omega, settings, resolution)
-    point = first_point(case, omega, amplitude)
-    return ResolvedState(case, case.joint(omega, amplitude), point)
+    return ResolvedState(case, first_point(case, omega, amplitude))
 
 
 def slider(settings, resolution=None):

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from solver import build_model, march_wear
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import state_of
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.state_report import periodic_state, resonance_frequency
@@ -32,7 +32,7 @@ def test_it_is_that_of_the_equation_of_motion(nodal_diameter):
         model = dovetail(3, nodal_diameter)
         balance, predicted = random_balance(model, settings, 3, wear=False, resolution=resolution)
     joint, at = balance.joint, balance.evaluate(predicted)
-    linear, state = harmonic_structure(joint.model, 1), periodic_state(joint, State(at, at.history))
+    linear, state = harmonic_structure(joint.model, 1), periodic_state(state_of(joint, at))
     x, load = full_motion(joint.model, state)[1], joint.excitation_amplitude * linear.load_harmonic
     # what holds the pairs is the rest of the equation of motion, K x + held + i w C x = F + w^2 M x
     square = joint.omega**2 + np.real(np.vdot(x, load)) / np.real(np.vdot(x, linear.mass @ x))

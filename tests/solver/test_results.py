@@ -28,7 +28,7 @@ KINDS = {"3d": ("3d",) * 3, "mixed": ALL_KINDS}
 @lru_cache
 def periodic(kinds):
     joint, point = worn_state(KINDS[kinds], SETTINGS)
-    return joint, point, periodic_state(joint, point)
+    return joint, point, periodic_state(point)
 
 
 @pytest.mark.parametrize("kinds", KINDS)

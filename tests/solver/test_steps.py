@@ -35,7 +35,7 @@ def states_of(steps, n_steps, rtol=1e-2):
 
 def read(states):
     """Counts, depths, m, and rates, m per cycle."""
-    return np.array([(state.cycle, state.depth[0], state.rates[-1] / AREA) for state in states]).T
+    return np.array([(state.cycle, state.depth[0], state.rate[0]) for state in states]).T
 
 
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
@@ -48,7 +48,7 @@ def test_a_given_step_follows_its_own_equation(scheme):
     assert np.diff(depth) == pytest.approx(4000.0 * taken, rel=1e-9)
     # the difference to the trapezoidal rule
     expected = 0.5 * 4000.0 * np.abs(np.diff(rate)) * AREA
-    assert [state.error for state in states[1:]] == pytest.approx(expected, rel=1e-9)
+    assert [state.steps.error for state in states[1:]] == pytest.approx(expected, rel=1e-9)
 
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
@@ -63,7 +63,7 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     at, depth, _ = read(states)
     lengths = np.diff(at)
     worn = np.maximum(np.diff(depth), depth[1:] * lengths / at[1:]) * AREA
-    assert ([state.error for state in states[1:]] <= control.STEP_ERROR_FRACTION * rtol * worn).all()
+    assert ([state.steps.error for state in states[1:]] <= control.STEP_ERROR_FRACTION * rtol * worn).all()
     assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
     assert states_of(None, 12, 1e-4)[-1].cycle < 0.5 * at[-1]
 
@@ -81,7 +81,7 @@ def failing(monkeypatch, fails):
 
 
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
-    first = states_of(None, 0)[0].length
+    first = states_of(None, 0)[0].steps.length
     with monkeypatch.context() as patch:
         tried = failing(patch, lambda tried: len(tried) == 1)
         states = states_of(None, 1)
@@ -99,7 +99,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
     # so short a step changes less than the tolerance
     of.run = of.run.with_tolerance(1e-10)
     first = of.with_first_length(of.unworn_state())
-    shortest = control.SHORTEST_SLOW_STEP * first.length
+    shortest = control.SHORTEST_SLOW_STEP * first.steps.length
 
     def fails(tried):
         """All steps up to the shortest one, the Euler step, and some longer ones behind it."""
@@ -116,7 +116,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
         assert isinstance(found, WearState)
         assert tried[-2:] == [("adaptive", 2.0 * shortest), ("adaptive", 4.0 * shortest)]
         assert found.cycle == 2.0**doublings * shortest
-        assert found.error > 0.0
+        assert found.steps.error > 0.0
 
 
 def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multiples_again(monkeypatch):
@@ -131,9 +131,9 @@ def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
     work.case = replace(work.case, settings=SolverSettings("auto", 512, rtol=1e-4))
     state = work.unworn_state()
     chosen = choose_harmonics(work, state, anew=True)
-    assert chosen.resolution != state.resolution
+    assert chosen.point.resolution != state.point.resolution
     assert chosen.rate == pytest.approx(work.gain(1.0) * chosen.at.slip_work, rel=1e-12, abs=0.0)
-    assert chosen.rates[-1] == pytest.approx(float(chosen.rate @ work.area))
+    assert work.volume_rate(chosen) == pytest.approx(float(chosen.rate @ work.area))
     assert abs(chosen.rate / state.rate - 1.0).max() > 1e-4
 
 
