@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
+from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import State
 from solver.model import FloatArray
@@ -18,11 +18,7 @@ from solver.settings import DIFFERENCE
 FIRST_ARC = SMOOTH_CHANGE / 10.0
 """Length of the first step, in unknowns over the norm of the first predicted force; the longest is `SMOOTH_CHANGE`."""
 
-CORNER_ARC = 1e-3
-"""Length of the step behind a corner, and least length after a step: without it seven branches with folds take 46 %
-more iterations."""
-
-SHORTEST_ARC = CORNER_ARC / 10.0
+SHORTEST_ARC = FINE_STEP / 10.0
 """Shortest step: where none of this length converges, the branch has a corner."""
 
 ARC_WANDER = 2.0
@@ -71,7 +67,7 @@ class Arc:
             ahead = self.tangent(reached, self.place(reached) - self.place(state))
             turns = ahead is not None and ahead[-1] * tangent[-1] < 0.0
             yield state, reached, state if back else self._fold(state, tangent, reached) if turns else None
-            state, tangent, length = reached, ahead, max(length, CORNER_ARC)
+            state, tangent, length = reached, ahead, max(length, FINE_STEP)
 
     def place(self, state: State) -> FloatArray:
         """Scaled unknowns of a state."""
@@ -106,12 +102,12 @@ class Arc:
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
         """State behind a corner, along the tangent a little ahead, with both signs; None where none is found."""
-        plane = _Plane(self, self.place(state), tangent, CORNER_ARC)
+        plane = _Plane(self, self.place(state), tangent, FINE_STEP)
         turned = self.tangent(self.state_of(plane.evaluate(*plane.first())), tangent)
         if turned is None:
             return None
         for sign in (1.0, -1.0):
-            reached = self.step(state, sign * turned, CORNER_ARC)
+            reached = self.step(state, sign * turned, FINE_STEP)
             if reached is None:
                 continue
             chord = self.place(reached) - plane.base

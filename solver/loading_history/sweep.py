@@ -18,9 +18,9 @@ from typing import Any, Generic
 import numpy as np
 
 from solver.accuracy.resolved_state import NOTHING, fewer
-from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
+from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.path import FREE_STEP, Path, S, Step
+from solver.loading_history.path import Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows
@@ -45,7 +45,7 @@ STEPS_OF_REFERENCE = 2
 """Steps of a sweep in one step of its reference: the errors of both are of second order in the step, and their
 difference is three times the smaller one."""
 
-PARTS_TO_POINT = (1, 4, 16)
+PARTS_TO_POINT = (1, 16)
 """Parts of the way from the last node of a reference sweep to a point: more where the point is not found at once."""
 
 
@@ -183,7 +183,7 @@ class Sweep(Generic[S]):
         most = f"the sweep has taken more than {SWEEP_ITERATIONS} iterations"
         taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST, most)
         if budget.iterations <= SWEEP_ITERATIONS:
-            taken = take_step(self, here, self.length, Lengths(1, AIMED_CHANGE, path.shortest, FREE_STEP))
+            taken = take_step(self, here, self.length, Lengths(1, AIMED_CHANGE, path.shortest, FINE_STEP))
         if isinstance(taken, Failure):
             self.failure = taken
             return

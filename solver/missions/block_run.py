@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from solver.accuracy.refinement import VIBRATION_RECHECK
+from solver.accuracy.refinement import DIFFERENCE_SAFETY, VIBRATION_RECHECK
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
@@ -25,7 +25,6 @@ from solver.settings import Direction, Passage, Resolution
 from solver.stability.floquet import find_instability
 from solver.structure.condensation import SingularStructureError
 from solver.structure.joint import Case, build_case
-from solver.wear.errors import HISTORY_SAFETY
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
@@ -178,7 +177,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         rates = rate_slope(problem, state, given.depth + depth[-1] > 0.0)
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
-    by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
+    by_steps = DIFFERENCE_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
     return BlockResult(
         growth=depth[-1],
         response=values["response"],

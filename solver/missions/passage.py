@@ -39,14 +39,11 @@ from solver.outcome import Outcome, absolute
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.joint import friction_of_pairs
-from solver.wear.slow_time import RTOL_RATIO, Guide
+from solver.wear.slow_time import MOST_NODES, RTOL_RATIO, Guide
 from solver.wear.step import rate_slope
 
 FIRST_FREQUENCIES = 17
 """Frequencies before those that are added."""
-
-MOST_FREQUENCIES = 400
-"""Most frequencies of a passage."""
 
 FINEST_INTERVAL = 0.1
 """Longest interval of frequencies that is never divided, over sqrt(|df/dt|): a tenth of zeta f where the sweep rate is
@@ -175,7 +172,7 @@ def find_states(given: BlockInput) -> Swept | Failure:
         least_wear = max(NEGLIGIBLE * float(given.depth @ area), ROUND_OFF * given.mission.wear_coefficient * work)
         allowed, error = aim * max(volume, least_wear), float(errors.sum())
         wanted = []
-        if error > allowed and len(states) < MOST_FREQUENCIES:
+        if error > allowed and len(states) < MOST_NODES:
             for place in np.flatnonzero(errors > allowed / len(errors)):
                 wanted.extend(_between(states[place], states[place + 1], FINEST_INTERVAL * passage.rate**0.5))
     return Swept(tuple(states), error, iterations, _needed(states, errors, allowed / len(errors), least))

@@ -18,10 +18,10 @@ from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import NOTHING, Estimate, ResolvedState, shifted
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
-from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
+from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import Failure, State, final_history
-from solver.loading_history.path import FREE_STEP, LINEAR_CHANGE, Path
+from solver.loading_history.path import Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
 from solver.newton.run import MOST_ITERATIONS, Bordered, Run
@@ -78,7 +78,7 @@ class NonlinearMode(Path[ModeState]):
     model: ReducedModel
     linear: LinearMode
     # where a smaller ratio is needed the mode is lost; with a tenth of it modes are equal
-    shortest: ClassVar[float] = FREE_STEP
+    shortest: ClassVar[float] = FINE_STEP
     longest: ClassVar[float] = math.log(LARGEST_STEP_RATIO)
 
     def case_of(self, values: FloatArray) -> Case:
@@ -138,7 +138,7 @@ class NonlinearMode(Path[ModeState]):
 
     def change(self, before: ModeState, after: ModeState) -> float:  # noqa: D102
         sticks = all((state.evaluation.status_t == STICK).all() for state in (before, after))
-        return self.differs(before, after) / (LINEAR_CHANGE if sticks else self.largest_change())
+        return self.differs(before, after) / (1.0 if sticks else self.largest_change())
 
     def differs(self, before: ModeState, after: ModeState) -> float:
         """As in Path: of the vibrating predicted force per amplitude."""
@@ -252,7 +252,7 @@ class Rest:
         case, normal_force = self.mode.case, self.state.evaluation.force_h[:, 0, 0]
         limit = np.linalg.norm(friction_limit(case.friction_coefficient, normal_force))
         force = np.linalg.norm(case.joint(self.mode.linear.omega, 1.0).structure.force_h[:, 1:])
-        return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
+        return float(FINE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
 
     def raised(self, amplitude: float, run: Run) -> ModeState | None:
         """The mode at a small amplitude, m sqrt(kg), from rest or from smaller static friction forces; None if none."""

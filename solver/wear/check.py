@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, Certificate, certify
-from solver.accuracy.refinement import RELAXED_FRACTION, VIBRATION_RECHECK, refine, with_level_above
+from solver.accuracy.refinement import VIBRATION_RECHECK, refine, with_level_above
 from solver.accuracy.resolved_state import ResolvedState, lacks_even, left_out
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome, in_digits
 from solver.results.state_report import report_state
-from solver.settings import NEGLIGIBLE
+from solver.settings import NEGLIGIBLE, ONE_OF_TWO
 from solver.stability.floquet import find_instability
 from solver.wear.jump import creeps, free_slide
 from solver.wear.slow_time import Guide
@@ -88,7 +88,7 @@ def needs_new_choice(wearing: WearingJoint, state: WearState) -> bool:
         return now > NEGLIGIBLE
     if now > LEFT_OUT_GROWN * state.left_out:
         return error * now > settings.rtol * state.left_out
-    return now < RELAXED_FRACTION**2 * state.left_out
+    return now < ONE_OF_TWO**2 * state.left_out
 
 
 def choose_harmonics(wearing: WearingJoint, state: WearState, *, anew: bool = False) -> WearState | Failure:

@@ -27,8 +27,8 @@ RTOL_RATIO = 2.0
 stick again (dovetail, 16 pairs, 13 harmonics, 212.75 Hz: 1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true)."""
 
 MOST_NODES = 800
-"""Most stored steps of a history beside those with an output; half as many after those with the least progress are
-dropped. An adaptive history of 1e5 cycles has about 100 steps."""
+"""Most frequencies of a passage, and most stored steps of a history beside those with an output; half as many after
+those with the least progress are dropped. An adaptive history of 1e5 cycles has about 100 steps."""
 
 CERTIFIED = tuple(each.name for each in fields(Certificate) if each.name != "periodicity_error")
 """Values of a certificate; within a step, the larger value of both ends holds."""

@@ -27,11 +27,8 @@ from solver.outcome import Outcome, in_digits, in_whole
 from solver.packing import packable
 from solver.results.history import PeriodicState, StartState
 from solver.results.state_report import evaluated
-from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
+from solver.settings import ROUND_OFF, FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case, Hold, Joint
-
-NO_WEAR = 1e-12
-"""Fraction of `WearState.most_rate`: a joint that wears less sticks, and its rate is round-off."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +159,7 @@ class WearState:
     @property
     def wears(self) -> bool:
         """Whether the wear rate is above the round-off of the slip by the static load."""
-        return bool(self.rates[-1] > NO_WEAR * self.most_rate)
+        return bool(self.rates[-1] > ROUND_OFF * self.most_rate)
 
 
 class WearingJoint:
