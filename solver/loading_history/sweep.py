@@ -19,6 +19,7 @@ import numpy as np
 
 from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, Lengths, take_step
+from solver.continuation.transient import SEARCH_ITERATIONS
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import Path, S, Step
 from solver.newton.run import Budget, Run
@@ -32,11 +33,13 @@ slider take 7 % more iterations."""
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
 
-SWEEP_ITERATIONS = 8000
+SWEEP_ITERATIONS = 10 * SEARCH_ITERATIONS
 """Most Newton iterations of a sweep (the dovetail takes 300)."""
 
 NODE_ITERATIONS = 5 * SWEEP_ITERATIONS // 16
-"""Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
+"""Most Newton iterations from one node to the next, and from a node to a point: three transients. Also of a wear
+history or its reference solution, in addition to `NEAR_ITERATIONS` for each step: a travelling wave at its resonance
+takes 1400 in a corner within 500 cycles."""
 
 ITERATIONS_PER_SAVE = 100
 """Newton iterations after which a sweep is saved at its next node: 1 s of 48 pairs, 17 s of 336."""

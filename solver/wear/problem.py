@@ -24,6 +24,7 @@ from solver.accuracy.refinement import FEWEST_OF_SERIES
 from solver.accuracy.resolved_state import fewer, shifted, with_highest
 from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.state import Failure, vibration_change
+from solver.loading_history.sweep import NODE_ITERATIONS
 from solver.model import FloatArray
 from solver.newton.run import SHORTEST_STEP
 from solver.outcome import Outcome, in_digits
@@ -36,17 +37,13 @@ from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import allowed_error, attempt_step, explicit_step_limit, too_long
 from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
 
-HISTORY_ITERATIONS = 3000
-"""Most Newton iterations of a history or a reference solution, in addition to `NEAR_ITERATIONS` for each step. A
-travelling wave at its resonance: 1400 in a corner within 500 cycles."""
-
 FIRST_STEP, FIRST_DEPTH = 0.05, 0.01
 """Length of the first adaptive step, whose error is not known, as a fraction of the explicit step limit, and its
 largest wear, as a fraction of the largest relative motion."""
 
-DEEPEST, LONGEST_HISTORY, STEPS_TO_THE_END = 1.0, 1e25, 20_000
-"""Depth, m, cycles and steps beyond which wear has no end. A block on two pairs that nothing else carries is worn 1 m
-deep after 22 steps, which double; a joint takes 2 to 10 steps a pair to its final state."""
+DEEPEST, STEPS_TO_THE_END = 1.0, 20_000
+"""Depth, m, and steps beyond which wear has no end. A block on two pairs that nothing else carries is worn 1 m deep
+after 22 steps, which double; a joint takes 2 to 10 steps a pair to its final state."""
 
 DOUBLINGS_ACROSS = 6
 """Most doublings of the shortest step to go across corners: to 6 % of the cycle count. Dovetail, mesh 2, nodal diameter
@@ -124,8 +121,8 @@ class WearProblem(WearingJoint):
 
     def _gives_up(self, state: WearState, course: Course) -> Failure | None:
         """Why a history does not go on although it is not complete: its wear has no end, or takes too long."""
-        n_steps, most = len(course.ends) - 1, HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
-        within = state.depth.max() <= DEEPEST and state.cycle <= LONGEST_HISTORY and n_steps < STEPS_TO_THE_END
+        n_steps, most = len(course.ends) - 1, NODE_ITERATIONS + NEAR_ITERATIONS * len(course.ends)
+        within = state.depth.max() <= DEEPEST and n_steps < STEPS_TO_THE_END
         if isinstance(self.request.cycles, ToTheEnd) and not within:
             at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
             rate = f"the joint still wears at {float(state.rates[-1]):.6g} m3 a cycle"
