@@ -12,7 +12,7 @@ from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, SMOOTH_CHANG
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import State
 from solver.model import FloatArray
-from solver.newton.run import Bordered, Run
+from solver.newton.run import SHORTEST_STEP, Bordered, Run
 from solver.settings import DIFFERENCE
 
 FIRST_ARC = SMOOTH_CHANGE / 10.0
@@ -24,9 +24,6 @@ SHORTEST_ARC = FINE_STEP / 10.0
 ARC_WANDER = 2.0
 """Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
 the branch of `tests/solver/test_whole_response.py` is left for another one."""
-
-FOLD_HALVINGS = 10
-"""Halvings of a step with a fold; the parameter at the fold is off by the square of the length."""
 
 
 @dataclass(frozen=True)
@@ -124,10 +121,14 @@ class Arc:
         return None if found is None else State(found.evaluation, self.start.history, target)
 
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
-        """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""
+        """State with the extreme parameter between two states, by bisection of the length; tangent: at the first.
+
+        The parameter is off by the square of the last length (vibro-impact: by 1e-8).
+        """
         sign, low, high = np.sign(tangent[-1]), 0.0, float(tangent @ (self.place(after) - self.place(state)))
         best = max(state, after, key=lambda each: sign * each.parameter)
-        for _ in range(FOLD_HALVINGS):
+        shortest = SHORTEST_STEP * high
+        while high - low > shortest:
             place = 0.5 * (low + high)
             found = self.step(state, tangent, place)
             ahead = None if found is None else self.tangent(found, tangent)

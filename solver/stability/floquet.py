@@ -34,7 +34,7 @@ from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import MOST_PRODUCTS, SMALL_JOINT
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.settings import ROUND_OFF, SMALL, Resolution, all_orders, samples_for
+from solver.settings import FEWEST_SAMPLES, ROUND_OFF, SMALL, Resolution, all_orders, samples_for
 from solver.stability.disturbances import (
     HILL_SAMPLES,
     ROUNDING,
@@ -48,9 +48,6 @@ from solver.stability.disturbances import (
     switching_pairs,
 )
 from solver.structure.joint import Case, Joint
-
-SAMPLES_A_VIBRATION = 40
-"""Samples in a period of the fastest growing vibration of the structure alone, which BDF2 damps by 0.6 %."""
 
 OPENING_HARMONICS = 19
 """Fewest harmonics for a small joint that opens and closes: with 9 the multiplier is 0.95 in place of 2.8."""
@@ -226,7 +223,9 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
 
 
 def _samples(joint: Joint, at: Evaluation) -> int:
-    """Samples of a period: up to eight times as many for vibrations that grow in the structure alone."""
+    """Samples of a period: up to eight times as many for vibrations that grow in the structure alone, with at least
+    `FEWEST_SAMPLES` in a period of the fastest one, which BDF2 then damps by 0.2 %.
+    """
     (switching, stuck), fastest = switching_pairs(at), 0.0
     driven = [linear for linear in _structures(joint, at) if not _is_passive(linear)]
     for linear, pairs in product(driven, (stuck, stuck | switching)):
@@ -234,7 +233,7 @@ def _samples(joint: Joint, at: Evaluation) -> int:
         # round-off of a fast vibration is no growth
         grows = found.real > found.size * ROUNDING * np.abs(found).max(initial=0.0)
         fastest = max(fastest, float(np.abs(found.imag[grows]).max(initial=0.0)))
-    wanted = 2 ** int(np.ceil(np.log2(max(SAMPLES_A_VIBRATION * fastest / joint.omega, 1.0))))
+    wanted = 2 ** int(np.ceil(np.log2(max(FEWEST_SAMPLES * fastest / joint.omega, 1.0))))
     fewest = SMALL_SAMPLES if _moving(joint, at) <= SMALL_JOINT else SMALL_SAMPLES // 4
     return int(np.clip(wanted, fewest, HILL_SAMPLES))
 
