@@ -42,7 +42,7 @@ ROUGH_SHARE = 1e-4
 """Largest residual of a state that is no result, over rtol. Dovetail, 16 pairs, 212.42 Hz: with ten times this value
 sweeps in fine steps come to motions that differ by 0.8 %, with this one they agree within 2e-5."""
 
-STEP_SHARE = 1e-3
+STEP_SHARE = SMALL
 """Largest residual of a state of an adaptive history, over rtol. Steps err by 100 times as much. Dovetail, 16 and 48
 pairs: volumes equal to 2e-4, and 0.7 times the iterations of states with a residual of 1e-8."""
 

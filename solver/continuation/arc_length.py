@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, SMOOTH_CHANGE
+from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import State
 from solver.model import FloatArray
@@ -20,10 +20,6 @@ FIRST_ARC = SMOOTH_CHANGE / 10.0
 
 SHORTEST_ARC = FINE_STEP / 10.0
 """Shortest step: where none of this length converges, the branch has a corner."""
-
-ARC_WANDER = 2.0
-"""Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
-the branch of `tests/solver/test_whole_response.py` is left for another one."""
 
 
 @dataclass(frozen=True)
@@ -166,5 +162,6 @@ class _Plane:
         return np.array([self.tangent[:-1] @ step.ravel() / self.arc.size])
 
     def fraction(self, here: Bordered, _: FloatArray) -> float:
-        far = np.linalg.norm(here.extra) > ARC_WANDER * abs(self.length)
+        # without it the branch of `tests/solver/test_whole_response.py` is left for another one
+        far = np.linalg.norm(here.extra) > LARGEST_STEP_RATIO * abs(self.length)
         return np.nan if far else 1.0

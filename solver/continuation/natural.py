@@ -40,8 +40,8 @@ STEP_SAFETY = 0.85
 """Length of a step over the length with the allowed error, and the largest factor on a step that was refused."""
 
 LARGEST_STEP_RATIO = 2.0
-"""Largest ratio of two successive steps; BDF2 is zero-stable below 1 + sqrt(2). With 1.4 the damping of a mode of the
-dovetail changes by 5e-6."""
+"""Largest ratio of two successive steps, and of a step to its wanted length; BDF2 is zero-stable below 1 + sqrt(2).
+With 1.4 the damping of a mode of the dovetail changes by 5e-6."""
 
 SMALLEST_STEP_RATIO = 0.25
 """Factor on a step whose end was not found, and smallest factor on a step that was refused. On the viscosity of a

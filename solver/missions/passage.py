@@ -37,7 +37,7 @@ from solver.modes.modal_model import linear_mode
 from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, absolute
 from solver.results.history import StartState
-from solver.settings import NEGLIGIBLE, ROUND_OFF
+from solver.settings import NEGLIGIBLE, ONE_OF_TWO, ROUND_OFF
 from solver.structure.joint import friction_of_pairs
 from solver.wear.slow_time import MOST_NODES, RTOL_RATIO, Guide
 from solver.wear.step import rate_slope
@@ -48,9 +48,6 @@ FIRST_FREQUENCIES = 17
 FINEST_INTERVAL = 0.1
 """Longest interval of frequencies that is never divided, over sqrt(|df/dt|): a tenth of zeta f where the sweep rate is
 1. Slider without damping, 1 to 10 000 Hz at 10 Hz/s: 89 CPU seconds; without this limit not finished after 100."""
-
-FREQUENCY_ERROR = 0.25
-"""Allowed error of the wear of a passage by its frequencies, as a fraction of rtol."""
 
 LARGEST_SWEEP_RATE = 1.0
 """|df/dt| / (zeta f)^2 above which a message says how fast a passage is. Wear, integrated in time, over that of the
@@ -153,7 +150,8 @@ def parts_of(states: Sequence[SweptState]) -> FloatArray:
 def find_states(given: BlockInput) -> Swept | Failure:
     """The states of one passage at the depth before it, as many as its wear needs."""
     passage, area = given.passage, given.mission.area
-    aim = FREQUENCY_ERROR * (1.0 if given.guide is None else RTOL_RATIO) * given.mission.settings.rtol
+    # the frequencies have half of what the steps over missions leave to the blocks
+    aim = ONE_OF_TWO**2 * (1.0 if given.guide is None else RTOL_RATIO) * given.mission.settings.rtol
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed

@@ -35,7 +35,7 @@ from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
 FIRST_AMPLITUDE = 1e-6
 """First amplitude of a joint without static normal forces, m sqrt(kg)."""
 
-TOP_BASE = 4.0
+TOP_BASE = LARGEST_STEP_RATIO**2
 """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point: all points with one
 such power have one way. With 8 the mode of the foot is equal to 1e-8."""
 

@@ -224,7 +224,7 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
 
 def _samples(joint: Joint, at: Evaluation) -> int:
     """Samples of a period: up to eight times as many for vibrations that grow in the structure alone, with at least
-    `FEWEST_SAMPLES` in a period of the fastest one, which BDF2 then damps by 0.2 %.
+    `FEWEST_SAMPLES` in a period of the fastest one, which BDF2 then damps by 0.15 %.
     """
     (switching, stuck), fastest = switching_pairs(at), 0.0
     driven = [linear for linear in _structures(joint, at) if not _is_passive(linear)]
