@@ -26,7 +26,8 @@ VIOLATION_LIMITS = {
     **dict.fromkeys(("tension", "periodicity_error"), SMALL),
 }
 """Limits of the violations. Largest ones of good states with 3 to 41 harmonics: penetration 0.08 (vibro-impact with one
-harmonic, which is far off, 0.13), cone 0.018, energy 0.01, others below 1e-6."""
+harmonic, which is far off, 0.13; underplatform damper 0.04), cone 0.018, energy 0.01 (unstable ring 0.016), others
+below 1e-6."""
 
 
 @packable

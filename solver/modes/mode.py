@@ -33,7 +33,8 @@ from solver.structure.fourier import from_complex
 from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
 
 FIRST_AMPLITUDE = 1e-6
-"""First amplitude of a joint without static normal forces, m sqrt(kg)."""
+"""First amplitude of a joint without static normal forces, m sqrt(kg). With 1e-3 the mode of an oscillator with a wall
+is equal and takes 2 % more iterations."""
 
 TOP_BASE = LARGEST_STEP_RATIO**2
 """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point: all points with one
