@@ -10,9 +10,10 @@ from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import ResolvedState
 from solver.arguments import check_case, check_number, check_numbers, worn_model
 from solver.continuation.arc_length import Arc
+from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import HarmonicBalance, balance_at_start, functions_of
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import SMOOTH_CHANGE, State, first_response, largest_responses
+from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.loading_history.path import LoadingPath
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run

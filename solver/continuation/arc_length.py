@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS
+from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.harmonic_balance.state import SMOOTH_CHANGE, State
+from solver.harmonic_balance.state import State
 from solver.model import FloatArray
 from solver.newton.run import SHORTEST_STEP, Bordered, Run
 from solver.settings import DIFFERENCE

@@ -24,6 +24,10 @@ the largest amplitude (a step takes one or two), shakedown of sliding masses, pa
 NEAR_ITERATIONS = 10
 """Newton iterations from a near state, where a shorter step is the alternative. Of 1400 solves eight needed ten."""
 
+SMOOTH_CHANGE = 0.2
+"""Largest change over a smooth step of a branch, of the phase lag in rad; a fold with a smaller change is a corner.
+Half the value takes up to 50 % more iterations; twice the value leads to equal states."""
+
 FINE_STEP = 1e-3
 """Length over which the end or a corner of a branch is located, over the parameter, the cycle count or the force along
 the branch: there a sweep is left to its rescue, and no shorter step is made but of a sweep. Also the first load factor

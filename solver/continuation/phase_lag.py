@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.continuation.natural import ATTEMPTS
+from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
-from solver.harmonic_balance.state import SMOOTH_CHANGE, first_response
+from solver.harmonic_balance.state import first_response
 from solver.model import ComplexArray, FloatArray
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import MOST_ITERATIONS, Bordered, Run

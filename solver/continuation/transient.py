@@ -18,9 +18,9 @@ from typing import cast
 
 import numpy as np
 
-from solver.continuation.natural import NEAR_ITERATIONS
+from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import SMOOTH_CHANGE, Failure, State
+from solver.harmonic_balance.state import Failure, State
 from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome

@@ -16,11 +16,6 @@ from solver.structure.condensation import SingularStructureError, build_structur
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
 from solver.structure.joint import Case, Joint
 
-SMOOTH_CHANGE = 0.2
-"""Largest change over a smooth step of a branch, of the phase lag in rad; a fold with a smaller change is a corner, and
-two states that differ by more belong to different branches. Half the value takes up to 50 % more iterations; twice the
-value leads to equal states. At a wall more than 9 harmonics change means and first harmonics by up to 3 %."""
-
 
 @packable
 @dataclass(frozen=True)

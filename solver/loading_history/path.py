@@ -16,18 +16,10 @@ import numpy as np
 from solver.accuracy.refinement import VIBRATION_RECHECK, refine, with_level_above
 from solver.accuracy.resolved_state import Estimate, ResolvedState, left_out, nothing_happens
 from solver.contact.coulomb import SEPARATED, SLIP, friction_limit
-from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, follow_naturally
+from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import (
-    SMOOTH_CHANGE,
-    Failure,
-    State,
-    balance_after,
-    transfer,
-    vibration_change,
-    vibration_size,
-)
+from solver.harmonic_balance.state import Failure, State, balance_after, transfer, vibration_change, vibration_size
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome

@@ -9,8 +9,8 @@ import scipy.linalg
 from solver.accuracy.refinement import DIFFERENCE_SAFETY, VIBRATION_RECHECK
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
-from solver.continuation.natural import ATTEMPTS
-from solver.harmonic_balance.state import SMOOTH_CHANGE, Failure, State, vibration_change
+from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
+from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import FrequencySweep
 from solver.loading_history.sweep import LAST_NODES, STEPS_OF_REFERENCE
@@ -29,6 +29,9 @@ from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
+
+LARGEST_CHANGE = 2.0
+"""Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
 
 
 @packable
@@ -270,7 +273,7 @@ def _through_nodes(path: LoadingPath, earlier: EarlierSweep, target: float, stri
     ahead, halvings, rough = [*nodes, target], 0, run.with_tolerance(coarse.case.settings.rough_tolerance)
     while ahead:
         after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
-        if after is not None and coarse.change(states[-1], after) <= stride:
+        if after is not None and coarse.change(states[-1], after) <= LARGEST_CHANGE * stride:
             states = (*states, after)[-LAST_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > ATTEMPTS:

@@ -15,10 +15,11 @@ import numpy as np
 
 from solver.continuation.transient import SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import SMOOTH_CHANGE, Failure, vibration_change
+from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome, in_digits
 from solver.settings import NEGLIGIBLE, ROUND_OFF
+from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import HOLD_FRACTION
 from solver.wear.wearing_joint import WearingJoint, WearState
@@ -47,7 +48,7 @@ def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, dri
     point = wearing.run.state(Balance(joint, state.point.history, worn), state.at.predicted_h)
     if point is None or not wearing.run.is_stable(joint, point.evaluation):
         return None
-    if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > SMOOTH_CHANGE:
+    if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         return None
     return replace(state, point=point, hold=hold, held_from=state.cycle)
 
@@ -64,7 +65,7 @@ def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray
         reason = point.outcome if point.outcome is Outcome.ADRIFT else Outcome.MARCH_FAILED
         return Failure(reason, f"no state is found beyond cycle {in_digits(state.cycle)}: {point.message}")
     # a small fold of the branch at a corner is no jump, and there may be many corners
-    if vibration_change(state.at, point.evaluation) > SMOOTH_CHANGE:
+    if vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
         state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))
     return replace(state, point=point)
 

@@ -22,8 +22,8 @@ import numpy as np
 
 from solver.accuracy.refinement import FEWEST_OF_SERIES
 from solver.accuracy.resolved_state import fewer, shifted, with_highest
-from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, Lengths, take_step
-from solver.harmonic_balance.state import SMOOTH_CHANGE, Failure, vibration_change
+from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths, take_step
+from solver.harmonic_balance.state import Failure, vibration_change
 from solver.loading_history.sweep import NODE_ITERATIONS
 from solver.model import FloatArray
 from solver.newton.run import SHORTEST_STEP

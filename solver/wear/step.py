@@ -31,9 +31,10 @@ from dataclasses import replace
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, STICK
+from solver.continuation.natural import SMOOTH_CHANGE
 from solver.continuation.transient import RUNAWAY
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
-from solver.harmonic_balance.state import SMOOTH_CHANGE, Failure, vibration_size
+from solver.harmonic_balance.state import Failure, vibration_size
 from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
 from solver.outcome import Outcome, in_digits
