@@ -40,9 +40,6 @@ TOP_BASE = LARGEST_STEP_RATIO**2
 """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point: all points with one
 such power have one way. With 8 the mode of the foot is equal to 1e-8."""
 
-SLIDING_STARTS = 4
-"""Attempts to find a mode of a sliding joint, each at an amplitude higher by `TOP_BASE`. The slider may need two."""
-
 
 @packable
 @dataclass(frozen=True, kw_only=True)
@@ -269,8 +266,8 @@ class Rest:
     def sliding(self, amplitude: float, run: Run) -> ModeState | None:
         """The mode at a large amplitude, at which the joint slides as in its linear mode; None where not found."""
         linear, dofs = self.mode.linear, self.mode.model.contact.dofs
-        for attempt in range(SLIDING_STARTS):
-            size = amplitude * TOP_BASE**attempt
+        # the slider may need the second one
+        for size in (amplitude, TOP_BASE * amplitude):
             joint = self.mode.case.joint(linear.omega, size)
             amplitudes = np.zeros((dofs.size, len(joint.basis.orders)), complex)
             amplitudes[:, 0] = np.where(dofs.ravel() >= 0, size * linear.shape[dofs.ravel()], 0.0)
