@@ -31,7 +31,7 @@ FULL_STEPS = 6
 SHORTEST_STEP = 1.0 / 128.0
 """Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate
 state. Also the shortest natural step over the range to the target, the shortest Euler step on the slow time over the
-wanted one, over the longest one across corners, and the shortest relaxation step in periods; and the length to which a
+wanted one, and the shortest relaxation step in periods; and the length to which a
 fold is located over that of the step with it."""
 
 SAMPLES_OF_SIGN = 16

@@ -54,8 +54,7 @@ OPENING_HARMONICS = 19
 
 OTHER_BRANCH = 0.05
 """Relative difference of the vibration above which two states belong to different branches. At a wall more than 9
-harmonics change means and first harmonics by up to 3 %. With 0.2 the dovetail, 16 pairs, 212.42 Hz, is taken for held
-where it jumps; blocks, waves and impacts are equal."""
+harmonics change means and first harmonics by up to 3 %. With 0.2 blocks, waves and impacts are equal."""
 
 MOST_ROWS = 600
 """Largest number of displacements of switching pairs in all sectors: 200 pairs take 0.4 GB and 10 s."""
