@@ -15,7 +15,7 @@ from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
-from solver.settings import ROUND_OFF, SMALL
+from solver.settings import SMALL, SolverSettings
 
 FORCING = SMALL
 """Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
@@ -49,9 +49,10 @@ SMALL_JOINT = 40
 """Relative displacements up to which a joint is small and its Jacobian is factorised: impacts couple most harmonics,
 and products with any other factorisation are in vain (three pairs with 115 harmonics in the tests)."""
 
-NEUTRAL_SHIFT = ROUND_OFF
+NEUTRAL_SHIFT = SolverSettings.tolerance
 """Shift of the eigenvalues, which are 1 for a pair that sticks, where the sign of the determinant counts. The position
-of a joint that slips as a whole is arbitrary: round-off in a zero eigenvalue would give the determinant any sign."""
+of a joint that slips as a whole is arbitrary: round-off in a zero eigenvalue would give the determinant any sign. With
+a tenth a shroud wears as much within 1e-5, and the error of a block that comes loose is told six times as large."""
 
 
 @dataclass(frozen=True)
