@@ -28,11 +28,13 @@ from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 
 LOAD_STEPS = 20
-"""Steps of the static load of a joint with gaps or given normal forces, which may change the state."""
+"""Steps of the static load of a joint with gaps or given normal forces, which may change the state. With 10 and 40
+vibro-impact, its mode and a ring are equal, and take as many iterations fewer or more."""
 
-RELIEF = (0.1, 0.4)
-"""Fractions of the static friction forces that are removed where the excitation cannot be raised with the full forces.
-Other fractions lead to other states that friction allows: 5 % for a mass that ratchets."""
+RELIEF = 0.4
+"""Fraction of the static friction forces that is removed where the excitation cannot be raised with the full forces.
+Other fractions lead to other states that friction allows: 5 % for a mass that ratchets. With 0.1 before it blocks,
+waves, modes and impacts are equal, and those that fail take 5 % more iterations."""
 
 
 def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run: Run) -> State | Failure:
@@ -60,7 +62,7 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
     slid = None if sliding is None else run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
     if slid is not None and run.is_stable(whole.joint, slid.evaluation):
         return slid
-    for fraction in (0.0, *RELIEF):
+    for fraction in (0.0, RELIEF):
         relieved = Balance(quiet, relieved_history(quiet, rest, fraction))
         begun = run.state(relieved, rest.evaluation.predicted_h, 0.0) if fraction else rest
         if begun is None:

@@ -37,7 +37,9 @@ other kernels of BLAS end 0.75 % apart, with 1e-3 0.4 %. Arc length without it: 
 iterations. Modes with 1e-2 and 1e-4: the damping of the dovetail changes by 7e-5 and 1e-3."""
 
 STEP_SAFETY = 0.85
-"""Length of a step over the length with the allowed error, and the largest factor on a step that was refused."""
+"""Length of a step over the length with the allowed error, and the largest factor on a step that was refused. With 0.7
+and 0.95 histories of slider, blocks and spheres agree within their errors (2e-3) with 2 % fewer and 7 % more
+iterations."""
 
 LARGEST_STEP_RATIO = 2.0
 """Largest ratio of two successive steps, and of a step to its wanted length; BDF2 is zero-stable below 1 + sqrt(2).

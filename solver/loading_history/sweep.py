@@ -31,7 +31,8 @@ LAST_NODES = 3
 slider take 7 % more iterations."""
 
 AIMED_CHANGE = 0.75
-"""Expected change of the vibration in the next step over the largest change. Few steps are refused."""
+"""Expected change of the vibration in the next step over the largest change. Few steps are refused. With 0.6 and 0.9
+slider, masses, waves and impacts are equal within 1e-3, with 9 % more iterations."""
 
 SWEEP_ITERATIONS = 10 * SEARCH_ITERATIONS
 """Most Newton iterations of a sweep (the dovetail takes 300)."""

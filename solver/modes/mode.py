@@ -38,7 +38,7 @@ is equal and takes 2 % more iterations."""
 
 TOP_BASE = LARGEST_STEP_RATIO**2
 """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point: all points with one
-such power have one way. With 8 the mode of the foot is equal to 1e-8."""
+such power have one way. With 8 the mode of the foot is equal to 1e-8, that of the slider to 1e-13."""
 
 
 @packable
@@ -259,7 +259,7 @@ class Rest:
         start = self.state.evaluation.predicted_h.copy()
         start[:, 1:] = joint.structure.force_h[:, 1:]
         values = np.array([linear.omega, linear.damping_ratio, amplitude])
-        histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, *RELIEF))
+        histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, RELIEF))
         found = (self.mode.find(amplitude, (start, values), history, run.fresh()) for history in histories)
         return next((node for node in found if node is not None), None)
 

@@ -47,7 +47,8 @@ LARGEST_DENSE = 3000
 
 SMALL_JOINT = 40
 """Relative displacements up to which a joint is small and its Jacobian is factorised: impacts couple most harmonics,
-and products with any other factorisation are in vain (three pairs with 115 harmonics in the tests)."""
+and products with any other factorisation are in vain (three pairs with 115 harmonics in the tests). With 80 the
+stability of a ring is not known."""
 
 NEUTRAL_SHIFT = SolverSettings.tolerance
 """Shift of the eigenvalues, which are 1 for a pair that sticks, where the sign of the determinant counts. The position

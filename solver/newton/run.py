@@ -23,10 +23,12 @@ from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
 
 MOST_ITERATIONS = 30
-"""Most iterations of one solve: 2 to 5 are needed from a near state."""
+"""Most iterations of one solve: 2 to 5 are needed from a near state. With 20 and 60 slider, blocks, waves and impacts
+are equal."""
 
 FULL_STEPS = 6
-"""Full steps in a row without a new lowest residual before steps are halved. Half and twice as many: equal states."""
+"""Full steps in a row without a new lowest residual before steps are halved. Half and twice as many: equal states, and
+up to 20 % more iterations with impacts."""
 
 SHORTEST_STEP = 1.0 / 128.0
 """Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate

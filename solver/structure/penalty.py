@@ -19,10 +19,12 @@ from solver.structure.condensation import condense, regular
 
 INERTIAL_RATIO = 2.0
 """Ratio of the stiffness at twice a rate to the stiffness at the rate, above which a pair is inertial: 1 for a spring,
-4 for a mass. With 4 no pair is inertial, and the motion of the two masses is 20 % off with H = 5."""
+4 for a mass. With 4 no pair is inertial, and the motion of the two masses is 20 % off with H = 5; with 1.5 and 3
+slider, masses, waves and blocks are equal."""
 
 INERTIAL_RATE = 8.0
-"""Rate of the first test for `INERTIAL_RATIO` over the frequency, for any number of harmonics."""
+"""Rate of the first test for `INERTIAL_RATIO` over the frequency, for any number of harmonics. Half and twice: slider,
+masses, waves and blocks are equal."""
 
 DRAG_FRACTION = 0.1
 """Drag of an inertial pair over m w: the mean velocity falls to exp(-2 pi 0.1) = 0.53 of its value in a period. Half

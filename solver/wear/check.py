@@ -20,7 +20,8 @@ from solver.wear.wearing_joint import WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
 """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
-which a new choice is possible. Dovetail, 211.5, 211.75, 212.5 Hz: 0.8 to 1.4 over 1e5 cycles."""
+which a new choice is possible. Dovetail, 211.5, 211.75, 212.5 Hz: 0.8 to 1.4 over 1e5 cycles. With 1.2 and 3
+histories of slider, blocks and sphere are equal within 4e-5."""
 
 
 def full_check(wearing: WearingJoint, state: WearState) -> tuple[WearState, dict[str, Any]] | Failure:

@@ -39,7 +39,8 @@ from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
 
 FIRST_STEP, FIRST_DEPTH = 0.05, 0.01
 """Length of the first adaptive step, whose error is not known, as a fraction of the explicit step limit, and its
-largest wear, as a fraction of the largest relative motion."""
+largest wear, as a fraction of the largest relative motion. Half and twice: histories of slider, blocks and sphere are
+equal within 4e-5, with 8 % fewer and 3 % more iterations."""
 
 DOUBLINGS_ACROSS = 6
 """Most doublings of the shortest step to go across corners: to 6 % of the cycle count. Dovetail, mesh 2, nodal diameter
