@@ -24,7 +24,7 @@ from solver.structure.condensation import FrequencySlope, frequency_slope
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
-LARGEST_FREQUENCY_CHANGE = 0.02
+LARGEST_FREQUENCY_CHANGE = SMOOTH_CHANGE / 10.0
 """Largest change of the frequency in an iteration, over the frequency. Half and twice: followed resonance and peak of
 the slider are equal within 5e-4."""
 
