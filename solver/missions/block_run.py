@@ -30,6 +30,10 @@ from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
 
+LARGEST_CHANGE = 2.0
+"""Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep. With 1 missions
+of the slider are equal, and of the dovetail within 9e-4."""
+
 
 @packable
 @dataclass(frozen=True)
@@ -270,7 +274,7 @@ def _through_nodes(path: LoadingPath, earlier: EarlierSweep, target: float, stri
     ahead, halvings, rough = [*nodes, target], 0, run.with_tolerance(coarse.case.settings.rough_tolerance)
     while ahead:
         after = coarse.solve(states, ahead[0], run if ahead[0] == target else rough)
-        if after is not None and coarse.change(states[-1], after) <= stride:
+        if after is not None and coarse.change(states[-1], after) <= LARGEST_CHANGE * stride:
             states = (*states, after)[-LAST_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > ATTEMPTS:
