@@ -117,13 +117,10 @@ class Arc:
         return None if found is None else State(found.evaluation, self.start.history, target)
 
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
-        """State with the extreme parameter between two states, by bisection of the length; tangent: at the first.
-
-        The parameter is off by the square of the last length (vibro-impact: by 1e-8).
-        """
+        """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""
         sign, low, high = np.sign(tangent[-1]), 0.0, float(tangent @ (self.place(after) - self.place(state)))
         best = max(state, after, key=lambda each: sign * each.parameter)
-        shortest = SHORTEST_STEP * high
+        shortest = SHORTEST_STEP * high  # the parameter is off by its square: folds of vibro-impact are equal with a tenth
         while high - low > shortest:
             place = 0.5 * (low + high)
             found = self.step(state, tangent, place)
