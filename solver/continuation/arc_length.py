@@ -120,7 +120,7 @@ class Arc:
         """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""
         sign, low, high = np.sign(tangent[-1]), 0.0, float(tangent @ (self.place(after) - self.place(state)))
         best = max(state, after, key=lambda each: sign * each.parameter)
-        shortest = SHORTEST_STEP * high  # the parameter is off by its square: folds of vibro-impact are equal with a tenth
+        shortest = SHORTEST_STEP * high  # the parameter is off by its square; with an eighth folds are equal
         while high - low > shortest:
             place = 0.5 * (low + high)
             found = self.step(state, tangent, place)
